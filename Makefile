@@ -1,0 +1,75 @@
+# Everything the project does, from a fresh clone on a machine with Python >= 3.11 and a Rust toolchain.
+# `make demo` and `make test` are the two that matter; each does all set-up itself, in .venv.
+
+PYTHON ?= python3
+OUT    ?= out
+BIN    := .venv/bin
+SOURCES := $(shell find rust python -type f \( -name '*.rs' -o -name '*.toml' -o -name '*.py' -o -name '*.pyi' -o -name py.typed \)) \
+           Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test wheel dev bench lint rust-test python-test format clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: .venv/demo ## set up, build, and chart error against cost for two scenes into out/
+	$(BIN)/stepwell chart oscillator clover -o $(OUT)
+
+test: lint rust-test python-test ## set up, and run every test: Rust, Python, examples, docs, formatting, lints, types, stubs
+
+wheel: .venv/wheel ## build the release wheel into dist/
+	@ls -l dist/*.whl
+
+dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
+	$(BIN)/maturin develop --release --quiet
+
+bench: .venv/bench ## time every language on the same work, in one run, into benches/RESULTS.md
+	$(BIN)/python -m benches.compare
+
+lint: .venv/test
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	$(BIN)/ruff format --check --quiet .
+	$(BIN)/ruff check --quiet .
+	$(BIN)/mypy --no-error-summary
+	$(BIN)/python -m mypy.stubtest stepwell._core --concise
+
+rust-test:
+	cargo test --workspace --quiet
+
+python-test: .venv/test
+	$(BIN)/python -m pytest -q
+
+format: .venv/test ## format Rust and Python
+	cargo fmt --all
+	$(BIN)/ruff check --fix --quiet .
+	$(BIN)/ruff format --quiet .
+
+clean: ## remove everything that was built
+	rm -rf .venv dist target out
+
+# ---- set-up; the files in .venv are stamps
+
+.venv/bin/python:
+	@command -v cargo >/dev/null || { echo "stepwell needs a Rust toolchain: https://rustup.rs"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "stepwell needs Python 3.11 or later; set PYTHON="; exit 1; }
+	$(PYTHON) -m venv .venv
+
+.venv/maturin: .venv/bin/python
+	$(BIN)/pip install --quiet --disable-pip-version-check 'maturin>=1.13,<2'
+	@touch $@
+
+.venv/wheel: .venv/maturin $(SOURCES)
+	rm -rf dist
+	$(BIN)/maturin build --release --quiet --out dist
+	@touch $@
+
+# The wheel with the extra that a target asks for.
+.venv/demo: EXTRA = chart
+.venv/test: EXTRA = test
+.venv/bench: EXTRA = bench
+.venv/demo .venv/test .venv/bench: .venv/wheel
+	$(BIN)/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRA)]"
+	$(BIN)/pip install --quiet --disable-pip-version-check --force-reinstall --no-deps dist/*.whl
+	@touch $@

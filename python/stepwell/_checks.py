@@ -1,0 +1,136 @@
+"""Checks of what users give, before any work. Each raises one clear error or returns what it was given, made usable."""
+
+from __future__ import annotations
+
+import difflib
+import operator
+import os
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
+
+Array = NDArray[np.float64]
+Shape = tuple[int, ...]
+
+#: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
+LAST_STEP = 2**53
+
+
+def known(argument: str, name: object, names: Iterable[str]) -> str:
+    """Return ``name`` if it is one of ``names``; otherwise say which is the nearest."""
+    names = tuple(names)
+    if isinstance(name, str) and name in names:
+        return name
+    near = difflib.get_close_matches(str(name).lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.".replace("' Known", "'. Known"))
+
+
+def numbers(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> Array:
+    """Return ``value`` as float64, if it is real and finite, and positive if asked."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+    if array.dtype.kind not in "iuf":
+        raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
+    array = np.asarray(array, dtype=np.float64)
+    wrong = ~np.isfinite(array)
+    if wrong.any():
+        raise NotFiniteError(f"{argument}: expected finite numbers{_in(unit)}, got {array[wrong][0]}{_where(wrong)}")
+    if positive and (wrong := array <= 0).any():
+        raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
+    return array
+
+
+def number(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> float:
+    """Return ``value`` as one float."""
+    array = numbers(argument, value, positive=positive, unit=unit)
+    if array.ndim:
+        raise ShapeError(f"{argument}: expected one number{_in(unit)}, got an array of shape {array.shape}")
+    return float(array)
+
+
+def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
+    """Return ``value`` as a whole number in ``least … most``."""
+    try:
+        n = operator.index(value)
+    except TypeError:
+        raise DTypeError(f"{argument}: expected a whole number, got {value!r} ({type(value).__name__})") from None
+    if isinstance(value, (bool, np.bool_)):
+        raise DTypeError(f"{argument}: expected a whole number, got {value!r} (bool)")
+    if not least <= n <= most:
+        raise ArgumentError(f"{argument}: expected {least} or more{'' if n < least else f', up to {most}'}, got {n}")
+    return n
+
+
+def block(argument: str, value: Any, shape: Shape, axes: str) -> Array:
+    """Return a state block whose leading axes are ``shape``; a single number fills the whole block."""
+    array = numbers(argument, value)
+    if array.ndim == 0:
+        return np.broadcast_to(array, shape)
+    if array.shape[: len(shape)] != shape:
+        raise ShapeError(f"{argument}: expected shape {_shape(shape, axes)}, got {array.shape}; batch axes come last")
+    return array
+
+
+def batch_shape(shapes: dict[str, Shape]) -> Shape:
+    """Return the shape to which all batches broadcast, the arguments by name."""
+    try:
+        shape = np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        given = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
+        raise ShapeError(f"these batch shapes do not broadcast to one: {given}") from None
+    if 0 in shape:
+        empty = ", ".join(name for name, shape in shapes.items() if 0 in shape)
+        raise ShapeError(f"{empty}: expected at least one member, got an empty batch of shape {shape}")
+    return shape
+
+
+def fits(what: str, rows: int, batch: Shape, remedy: str) -> None:
+    """Raise if ``rows`` numbers for each member of a batch do not fit in this machine's memory."""
+    members = 1
+    for n in batch:
+        members *= int(n)
+    needed = 8.0 * rows * members
+    memory = float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 2.0**63
+    if needed > memory:
+        raise TooLargeError(
+            f"{what} of {members} members need {needed / 2**30:.3g} GiB, but this machine has {memory / 2**30:.3g} GiB; {remedy}"
+        )
+
+
+def in_place(argument: str, array: Any, shape: Shape) -> Array:
+    """Return ``array`` if it can be stepped in place; it is never copied."""
+    if not isinstance(array, np.ndarray):
+        raise DTypeError(f"{argument}: expected a NumPy array to step in place, got {type(array).__name__}")
+    if array.dtype != np.float64 or not array.dtype.isnative:
+        raise DTypeError(f"{argument}: expected dtype float64 to step in place, got {array.dtype}")
+    if array.shape != shape:
+        raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
+    if not array.flags.c_contiguous:
+        raise ArgumentError(f"{argument}: expected a C-contiguous array to step in place, got strides {array.strides}")
+    if not array.flags.writeable:
+        raise ArgumentError(f"{argument}: expected a writeable array to step in place, got a read-only one")
+    numbers(argument, array)
+    return array
+
+
+def _in(unit: str) -> str:
+    return f" in {unit}" if unit else ""
+
+
+def _kind(value: Any, array: NDArray[Any]) -> str:
+    return repr(value) if array.ndim == 0 else f"an array of dtype {array.dtype}"
+
+
+def _where(wrong: NDArray[np.bool_]) -> str:
+    return f" at index {tuple(int(i) for i in np.argwhere(wrong)[0])}" if wrong.ndim else ""
+
+
+def _shape(shape: Shape, axes: str) -> str:
+    return f"({', '.join(str(n) for n in shape)}, batch…){f' = ({axes}, batch…)' if axes else ''}"

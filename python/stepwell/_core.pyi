@@ -1,0 +1,66 @@
+"""The Rust core: arrays in, arrays out. Everything is checked before it gets here; use ``stepwell``, not this."""
+
+from collections.abc import Callable
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+@final
+class ModelSpec:
+    def __new__(
+        cls,
+        system: str,
+        options: list[str],
+        size: int,
+        rows: list[NDArray[np.float64]],
+        tables: list[tuple[float, float, NDArray[np.float64]]],
+        method: str,
+        matrix: tuple[list[float], int] | None = None,
+    ) -> ModelSpec: ...
+
+@final
+class World:
+    def __new__(
+        cls,
+        model: ModelSpec,
+        *,
+        t0: float,
+        dt: float,
+        start: int,
+        first: int,
+        members: int,
+        v: NDArray[np.float64],
+        y: NDArray[np.float64],
+    ) -> World: ...
+    def step(self, n: int = 1) -> None: ...
+    @property
+    def t(self) -> float: ...
+    @property
+    def step_number(self) -> int: ...
+
+def catalogue() -> list[dict[str, Any]]: ...
+def systems() -> list[str]: ...
+def isa() -> str: ...
+def isa_levels() -> list[str]: ...
+def saves(steps: int, every: int | None) -> list[int]: ...
+def run(
+    model: ModelSpec,
+    *,
+    t0: float,
+    dt: float,
+    start: int,
+    first: int,
+    steps: int,
+    every: int | None,
+    threads: int,
+    carried: bool,
+    v: NDArray[np.float64],
+    y: NDArray[np.float64],
+    saved_v: NDArray[np.float64],
+    saved_y: NDArray[np.float64],
+    first_bad: NDArray[np.int64],
+    progress: Callable[[float], object] | None,
+) -> None: ...

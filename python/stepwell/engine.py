@@ -1,0 +1,226 @@
+"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct or in matrix form.
+
+A slot is what stands in the place of a block between steps: v for most methods, something else for those with a carry. Everything
+above this file speaks of states, everything below of slots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from math import lcm
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+from ._checks import Array, Shape
+from .methods import Method
+from .reference import run as reference
+from .systems import Sampled, System
+from .systems.base import Parameters, row
+from .systems.inputs import Input, table
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay."""
+
+    system: System
+    method: Method
+    batch: Shape
+    dt: float
+    t0: float = 0.0
+    first: int = 0
+    steps: int = 1
+    every: int | None = None
+    choice: int = 0
+    threads: int = 0
+    backend: str = "rust"
+    form: str = "direct"
+    progress: Callable[[float], object] | None = None
+
+    @property
+    def saves(self) -> list[int]:
+        """The steps, counted from the first, at which the state is kept."""
+        return _core.saves(self.steps, self.every)
+
+    @property
+    def block_axes(self) -> tuple[int, int]:
+        """How many axes a block of v and one of y have."""
+        return len(self.system.v_shape), len(self.system.y_shape)
+
+
+@dataclass
+class Outcome:
+    """Kept states, last slots, and the first step of each member that was not finite."""
+
+    v: Array
+    y: Array
+    slot: Array
+    first_bad: NDArray[np.int64]
+
+
+def advance(plan: Plan, v: Array, y: Array, *, carried: bool = False) -> Outcome:
+    """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch."""
+    if plan.form == "matrix":
+        return _matrix(plan, v, y, carried)
+    if plan.backend == "numpy":
+        return _numpy(plan, v, y, carried)
+    return _rust(plan, _model(plan), v, y, carried)
+
+
+def _numpy(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
+    steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
+
+    def step(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+        return steps.step(s, t, plan.dt, v, y)
+
+    slot = v if carried else _start(plan, v, y)
+    slot, y, kept, first_bad = _loop(plan, step, slot, y, plan.block_axes)
+    return _finished(plan, slot, kept, first_bad)
+
+
+def _loop(plan: Plan, step: Any, v: Array, y: Array, block_axes: tuple[int, int]) -> Any:
+    def told(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+        nonlocal done
+        done += 1
+        if plan.progress is not None and done % every == 0:
+            plan.progress(done / plan.steps)
+        return step(t, v, y)  # type: ignore[no-any-return]
+
+    done, every = 0, max(1, plan.steps // 100)
+    return reference.run(
+        told, v, y, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves
+    )
+
+
+def _start(plan: Plan, v: Array, y: Array) -> Array:
+    """What the method carries at the first step."""
+    if plan.method.carry is None:
+        return v
+    s = plan.system.scaled(plan.dt, plan.batch)
+    with np.errstate(all="ignore"):
+        return np.asarray(plan.method.steps.start(s, plan.choice, plan.t0 + plan.first * plan.dt, v, y))
+
+
+def _finished(plan: Plan, slot: Array, kept: list[tuple[Array, Array]], first_bad: Any) -> Outcome:
+    """The states from the kept slots."""
+    v = [pair[0] for pair in kept]
+    y = [pair[1] for pair in kept]
+    if plan.method.carry is not None:
+        s = plan.system.scaled(plan.dt, plan.batch)
+        times = [plan.t0 + (plan.first + i) * plan.dt for i in plan.saves]
+        with np.errstate(all="ignore"):
+            v = [plan.method.steps.finish(s, plan.choice, *state) for state in zip(times, v, y, strict=True)]
+    return Outcome(np.stack(v), np.stack(y), slot, np.asarray(first_bad, dtype=np.int64))
+
+
+def _model(plan: Plan) -> _core.ModelSpec:
+    return model(plan.system.kernel, plan.system.parameters(plan.batch), plan.method)
+
+
+def model(kernel: str, p: Parameters, method: Method, matrix: tuple[list[float], int] | None = None) -> _core.ModelSpec:
+    """What to step, as the core takes it."""
+    tables = [(start, interval, values) for values, interval, start in p.tables]
+    return _core.ModelSpec(kernel, p.options, p.size, p.rows, tables, method.name, matrix)
+
+
+def _rust(plan: Plan, model: _core.ModelSpec, v: Array, y: Array, carried: bool, carries: bool | None = None) -> Outcome:
+    carries = plan.method.carry is not None if carries is None else carries
+    slot, y = (np.array(a, dtype=np.float64, order="C") for a in (v, y))
+    # The last state alone needs no second copy, unless the slot holds something else.
+    keep = len(plan.saves) if plan.every is not None or carries else 0
+    saved_v, saved_y = (np.empty((keep, *a.shape)) for a in (slot, y))
+    first_bad = np.full(plan.batch, -1, dtype=np.int64)
+    _core.run(
+        model,
+        t0=plan.t0,
+        dt=plan.dt,
+        start=plan.choice,
+        first=plan.first,
+        steps=plan.steps,
+        every=plan.every,
+        threads=plan.threads,
+        carried=carried,
+        v=slot,
+        y=y,
+        saved_v=saved_v,
+        saved_y=saved_y,
+        first_bad=first_bad.reshape(-1),
+        progress=plan.progress,
+    )
+    if not keep:
+        saved_v, saved_y = slot[np.newaxis], y[np.newaxis]
+    return Outcome(saved_v, saved_y, slot, first_bad)
+
+
+# ---- the transition-matrix form
+
+
+def transition(plan: Plan) -> tuple[Array, Array, list[Any]]:
+    """P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), and the inputs.
+
+    Both are found by stepping: P from unit vectors of the slots, Q from zero with a unit pulse of one input at one node.
+    """
+    n_v, n_y = (int(np.prod(shape)) for shape in (plan.system.v_shape, plan.system.y_shape))
+    n = n_v + n_y
+    one = replace(plan, t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
+
+    def step(system: System, batch: Shape, v: Array, y: Array) -> Array:
+        out = advance(replace(one, system=system, batch=batch), v, y, carried=True)
+        last_y = out.y[-1]
+        return np.concatenate([out.slot.reshape(n_v, *batch), last_y.reshape(n_y, *batch)])
+
+    unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(plan.batch)), (n, n, *plan.batch))
+    v, y = unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch), unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch)
+    p = step(plan.system.without_inputs(), (n, *plan.batch), v, y)
+
+    inputs = plan.system.inputs()
+    grid = lcm(*(Fraction(c).limit_denominator(1000).denominator for c in plan.method.nodes))
+    zero_v, zero_y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
+    q = []
+    for node in plan.method.nodes:
+        for name in inputs:
+            pulse = np.zeros(grid + 1)
+            pulse[round(node * grid)] = 1.0
+            q.append(step(plan.system.with_pulse(name, pulse, plan.dt / grid), plan.batch, zero_v, zero_y))
+    return p, np.stack(q) if q else np.zeros((0, n, *plan.batch)), list(inputs.values())
+
+
+def _matrix(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
+    p, q, signals = transition(plan)
+    slot = v if carried else _start(plan, v, y)
+    n_v, n_y = v.size // max(1, int(np.prod(plan.batch))), y.size // max(1, int(np.prod(plan.batch)))
+    blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
+    flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
+
+    if plan.backend == "numpy":
+        linear = reference.linear_step(p, q, signals, plan.method.nodes, plan.dt)
+
+        def step(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+            s = linear(t, np.concatenate([v, y]))
+            return s[:n_v], s[n_v:]
+
+        flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, (1, 1))
+    else:
+        rows = [row(r, plan.batch) for r in (*p.reshape(-1, *plan.batch), *q.reshape(-1, *plan.batch))]
+        parameters = Parameters(size=n_v + n_y, rows=rows)
+        for given in _given_inputs(plan.system):
+            if isinstance(given, Sampled):
+                parameters.options.append("held")
+                parameters.tables.append(table(given, plan.batch))
+            else:
+                parameters.options.append("sine")
+                rows += [row(a, plan.batch) for a in (given.amplitude, given.omega, given.phase)]
+        spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
+        out = _rust(plan, spec, flat_v, flat_y, carried=True, carries=False)
+        flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
+    shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
+    return _finished(plan, flat_v.reshape(blocks[0]), shaped, first_bad)
+
+
+def _given_inputs(system: System) -> list[Input]:
+    return [given for given in (getattr(system, "x", None), getattr(system, "a", None)) if given is not None]

@@ -1,0 +1,42 @@
+"""Everything that stepwell raises or warns of, in one tree.
+
+A message says what was given, what was expected, and the argument's name.
+"""
+
+from __future__ import annotations
+
+
+class StepwellError(Exception):
+    """The root: catching it catches every error that stepwell raises by intention."""
+
+
+class ArgumentError(StepwellError, ValueError):
+    """An argument has a value that cannot be used."""
+
+
+class UnknownNameError(ArgumentError, LookupError):
+    """There is no method, system, scene or option of that name; the message names the nearest one."""
+
+
+class ShapeError(ArgumentError):
+    """An array has a shape that does not fit."""
+
+
+class DTypeError(ArgumentError, TypeError):
+    """A value is of a kind that is no number, or an array of a kind that cannot be stepped in place."""
+
+
+class NotFiniteError(ArgumentError):
+    """An input holds NaN or an infinity."""
+
+
+class TooLargeError(ArgumentError, MemoryError):
+    """What was asked for does not fit in memory."""
+
+
+class UnsupportedError(StepwellError, ValueError):
+    """A method cannot do what a system asks for."""
+
+
+class DivergenceWarning(UserWarning):
+    """Some members left the range of finite numbers. Their rows say when; their neighbours are not touched."""

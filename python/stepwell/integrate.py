@@ -1,0 +1,163 @@
+"""Runs: one trajectory or a hundred thousand."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import nullcontext
+from typing import Any
+
+import numpy as np
+
+from . import _checks, engine
+from ._checks import Array
+from .errors import ArgumentError, DivergenceWarning, DTypeError, UnsupportedError
+from .methods import Method, method as find_method
+from .result import Run, Status
+from .systems import System
+
+BACKENDS = ("rust", "numpy")
+FORMS = ("direct", "matrix")
+
+
+def integrate(
+    system: System,
+    method: str | Method,
+    *,
+    v: Any,
+    y: Any,
+    dt: float,
+    steps: int,
+    every: int | None = None,
+    t0: float = 0.0,
+    start_step: int = 0,
+    start: str | None = None,
+    carry: Any = None,
+    form: str = "direct",
+    threads: int | None = None,
+    backend: str = "rust",
+    progress: bool = False,
+) -> Run:
+    """Step a system, or a batch of it.
+
+    Every parameter of the system and both blocks broadcast; batch axes come last. One diverged member never touches its
+    neighbours. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
+    in company, in one piece or in several.
+
+    Args:
+        system: what to step.
+        method: its name, or what ``stepwell.method`` returns.
+        v: velocity block at the start, shape (*block, *batch), or one number for all.
+        y: coordinate block at the start, likewise.
+        dt: the step, in units of time, above zero.
+        steps: how many steps, one or more.
+        every: keep the state every so many steps, with the first and the last; None keeps the last alone.
+        t0: time of step 0. Step k is at t0 + k·dt, computed so and never accumulated.
+        start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
+        start: how a method with a choice starts; see ``method(…).starts``.
+        carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used.
+        form: ``"direct"``, or ``"matrix"`` for the transition matrix of a linear system (Appendix B).
+        threads: how many threads share the members; None for as many as pay.
+        backend: ``"rust"``, or ``"numpy"`` for the reference.
+        progress: show a progress bar (needs rich).
+
+    Returns:
+        A ``Run``.
+
+    Raises:
+        ArgumentError: before any work: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system.
+        KeyboardInterrupt: within a tenth of a second of Ctrl-C.
+
+    Warns:
+        DivergenceWarning: how many members left the finite range, which first, and when. Nothing computed is lost.
+    """
+    if not isinstance(system, System):
+        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
+    how = find_method(method)
+    fits_together(system, how)
+    form = _checks.known("form", form, FORMS)
+    backend = _checks.known("backend", backend, BACKENDS)
+    if form == "matrix" and not system.linear:
+        raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    t0 = _checks.number("t0", t0, unit="units of time")
+    steps = _checks.count("steps", steps, 1)
+    start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
+    every = None if every is None else _checks.count("every", every, 1)
+    workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
+    choice = how.start_choice(start)
+    if carry is not None and how.carry is None:
+        raise ArgumentError(f"carry: {how.name} carries nothing but v between steps")
+
+    v = _checks.block("carry" if carry is not None else "v", v if carry is None else carry, system.v_shape, system.axes)
+    y = _checks.block("y", y, system.y_shape, system.axes)
+    batch = _checks.batch_shape(
+        {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    )
+    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form)
+    rows = int(np.prod(system.v_shape)) + int(np.prod(system.y_shape))
+    kept = 1 if every is None else steps // every + 2
+    _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
+    v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+
+    with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
+        out = engine.advance(engine.replace(plan, progress=told), v, y, carried=carry is not None)
+    run = Run(
+        t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
+        v=out.v,
+        y=out.y,
+        status=np.where(out.first_bad >= 0, Status.DIVERGED, Status.OK).astype(np.int8),
+        first_bad_step=out.first_bad,
+        carry=None if how.carry is None else out.slot,
+        system=system,
+        method=how,
+        dt=dt,
+        t0=t0,
+        start_step=start_step,
+        steps=steps,
+        start=how.starts[choice] if how.starts else None,
+    )
+    _warn(run)
+    return run
+
+
+def fits_together(system: System, method: Method) -> None:
+    """Raise if the method cannot do the system."""
+    if not method.needs_acceleration:
+        return
+    if not system.second_order:
+        raise UnsupportedError(f"{method.name} needs a second-order system, ÿ = a(t, y); {system!r} is not one")
+    if system.velocity_term is not None:
+        raise UnsupportedError(
+            f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
+            f"use false_euler, or leave {system.velocity_term} out"
+        )
+
+
+def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Array:
+    """A state over the whole batch."""
+    axes = array.shape[len(block) :]
+    return np.broadcast_to(array.reshape(*block, *(1,) * (len(batch) - len(axes)), *axes), (*block, *batch))
+
+
+def _bar(title: str) -> Any:
+    try:
+        from ._progress import bar
+    except ImportError:
+        raise UnsupportedError("progress: a progress bar needs rich; pip install 'stepwell[progress]'") from None
+    return bar(title)
+
+
+def _warn(run: Run) -> None:
+    bad = run.first_bad_step >= 0
+    if not bad.any():
+        return
+    step = int(run.first_bad_step[bad].min())
+    first = tuple(int(i) for i in np.argwhere(run.first_bad_step == step)[0])
+    who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
+    warnings.warn(
+        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {who} at step {step} "
+        f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}",
+        DivergenceWarning,
+        stacklevel=3,
+    )

@@ -1,0 +1,114 @@
+"""Methods: everything there is to ask of one, read from its record in the core."""
+
+from __future__ import annotations
+
+import importlib
+from functools import cache
+from typing import Any, Protocol, cast
+
+from . import _checks, _core
+from .errors import ArgumentError
+
+
+class Steps(Protocol):
+    """What a file in ``reference/steppers`` defines. ``start`` and ``finish`` are there if the method has a carry."""
+
+    def step(self, s: Any, t: float, h: float, v: Any, y: Any) -> tuple[Any, Any]:
+        """One step."""
+
+    def start(self, s: Any, choice: int, t: float, v: Any, y: Any) -> Any:
+        """What the method carries in the place of v."""
+
+    def finish(self, s: Any, choice: int, t: float, v: Any, y: Any) -> Any:
+        """The velocity from what the method carries."""
+
+
+class Method:
+    """A method and what is known of it.
+
+    Attributes:
+        name: what you type.
+        title: the document's name.
+        other_names: standard names of the same method.
+        false_friends: methods that it is easily taken for.
+        order: order of convergence.
+        evaluations: rate evaluations per step.
+        family: what kind of method it is.
+        limit: the undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
+        nodes: times within a step at which rates are asked for, as fractions of the step.
+        needs_acceleration: whether it asks for a second-order system whose forces do not depend on the velocity.
+        carry: what it carries between steps in the place of v, or None.
+        starts: ways to start it, the default first.
+        section: section of the document.
+        reference: where it comes from.
+        about: what it does.
+    """
+
+    name: str
+    title: str
+    other_names: tuple[str, ...]
+    false_friends: tuple[str, ...]
+    order: int
+    evaluations: int
+    family: str
+    limit: float
+    nodes: tuple[float, ...]
+    needs_acceleration: bool
+    carry: str | None
+    starts: tuple[str, ...]
+    section: str
+    reference: str
+    about: str
+
+    def __init__(self, record: dict[str, Any]) -> None:
+        for key, value in record.items():
+            setattr(self, key, tuple(value) if isinstance(value, list) else value)
+        self.__doc__ = self._text()
+
+    @property
+    def steps(self) -> Steps:
+        """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
+        return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
+
+    def start_choice(self, start: str | None) -> int:
+        """The number of a start, for the core."""
+        if start is None:
+            return 0
+        if not self.starts:
+            raise ArgumentError(f"start: {self.name} starts in one way only, got {start!r}")
+        return self.starts.index(_checks.known("start", start, self.starts))
+
+    def _text(self) -> str:
+        limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
+        lines = [f"{self.title}: order {self.order}, {self.evaluations} rate evaluation(s) per step.", "", self.about, ""]
+        if self.other_names:
+            lines.append(f"Also called: {', '.join(self.other_names)}.")
+        if self.false_friends:
+            lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
+        lines += [f"Undamped oscillator stable: {limit}.", f"Source: the document's {self.section}; {self.reference}."]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<method {self.name}: {self.title}, order {self.order}, {self.evaluations} evaluation(s) per step>"
+
+
+@cache
+def _catalogue() -> dict[str, Method]:
+    by_section = sorted(map(Method, _core.catalogue()), key=lambda m: (int(m.section.strip("§")), m.order, m.name))
+    return {m.name: m for m in by_section}
+
+
+def methods() -> tuple[Method, ...]:
+    """Every method, in the order of the document."""
+    return tuple(_catalogue().values())
+
+
+def method(name: str | Method) -> Method:
+    """The method of that name.
+
+    Raises:
+        UnknownNameError: if there is none; the message names the nearest.
+    """
+    if isinstance(name, Method):
+        return name
+    return _catalogue()[_checks.known("method", name, _catalogue())]

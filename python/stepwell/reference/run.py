@@ -1,0 +1,39 @@
+"""The loop around a step, and the transition-matrix form (Appendix B): the specification of the core's driver."""
+
+import numpy as np
+
+
+def run(step, v, y, block_axes, *, h, t0, first, steps, saves):
+    """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves`` and who diverged when.
+
+    ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is
+    t0 + k·h, never accumulated. A member has diverged at the first step whose state is not finite.
+    """
+    keep = set(saves)
+    kept = [(v, y)] if 0 in keep else []
+    first_bad = np.full(y.shape[block_axes[1] :], -1)
+    blocks = tuple(tuple(range(n)) for n in block_axes)
+    with np.errstate(all="ignore"):
+        for i in range(steps):
+            k = first + i
+            v, y = step(t0 + k * h, v, y)
+            finite = np.isfinite(v).all(axis=blocks[0]) & np.isfinite(y).all(axis=blocks[1])
+            first_bad = np.where((first_bad < 0) & ~finite, k + 1, first_bad)
+            if i + 1 in keep:
+                kept.append((v, y))
+    return v, y, kept, first_bad
+
+
+def linear_step(p, q, inputs, nodes, h):
+    """One step of s ← P·s + Σ Q·u, with s the rows of v and y; the sums run over s, then over the nodes and their inputs."""
+    columns = [(node * h, signal) for node in nodes for signal in inputs]
+
+    def step(t, s):
+        following = p[:, 0] * s[0]
+        for j in range(1, len(s)):
+            following = following + p[:, j] * s[j]
+        for j, (later, signal) in enumerate(columns):
+            following = following + q[j] * signal.at(t + later)
+        return following
+
+    return step

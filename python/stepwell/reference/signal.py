@@ -1,0 +1,39 @@
+"""Inputs: what drives a system from outside, as a function of time."""
+
+import math
+
+from . import trig
+
+#: A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
+HOLD_SLACK = 1e-6
+
+
+class Sine:
+    """amplitude · sin(omega·t + phase)."""
+
+    def __init__(self, amplitude, omega, phase):
+        self.amplitude, self.omega, self.phase = amplitude, omega, phase
+
+    def at(self, t):
+        """The value at time t."""
+        return self.amplitude * trig.sin(self.omega * t + self.phase)
+
+    def scaled(self, factor):
+        """The same input, times a factor."""
+        return Sine(factor * self.amplitude, self.omega, self.phase)
+
+
+class Held:
+    """``values[i]`` from start + i·interval until the next sample; the first before, the last after. A constant is one sample."""
+
+    def __init__(self, values, interval, start, factor=1.0):
+        self.values, self.interval, self.start, self.factor = values, interval, start, factor
+
+    def at(self, t):
+        """The value at time t."""
+        i = math.floor((t - self.start) / self.interval + HOLD_SLACK)
+        return self.factor * self.values[max(0, min(i, len(self.values) - 1))]
+
+    def scaled(self, factor):
+        """The same input, times a factor."""
+        return Held(self.values, self.interval, self.start, factor)

@@ -1,0 +1,1 @@
+"""The methods, one file each, as short as in the document."""

@@ -1,0 +1,12 @@
+"""Standard Heun (§9)."""
+
+
+def step(s, t, h, v, y):
+    """A predictor, then the mean of the increments at both ends."""
+    dv1 = s.dv(t, v, y)
+    dy1 = s.dy(t, v, y)
+    v1 = v + dv1
+    y1 = y + dy1
+    dv2 = s.dv(t + h, v1, y1)
+    dy2 = s.dy(t + h, v1, y1)
+    return v + 0.5 * (dv1 + dv2), y + 0.5 * (dy1 + dy2)

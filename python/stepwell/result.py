@@ -1,0 +1,78 @@
+"""What a run returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._checks import Array
+from .methods import Method
+from .systems import System
+
+
+class Status(IntEnum):
+    """How a member ended."""
+
+    OK = 0
+    DIVERGED = 1
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run, with what was asked for kept along the first axis.
+
+    Attributes:
+        t: times of the kept states, shape (saved,).
+        v: velocities, shape (saved, *block, *batch).
+        y: coordinates, likewise.
+        status: per member, ``Status.OK`` or ``Status.DIVERGED``, shape (*batch).
+        first_bad_step: per member, the number of the first step that was not finite, or −1.
+        carry: what the method carries in the place of v (Verlet: ``y_prev``), or None.
+        system: what was stepped.
+        method: how.
+        dt: the step.
+        t0: time of step 0.
+        start_step: number of the first step.
+        steps: how many steps were made.
+        start: how the method was started, or None.
+    """
+
+    t: Array
+    v: Array
+    y: Array
+    status: NDArray[np.int8]
+    first_bad_step: NDArray[np.int64]
+    carry: Array | None
+    system: System
+    method: Method
+    dt: float
+    t0: float
+    start_step: int
+    steps: int
+    start: str | None
+
+    @property
+    def energy(self) -> Array:
+        """Energy of every kept state, shape (saved, *batch), computed now; see the system's ``energy``."""
+        v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
+        with np.errstate(all="ignore"):
+            return self.system.energy(v, y)
+
+    @property
+    def resume(self) -> dict[str, Any]:
+        """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit."""
+        state = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
+        if self.start is not None:
+            state["start"] = self.start
+        return state | ({} if self.carry is None else {"carry": self.carry})
+
+    def __repr__(self) -> str:
+        bad = int(np.count_nonzero(self.status))
+        return (
+            f"<run of {self.system!r} by {self.method.name}: {self.steps} steps of {self.dt:g} from t = {self.t[0]:g}, "
+            f"{len(self.t)} kept, {self.status.size} member(s), {bad} diverged>"
+        )

@@ -1,0 +1,9 @@
+"""The systems that users describe: parameters, checks, energies. Their formulas are in ``stepwell.reference.systems``."""
+
+from .base import System
+from .chain import Chain
+from .inputs import Sampled, Sinusoid
+from .nbody import NBody
+from .oscillator import Oscillator
+
+__all__ = ["Chain", "NBody", "Oscillator", "Sampled", "Sinusoid", "System"]

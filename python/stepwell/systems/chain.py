@@ -1,0 +1,77 @@
+"""A chain of masses and springs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from ..errors import ArgumentError, ShapeError
+from ..reference.systems import chain as reference
+from .base import Parameters, System, row
+
+
+class Chain(System):
+    """n masses between two walls, joined by n + 1 springs; mass i of block shape (n,) is displaced by y from its rest.
+
+    Args:
+        n: how many masses, one or more.
+        stiffness: of the springs: one number, or an array with the n + 1 springs (or 1, for all) along its first axis and the
+            batch along the others. A first or last spring of no stiffness leaves that end of the chain free.
+        mass: of the masses, likewise, with n (or 1) along its first axis.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+    """
+
+    kernel = "chain"
+    axes = "masses"
+    linear = True
+
+    def __init__(self, n: int, *, stiffness: Any = 1.0, mass: Any = 1.0) -> None:
+        self.n = _checks.count("n", n, 1)
+        self.stiffness = _per_row("stiffness", stiffness, self.n + 1, "springs")
+        self.mass = _per_row("mass", mass, self.n, "masses")
+        if (self.mass <= 0).any():
+            raise ArgumentError(f"mass: expected numbers above zero, got {self.mass.min():g}")
+        if (self.stiffness < 0).any():
+            raise ArgumentError(f"stiffness: expected numbers of zero or more, got {self.stiffness.min():g}")
+        self.v_shape = self.y_shape = (self.n,)
+        self.batch = _checks.batch_shape({"stiffness": self.stiffness.shape[1:], "mass": self.mass.shape[1:]})
+
+    def __repr__(self) -> str:
+        return f"Chain({self.n})"
+
+    def _rows(self, batch: Shape) -> tuple[Array, Array]:
+        """Stiffnesses and masses with as many batch axes as the states have."""
+
+        def aligned(array: Array) -> Array:
+            return array.reshape(len(array), *(1,) * (len(batch) - array.ndim + 1), *array.shape[1:])
+
+        return aligned(self.stiffness), aligned(self.mass)
+
+    def scaled(self, h: float, batch: Shape) -> reference.Chain:
+        """The NumPy reference, scaled to the step h."""
+        return reference.Chain(h, *self._rows(batch))
+
+    def parameters(self, batch: Shape) -> Parameters:
+        """Size and rows for the core, as ``chain.rs`` documents them."""
+        return Parameters(size=self.n, rows=[row(r, batch) for array in (self.stiffness, self.mass) for r in array])
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""
+        k, m = self._rows(y.shape[1:])
+        wall = np.zeros_like(y[:1])
+        stretch = np.diff(np.concatenate([wall, y, wall]), axis=0)
+        return np.asarray(0.5 * (m * v * v).sum(axis=0) + 0.5 * (k * stretch * stretch).sum(axis=0))
+
+
+def _per_row(argument: str, value: Any, rows: int, what: str) -> Array:
+    array = _checks.numbers(argument, value)
+    if array.ndim == 0:
+        return np.full(rows, array)
+    if array.shape[0] not in (1, rows):
+        raise ShapeError(f"{argument}: expected {rows} {what} (or 1) along the first axis, got shape {array.shape}")
+    return np.ascontiguousarray(np.broadcast_to(array, (rows, *array.shape[1:])))

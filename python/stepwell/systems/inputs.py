@@ -1,0 +1,85 @@
+"""Inputs x(t) and accelerations a(t): a number, a sinusoid, or samples held in between."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from ..errors import ShapeError
+from ..reference.signal import Held, Sine
+
+
+class Sinusoid:
+    """amplitude · sin(omega·t + phase).
+
+    Args:
+        amplitude: in the unit of the input; broadcasts over the batch.
+        omega: in radians per unit of time; broadcasts.
+        phase: in radians; broadcasts.
+    """
+
+    def __init__(self, amplitude: Any, omega: Any, phase: Any = 0.0) -> None:
+        self.amplitude = _checks.numbers("amplitude", amplitude)
+        self.omega = _checks.numbers("omega", omega, unit="rad per unit of time")
+        self.phase = _checks.numbers("phase", phase, unit="rad")
+        self.batch = _checks.batch_shape(
+            {"amplitude": self.amplitude.shape, "omega": self.omega.shape, "phase": self.phase.shape}
+        )
+
+    def __repr__(self) -> str:
+        return f"Sinusoid(amplitude={self.amplitude}, omega={self.omega}, phase={self.phase})"
+
+    def signal(self) -> Any:
+        """The reference signal."""
+        return Sine(self.amplitude, self.omega, self.phase)
+
+
+class Sampled:
+    """Samples, each held until the next; the first also before it, the last also after it.
+
+    Args:
+        values: the samples along the first axis, the batch along the others.
+        interval: time from one sample to the next.
+        start: time of the first sample.
+
+    A time that misses a sample's instant by less than a millionth of the interval, as t = t0 + k·dt may by rounding, counts
+    as that instant.
+    """
+
+    def __init__(self, values: Any, interval: Any, start: Any = 0.0) -> None:
+        self.values = _checks.numbers("values", values)
+        if self.values.ndim == 0 or len(self.values) == 0:
+            raise ShapeError(f"values: expected at least one sample along the first axis, got shape {self.values.shape}")
+        self.interval = _checks.number("interval", interval, positive=True, unit="units of time")
+        self.start = _checks.number("start", start, unit="units of time")
+        self.batch: Shape = self.values.shape[1:]
+
+    def __repr__(self) -> str:
+        return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
+
+    def signal(self) -> Any:
+        """The reference signal."""
+        return Held(self.values, self.interval, self.start)
+
+
+Input = Sinusoid | Sampled
+
+
+def as_input(argument: str, value: Any) -> Input | None:
+    """An input from what users give: a constant is one sample, held forever."""
+    if value is None or isinstance(value, (Sinusoid, Sampled)):
+        return value
+    return Sampled(_checks.numbers(argument, value)[np.newaxis], interval=1.0)
+
+
+def table(sampled: Sampled, batch: Shape) -> tuple[Array, float, float]:
+    """The samples as the core takes them: a row per sample, of one number or one for each member."""
+    values = sampled.values
+    if values.ndim > 1:
+        values = np.broadcast_to(
+            values.reshape(len(values), *(1,) * (len(batch) - len(sampled.batch)), *sampled.batch), (len(values), *batch)
+        )
+    return np.ascontiguousarray(values.reshape(len(values), -1)), sampled.interval, sampled.start

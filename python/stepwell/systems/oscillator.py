@@ -1,0 +1,102 @@
+"""The linear oscillator (§3)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from ..reference.systems import oscillator as reference
+from .base import Parameters, System, row
+from .inputs import Input, Sampled, Sinusoid, as_input, table
+
+FORMS = ("canonical", "physical")
+
+
+class Oscillator(System):
+    """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3).
+
+    Args:
+        omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch.
+        damping: damping ratio D, without a unit; broadcasts. None leaves the term out.
+        x: input that the spring pulls towards: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
+        a: acceleration by an external force, likewise.
+        form: ``"canonical"``, where v is the velocity divided by ω₀ and the phase diagram is a circle, or ``"physical"``, where
+            v is the velocity.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+    """
+
+    kernel = "oscillator"
+    linear = True
+
+    def __init__(
+        self, omega: Any = 1.0, damping: Any = None, *, x: Any = None, a: Any = None, form: str = "canonical"
+    ) -> None:
+        self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
+        self.damping = None if damping is None else _checks.numbers("damping", damping)
+        self.x = as_input("x", x)
+        self.a = as_input("a", a)
+        self.form = _checks.known("form", form, FORMS)
+        self.velocity_term = None if damping is None else "damping"
+        self.batch = _checks.batch_shape(
+            {"omega": self.omega.shape}
+            | ({} if self.damping is None else {"damping": self.damping.shape})
+            | {name: given.batch for name, given in self._inputs().items()}
+        )
+
+    def __repr__(self) -> str:
+        given = {"omega": self.omega, "damping": self.damping, "x": self.x, "a": self.a}
+        parts = [f"{k}={_short(v)}" for k, v in given.items() if v is not None]
+        return f"Oscillator({', '.join([*parts, f'form={self.form!r}'])})"
+
+    def _inputs(self) -> dict[str, Input]:
+        return {name: given for name, given in (("x", self.x), ("a", self.a)) if given is not None}
+
+    def scaled(self, h: float, batch: Shape) -> reference.Oscillator:
+        """The NumPy reference, scaled to the step h."""
+        signals = [None if given is None else given.signal() for given in (self.x, self.a)]
+        return reference.Oscillator(h, self.form, self.omega, self.damping, *signals)
+
+    def parameters(self, batch: Shape) -> Parameters:
+        """Options, rows and tables for the core, as ``oscillator.rs`` documents them."""
+        options = [self.form] + ["damped"] * (self.damping is not None)
+        zero = np.zeros(1)
+        rows = [row(self.omega, batch), zero if self.damping is None else row(self.damping, batch)]
+        tables = []
+        for name, given in (("x", self.x), ("a", self.a)):
+            sine = [zero] * 3
+            if isinstance(given, Sinusoid):
+                options.append(f"{name}:sine")
+                sine = [row(p, batch) for p in (given.amplitude, given.omega, given.phase)]
+            elif given is not None:
+                options.append(f"{name}:held")
+                tables.append(table(given, batch))
+            rows += sine
+        return Parameters(options, rows=rows, tables=tables)
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""
+        if self.form == "canonical":
+            return 0.5 * (v * v + y * y)
+        return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
+
+    def inputs(self) -> dict[str, Any]:
+        """Its inputs by name, as reference signals."""
+        return {name: given.signal() for name, given in self._inputs().items()}
+
+    def without_inputs(self) -> Oscillator:
+        """The same oscillator, left to itself."""
+        return Oscillator(self.omega, self.damping, form=self.form)
+
+    def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:
+        """The same oscillator with these samples as its only input."""
+        pulse: dict[str, Any] = {name: Sampled(values, interval)}
+        return Oscillator(self.omega, self.damping, form=self.form, **pulse)
+
+
+def _short(value: Any) -> str:
+    return f"array{value.shape}" if isinstance(value, np.ndarray) and value.ndim else str(value)

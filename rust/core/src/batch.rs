@@ -1,0 +1,369 @@
+//! The driver: many members, some threads, what to keep, and who diverged.
+
+use std::{
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    error::Error,
+    group::{Clock, Group, Width},
+    table::Model,
+};
+
+/// A run to be made.
+#[derive(Clone, Debug)]
+pub struct Plan<'a> {
+    /// What to step, and how.
+    pub model: Model<'a>,
+    /// Time and step.
+    pub clock: Clock,
+    /// Number of the first step.
+    pub first: i64,
+    /// How many steps.
+    pub steps: i64,
+    /// Keep every so many steps, the first state and the last; or the last alone.
+    pub every: Option<i64>,
+    /// How many members.
+    pub members: usize,
+    /// How many threads; zero for as many as pay.
+    pub threads: usize,
+    /// The v slot holds what the method carries already: do not start.
+    pub carried: bool,
+    /// The v slot holds something else than v between steps: finish before keeping it.
+    pub carries: bool,
+}
+
+/// The arrays of a run, each of rows of one number per member.
+#[derive(Debug)]
+pub struct Arrays<'a> {
+    /// The v slot: first the start, then what is carried at the end.
+    pub v: &'a mut [f64],
+    /// The coordinates: first the start, then the end.
+    pub y: &'a mut [f64],
+    /// What is kept of v, one block per kept step; may be empty if the last alone is asked for and the method carries v.
+    pub saved_v: &'a mut [f64],
+    /// What is kept of y.
+    pub saved_y: &'a mut [f64],
+    /// Per member, the number of the first step that is not finite, or −1.
+    pub first_bad: &'a mut [i64],
+}
+
+/// Steps, counted from the first, at which a run keeps its state.
+pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
+    let step = every.unwrap_or(steps).max(1);
+    let from = if every.is_some() { 0 } else { steps };
+    let last = (every.is_some() && steps % step != 0).then_some(steps);
+    (from..=steps).step_by(step as usize).chain(last)
+}
+
+/// Between two looks at whether everything is finite.
+const LOOK: i64 = 1024;
+/// About how many numbers to step between two looks at the clock; some milliseconds of the slowest system.
+const PATIENCE: i64 = 1 << 20;
+/// How long the caller's monitor may wait.
+const POLL: Duration = Duration::from_millis(20);
+/// Numbers × steps below which a second thread costs more than it brings.
+const WORTH_A_THREAD: f64 = 3e6;
+
+/// One thread's share of the members, as slices of every row.
+struct Part<'a> {
+    first: usize,
+    v: Vec<&'a mut [f64]>,
+    y: Vec<&'a mut [f64]>,
+    saved_v: Vec<&'a mut [f64]>,
+    saved_y: Vec<&'a mut [f64]>,
+    first_bad: &'a mut [i64],
+}
+
+/// Cuts every row of `width` numbers at the same places: one list of row slices per share.
+fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a mut [T]>> {
+    let rows = if width == 0 { 0 } else { data.len() / width };
+    let mut parts: Vec<_> = shares.iter().map(|_| Vec::with_capacity(rows)).collect();
+    for mut row in data.chunks_exact_mut(width.max(1)) {
+        for (part, share) in parts.iter_mut().zip(shares) {
+            let (mine, rest) = row.split_at_mut(*share);
+            part.push(mine);
+            row = rest;
+        }
+    }
+    parts
+}
+
+fn expect(what: &'static str, expected: usize, got: usize) -> Result<(), Error> {
+    if expected == got { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
+}
+
+/// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the share that is done;
+/// when it answers no, the run ends soon.
+pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
+    let b = plan.members;
+    let wide = plan.model.group(&plan.clock, Width::Wide)?;
+    let (p, q) = (wide.slots().0.len() / wide.lanes(), wide.slots().1.len() / wide.lanes());
+    let kept = saves(plan.steps, plan.every).count();
+    expect("v", p * b, arrays.v.len())?;
+    expect("y", q * b, arrays.y.len())?;
+    if !arrays.saved_v.is_empty() || !arrays.saved_y.is_empty() {
+        expect("saved_v", kept * p * b, arrays.saved_v.len())?;
+        expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    }
+    expect("first_bad", b, arrays.first_bad.len())?;
+    for row in &plan.model.spec().rows {
+        if row.0.len() != 1 {
+            expect("a parameter", b, row.0.len())?;
+        }
+    }
+
+    let groups = b.div_ceil(wide.lanes());
+    let work = (p + q) as f64 * b as f64 * plan.steps as f64;
+    let threads = match plan.threads {
+        0 if work < WORTH_A_THREAD => 1,
+        0 => thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    };
+    let threads = threads.min(groups).max(1);
+    // Several shares a thread, so that one that is late does not keep the others waiting.
+    let shares = if threads == 1 { 1 } else { groups.min(threads * 4) };
+    let shares: Vec<usize> = (0..shares)
+        .map(|i| {
+            let edge = |i: usize| (groups * i / shares * wide.lanes()).min(b);
+            edge(i + 1) - edge(i)
+        })
+        .collect();
+
+    let mut first = 0;
+    let mut parts = Vec::with_capacity(shares.len());
+    let pieces = cut(arrays.v, b, &shares)
+        .into_iter()
+        .zip(cut(arrays.y, b, &shares))
+        .zip(cut(arrays.saved_v, b, &shares))
+        .zip(cut(arrays.saved_y, b, &shares))
+        .zip(cut(arrays.first_bad, b, &shares));
+    for ((((v, y), saved_v), saved_y), mut first_bad) in pieces {
+        if let Some(first_bad) = first_bad.pop() {
+            let count = first_bad.len();
+            parts.push(Part { first, v, y, saved_v, saved_y, first_bad });
+            first += count;
+        }
+    }
+
+    let queue = Mutex::new(parts.into_iter());
+    let done = AtomicU64::new(0);
+    let stop = AtomicBool::new(false);
+    let total = (b as f64 * plan.steps as f64).max(1.0);
+    let take = || queue.lock().map_or(None, |mut q| q.next());
+    thread::scope(|scope| {
+        let helpers: Vec<_> = (1..threads)
+            .map(|_| {
+                scope.spawn(|| {
+                    let mut worker = Worker::new(plan, None)?;
+                    while let Some(part) = take() {
+                        worker.part(part, &mut |n| {
+                            done.fetch_add(n, Relaxed);
+                            !stop.load(Relaxed)
+                        })?;
+                    }
+                    Ok(())
+                })
+            })
+            .collect();
+        let mut asked = Instant::now();
+        let mut go_on = |n: u64| {
+            done.fetch_add(n, Relaxed);
+            if asked.elapsed() >= POLL {
+                asked = Instant::now();
+                if !monitor(done.load(Relaxed) as f64 / total) {
+                    stop.store(true, Relaxed);
+                }
+            }
+            !stop.load(Relaxed)
+        };
+        let mine = || {
+            let mut worker = Worker::new(plan, Some(wide))?;
+            while let Some(part) = take() {
+                worker.part(part, &mut go_on)?;
+            }
+            Ok(())
+        };
+        let mut result = mine();
+        for helper in helpers {
+            while !helper.is_finished() {
+                thread::sleep(Duration::from_millis(1));
+                go_on(0);
+            }
+            let theirs = helper.join().unwrap_or(Err(Error::Interrupted));
+            result = result.and(theirs);
+        }
+        result
+    })
+}
+
+/// One thread's groups, and where it stands.
+struct Worker<'a> {
+    plan: &'a Plan<'a>,
+    wide: Box<dyn Group>,
+    narrow: Box<dyn Group>,
+    good: (Vec<f64>, Vec<f64>),
+}
+
+impl<'a> Worker<'a> {
+    fn new(plan: &'a Plan<'a>, wide: Option<Box<dyn Group>>) -> Result<Self, Error> {
+        let wide = match wide {
+            Some(group) => group,
+            None => plan.model.group(&plan.clock, Width::Wide)?,
+        };
+        let narrow = plan.model.group(&plan.clock, Width::Narrow)?;
+        Ok(Worker { plan, wide, narrow, good: Default::default() })
+    }
+
+    fn part(&mut self, mut part: Part, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
+        let members = part.first_bad.len();
+        let mut from = 0;
+        while from < members {
+            let left = members - from;
+            let narrow = left <= crate::group::NARROW.min(self.wide.lanes() - 1);
+            let group = if narrow { &mut self.narrow } else { &mut self.wide };
+            let count = left.min(group.lanes());
+            let mut job = Job { plan: self.plan, group: group.as_mut(), part: &mut part, from, count, good: &mut self.good };
+            if !job.run(go_on) {
+                return Err(Error::Interrupted);
+            }
+            from += count;
+        }
+        Ok(())
+    }
+}
+
+/// One group's run.
+struct Job<'a, 'b> {
+    plan: &'a Plan<'a>,
+    group: &'a mut dyn Group,
+    part: &'a mut Part<'b>,
+    from: usize,
+    count: usize,
+    good: &'a mut (Vec<f64>, Vec<f64>),
+}
+
+/// Copies the rows of a group into row slices, or the other way.
+fn put(rows: &mut [&mut [f64]], from: usize, count: usize, slot: &[f64], lanes: usize) {
+    for (row, slot) in rows.iter_mut().zip(slot.chunks_exact(lanes)) {
+        row[from..from + count].copy_from_slice(&slot[..count]);
+    }
+}
+
+fn get(rows: &[&mut [f64]], from: usize, count: usize, slot: &mut [f64], lanes: usize) {
+    for (row, slot) in rows.iter().zip(slot.chunks_exact_mut(lanes)) {
+        slot[..count].copy_from_slice(&row[from..from + count]);
+        slot[count..].fill(row[from + count - 1]); // idle lanes repeat the last member
+    }
+}
+
+impl Job<'_, '_> {
+    /// Whether it ran to its end.
+    fn run(&mut self, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
+        let (plan, lanes) = (self.plan, self.group.lanes());
+        self.group.prepare(plan.model.spec(), self.part.first + self.from, self.count);
+        let (v, y) = self.group.slots_mut();
+        get(&self.part.v, self.from, self.count, v, lanes);
+        get(&self.part.y, self.from, self.count, y, lanes);
+        let at_once = (PATIENCE / (v.len() + y.len()).max(1) as i64).clamp(1, LOOK);
+        if !plan.carried {
+            self.group.start(plan.first);
+        }
+        self.remember();
+
+        let (mut k, mut looked) = (plan.first, plan.first);
+        for (i, save) in saves(plan.steps, plan.every).enumerate() {
+            let until = plan.first + save;
+            while k < until {
+                let n = (until - k).min(looked + at_once - k);
+                self.group.advance(k, n);
+                k += n;
+                if k - looked == at_once {
+                    self.look(looked, k);
+                    looked = k;
+                    if !go_on((at_once * self.count as i64) as u64) {
+                        return false;
+                    }
+                }
+            }
+            self.save(i, k);
+        }
+        if k > looked {
+            self.look(looked, k);
+            if !go_on(((k - looked) * self.count as i64) as u64) {
+                return false;
+            }
+        }
+        let (v, y) = self.group.slots();
+        put(&mut self.part.v, self.from, self.count, v, lanes);
+        put(&mut self.part.y, self.from, self.count, y, lanes);
+        true
+    }
+
+    fn save(&mut self, i: usize, k: i64) {
+        if self.part.saved_v.is_empty() && self.part.saved_y.is_empty() {
+            return;
+        }
+        let lanes = self.group.lanes();
+        let (p, q) = (self.part.v.len(), self.part.y.len());
+        let carried = self.plan.carries.then(|| self.group.slots().0.to_vec());
+        if carried.is_some() {
+            self.group.finish(k);
+        }
+        let (v, y) = self.group.slots();
+        put(&mut self.part.saved_v[i * p..(i + 1) * p], self.from, self.count, v, lanes);
+        put(&mut self.part.saved_y[i * q..(i + 1) * q], self.from, self.count, y, lanes);
+        if let Some(carried) = carried {
+            self.group.slots_mut().0.copy_from_slice(&carried);
+        }
+    }
+
+    /// Keeps the present state to come back to.
+    fn remember(&mut self) {
+        let (v, y) = self.group.slots();
+        self.good.0.clear();
+        self.good.0.extend_from_slice(v);
+        self.good.1.clear();
+        self.good.1.extend_from_slice(y);
+    }
+
+    /// Whether a member that was finite so far no longer is; infinities and NaN stay, so looking now and then is enough.
+    fn newly_bad(&self) -> bool {
+        let (v, y) = self.group.slots();
+        let finite = |x: &f64| x.is_finite();
+        if v.iter().all(finite) && y.iter().all(finite) {
+            return false;
+        }
+        (0..self.count).any(|l| self.is_new(l))
+    }
+
+    fn is_new(&self, l: usize) -> bool {
+        let lanes = self.group.lanes();
+        let (v, y) = self.group.slots();
+        let bad = |slot: &[f64]| slot.iter().skip(l).step_by(lanes).any(|x| !x.is_finite());
+        self.part.first_bad[self.from + l] < 0 && (bad(v) || bad(y))
+    }
+
+    /// If somebody diverged since the last look, goes back to it and steps again, one by one, to see who and when.
+    fn look(&mut self, looked: i64, k: i64) {
+        if self.newly_bad() {
+            let (v, y) = self.group.slots_mut();
+            v.copy_from_slice(&self.good.0);
+            y.copy_from_slice(&self.good.1);
+            for at in looked..k {
+                self.group.advance(at, 1);
+                for l in 0..self.count {
+                    if self.is_new(l) {
+                        self.part.first_bad[self.from + l] = at + 1;
+                    }
+                }
+            }
+        }
+        self.remember();
+    }
+}

@@ -1,0 +1,61 @@
+//! What can go wrong in the core, said once.
+
+/// Why a run could not be made or did not end.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum Error {
+    /// A system that there is not.
+    #[error("there is no system {name:?}; known: {known}")]
+    UnknownSystem {
+        /// What was given.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A method that there is not.
+    #[error("there is no method {name:?}; known: {known}")]
+    UnknownMethod {
+        /// What was given.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// An option of a system that there is not.
+    #[error("system {system:?} has no kernel for the options {options:?}")]
+    Options {
+        /// The system's name.
+        system: String,
+        /// What was given.
+        options: String,
+    },
+    /// A method that needs ÿ = a(t, y) and a system that is not of that kind.
+    #[error("{method} needs forces that do not depend on the velocity, but {system} has {term}")]
+    VelocityDependent {
+        /// The method's name.
+        method: &'static str,
+        /// The system's name.
+        system: &'static str,
+        /// The term that depends on the velocity.
+        term: &'static str,
+    },
+    /// Arrays that do not fit together.
+    #[error("{what}: expected {expected}, got {got}")]
+    Shape {
+        /// Which array.
+        what: &'static str,
+        /// How many numbers it should have.
+        expected: usize,
+        /// How many it has.
+        got: usize,
+    },
+    /// A CPU level that this machine does not have or nobody knows.
+    #[error("STEPWELL_ISA={given:?} is not a CPU level of this machine; it has {known}")]
+    Isa {
+        /// What was given.
+        given: String,
+        /// What the machine has.
+        known: String,
+    },
+    /// The caller's monitor said stop.
+    #[error("interrupted")]
+    Interrupted,
+}

@@ -1,0 +1,168 @@
+//! Rows of lanes: systems of any size.
+//!
+//! The blocks are nalgebra matrices of `L` lanes × n rows on the heap. The same steps run over them; the lane loop is inside
+//! every operation instead of around the step. One lane serves a single large system, whose operations then run along its
+//! rows.
+
+use std::marker::PhantomData;
+
+use nalgebra::{Const, Dyn, OMatrix};
+
+use crate::{
+    block::{Block, Work},
+    group::{Clock, Group, Spec, Width},
+    isa::{Avx2, Avx512, Baseline, Isa, Level, Task},
+    stepper::Stepper,
+    system::System,
+};
+
+/// Rows of `L` lanes each: one column per row of numbers.
+pub type Rows<const L: usize> = OMatrix<f64, Const<L>, Dyn>;
+
+/// Lanes of a group of several large members.
+pub const LANES: usize = 8;
+
+/// `n` rows of `L` lanes, all zero.
+pub fn zeros<const L: usize>(n: usize) -> Rows<L> {
+    Rows::<L>::zeros_generic(Const::<L>, Dyn(n))
+}
+
+/// The rows as arrays of lanes.
+#[inline(always)]
+pub fn lanes<const L: usize>(rows: &Rows<L>) -> &[[f64; L]] {
+    rows.as_slice().as_chunks().0
+}
+
+/// The rows as arrays of lanes, to write.
+#[inline(always)]
+pub fn lanes_mut<const L: usize>(rows: &mut Rows<L>) -> &mut [[f64; L]] {
+    rows.as_mut_slice().as_chunks_mut().0
+}
+
+/// A system of any size over `L` lanes.
+pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + 'static {
+    /// The system of the members that `member` names for each lane, scaled to the step.
+    fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self;
+
+    /// How many velocities and coordinates a member of this size has.
+    fn shape(size: usize) -> (usize, usize);
+}
+
+struct RowGroup<S: Large<L>, St, I, const L: usize> {
+    clock: Clock,
+    isa: I,
+    system: Option<S>,
+    v: Rows<L>,
+    y: Rows<L>,
+    work: Work<S>,
+    stepper: PhantomData<fn() -> St>,
+}
+
+struct Steps<'a, S: System, St> {
+    clock: Clock,
+    k: i64,
+    n: i64,
+    system: &'a mut S,
+    v: &'a mut S::V,
+    y: &'a mut S::Y,
+    work: &'a mut Work<S>,
+    stepper: PhantomData<fn() -> St>,
+}
+
+impl<S: System, St: Stepper> Task for Steps<'_, S, St> {
+    #[inline(always)]
+    fn run(self) {
+        for k in self.k..self.k + self.n {
+            St::step(self.system, self.clock.at(k), self.clock.h, self.v, self.y, self.work);
+        }
+    }
+}
+
+impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> RowGroup<S, St, I, L> {
+    fn boxed(isa: I, clock: &Clock, size: usize) -> Box<dyn Group> {
+        let (p, q) = S::shape(size);
+        let (v, y) = (zeros(p), zeros(q));
+        let work = Work::new(St::RECORD.evaluations, &v, &y);
+        Box::new(Self { clock: *clock, isa, system: None, v, y, work, stepper: PhantomData::<fn() -> St> })
+    }
+}
+
+impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> Group for RowGroup<S, St, I, L>
+where
+    Work<S>: Send,
+{
+    fn lanes(&self) -> usize {
+        L
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
+        self.system = Some(S::prepare(spec, self.clock.h, |l| first + l.min(count - 1)));
+    }
+
+    fn slots(&self) -> (&[f64], &[f64]) {
+        (self.v.numbers(), self.y.numbers())
+    }
+
+    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        (self.v.numbers_mut(), self.y.numbers_mut())
+    }
+
+    fn start(&mut self, k: i64) {
+        if let Some(s) = &mut self.system {
+            St::start(s, self.clock.start, self.clock.at(k), &mut self.v, &self.y, &mut self.work);
+        }
+    }
+
+    fn advance(&mut self, k: i64, n: i64) {
+        if let Some(system) = &mut self.system {
+            self.isa.run(Steps::<S, St> {
+                clock: self.clock,
+                k,
+                n,
+                system,
+                v: &mut self.v,
+                y: &mut self.y,
+                work: &mut self.work,
+                stepper: PhantomData,
+            });
+        }
+    }
+
+    fn finish(&mut self, k: i64) {
+        if let Some(s) = &mut self.system {
+            St::finish(s, self.clock.start, self.clock.at(k), &mut self.v, &self.y, &mut self.work);
+        }
+    }
+}
+
+fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, size: usize) -> Box<dyn Group>
+where
+    Work<S>: Send,
+{
+    if clock.level == Level::Avx512
+        && let Some(isa) = Avx512::detect()
+    {
+        return RowGroup::<S, St, _, L>::boxed(isa, clock, size);
+    }
+    if clock.level == Level::Avx2
+        && let Some(isa) = Avx2::detect()
+    {
+        return RowGroup::<S, St, _, L>::boxed(isa, clock, size);
+    }
+    RowGroup::<S, St, _, L>::boxed(Baseline, clock, size)
+}
+
+/// A group of a system of any size: `Many` lanes for several members, `One` for a single one.
+pub fn group<Many, One, St>(clock: &Clock, size: usize, width: Width) -> Box<dyn Group>
+where
+    Many: Large<LANES>,
+    One: Large<1>,
+    St: Stepper,
+    Work<Many>: Send,
+    Work<One>: Send,
+{
+    match width {
+        Width::Wide => at_level::<Many, St, LANES>(clock, size),
+        Width::Narrow => at_level::<One, St, 1>(clock, size),
+    }
+}

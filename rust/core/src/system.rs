@@ -1,0 +1,28 @@
+//! Systems: two blocks and an increment for each.
+
+use crate::block::Block;
+
+/// A system scaled to the step: its rates times `h`.
+///
+/// The document writes every method in increments, `dv = h·v̇` and `dy = h·ẏ`, because `h` and a system's own constants can be
+/// multiplied once for a whole run (Φ = ω₀T for the oscillator: "ω₀ is the same as a scale factor for the time", §3). A
+/// method then needs nothing but increments and sums.
+pub trait System {
+    /// The velocity block.
+    type V: Block;
+    /// The coordinate block.
+    type Y: Block;
+
+    /// `out = h·v̇(t, v, y)`
+    fn dv(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V);
+
+    /// `out = h·ẏ(t, v, y)`
+    fn dy(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::Y);
+
+    /// The velocity whose increment of `y` is `d`: undoes `dy` in a second-order system, where ẏ is v times a number.
+    ///
+    /// Methods that ask for [`crate::stepper::Needs::Acceleration`] use it; no other system needs it.
+    fn velocity(&mut self, _d: &Self::Y, out: &mut Self::V) {
+        out.numbers_mut().fill(f64::NAN);
+    }
+}

@@ -1,0 +1,91 @@
+//! A chain of n masses between two walls, joined by n + 1 springs. n is chosen at run time.
+//!
+//! Spring j pulls between masses j − 1 and j with f_j = k_j·(y_j − y_{j−1}); the walls stand still at 0. A spring of no
+//! stiffness at an end leaves that end free. Parameters: the n + 1 stiffnesses, then the n masses.
+
+use crate::{
+    error::Error,
+    group::{Clock, Group, Spec, Width},
+    rows::{self, Large, Rows, lanes, lanes_mut, zeros},
+    stepper::Stepper,
+    system::System,
+};
+
+/// The chains of `L` members, scaled to the step.
+pub struct Chain<const L: usize> {
+    stiffness: Rows<L>,
+    by_mass: Rows<L>,
+    force: Rows<L>,
+    h: f64,
+}
+
+impl<const L: usize> System for Chain<L> {
+    type V = Rows<L>;
+    type Y = Rows<L>;
+
+    #[inline(always)]
+    fn dv(&mut self, _t: f64, _v: &Rows<L>, y: &Rows<L>, out: &mut Rows<L>) {
+        let (y, k, f) = (lanes(y), lanes(&self.stiffness), lanes_mut(&mut self.force));
+        let n = y.len();
+        let (Some(first), Some(last)) = (y.first(), y.last()) else { return };
+        for l in 0..L {
+            f[0][l] = k[0][l] * first[l];
+        }
+        for ((f, k), pair) in f[1..n].iter_mut().zip(&k[1..n]).zip(y.windows(2)) {
+            for l in 0..L {
+                f[l] = k[l] * (pair[1][l] - pair[0][l]);
+            }
+        }
+        for l in 0..L {
+            f[n][l] = k[n][l] * -last[l];
+        }
+        for ((out, pair), by_mass) in lanes_mut(out).iter_mut().zip(f.windows(2)).zip(lanes(&self.by_mass)) {
+            for l in 0..L {
+                out[l] = (pair[1][l] - pair[0][l]) * by_mass[l];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn dy(&mut self, _t: f64, v: &Rows<L>, _y: &Rows<L>, out: &mut Rows<L>) {
+        for (out, v) in out.as_mut_slice().iter_mut().zip(v.as_slice()) {
+            *out = self.h * *v;
+        }
+    }
+
+    #[inline(always)]
+    fn velocity(&mut self, d: &Rows<L>, out: &mut Rows<L>) {
+        for (out, d) in out.as_mut_slice().iter_mut().zip(d.as_slice()) {
+            *out = *d / self.h;
+        }
+    }
+}
+
+impl<const L: usize> Large<L> for Chain<L> {
+    fn shape(size: usize) -> (usize, usize) {
+        (size, size)
+    }
+
+    fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self {
+        let n = spec.size;
+        let mut chain = Chain { stiffness: zeros(n + 1), by_mass: zeros(n), force: zeros(n + 1), h };
+        for l in 0..L {
+            let member = member(l);
+            for (j, k) in lanes_mut(&mut chain.stiffness).iter_mut().enumerate() {
+                k[l] = spec.at(j, member);
+            }
+            for (i, by_mass) in lanes_mut(&mut chain.by_mass).iter_mut().enumerate() {
+                by_mass[l] = h / spec.at(n + 1 + i, member);
+            }
+        }
+        chain
+    }
+}
+
+/// A group of chains.
+pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+    match (spec.options.as_slice(), spec.size) {
+        ([], 1..) => Ok(rows::group::<Chain<{ rows::LANES }>, Chain<1>, St>(clock, spec.size, width)),
+        _ => Err(spec.unknown_options()),
+    }
+}

@@ -1,0 +1,278 @@
+//! The linear oscillator ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x + a (§3), in canonical and physical form.
+//!
+//! | form | v̇ | ẏ |
+//! |---|---|---|
+//! | canonical | −ω₀(y + 2Dv − x) + a/ω₀ | ω₀v |
+//! | physical | −ω₀²y − 2Dω₀v + ω₀²x + a | v |
+//!
+//! Options: `canonical` or `physical`; `damped`; `x:sine` or `x:held`; `a:sine` or `a:held`. Parameters: ω₀, D, then amplitude,
+//! frequency and phase of x, then those of a. Tables: x's, then a's, if held. A driven oscillator always has its damping term.
+
+use std::marker::PhantomData;
+
+use nalgebra::SVector;
+
+use crate::{
+    error::Error,
+    group::{Clock, Group, Spec, Width},
+    signal::{Both, Held, Signal, Sine},
+    stepper::{Needs, Stepper},
+    system::System,
+    tile::{self, Samples, Small},
+};
+
+/// The choice of state variables.
+pub trait Form: Send + 'static {
+    /// Factor of v in h·ẏ, from Φ = h·ω₀ and h.
+    fn speed(phi: f64, h: f64) -> f64;
+    /// Factors of y, x and a in h·v̇.
+    fn factors(h: f64, omega: f64) -> [f64; 3];
+}
+
+/// v is the velocity divided by ω₀: the phase diagram is a circle.
+pub struct Canonical;
+/// v is the velocity.
+pub struct Physical;
+
+impl Form for Canonical {
+    #[inline(always)]
+    fn speed(phi: f64, _h: f64) -> f64 {
+        phi
+    }
+    fn factors(h: f64, omega: f64) -> [f64; 3] {
+        [h * omega, h * omega, h / omega]
+    }
+}
+
+impl Form for Physical {
+    #[inline(always)]
+    fn speed(_phi: f64, h: f64) -> f64 {
+        h
+    }
+    fn factors(h: f64, omega: f64) -> [f64; 3] {
+        [h * (omega * omega), h * (omega * omega), h]
+    }
+}
+
+/// What acts on the oscillator besides its spring, times h.
+pub trait Force {
+    /// h·v̇ from the spring's part.
+    fn total(&self, spring: f64, t: f64, v: f64) -> f64;
+}
+
+/// Nothing.
+pub struct Free;
+/// Damping.
+pub struct Damped {
+    drag: f64,
+}
+/// Damping and inputs.
+pub struct Driven<X> {
+    drag: f64,
+    input: X,
+}
+
+impl Force for Free {
+    #[inline(always)]
+    fn total(&self, spring: f64, _t: f64, _v: f64) -> f64 {
+        -spring
+    }
+}
+
+impl Force for Damped {
+    #[inline(always)]
+    fn total(&self, spring: f64, _t: f64, v: f64) -> f64 {
+        -spring - self.drag * v
+    }
+}
+
+impl<X: Signal> Force for Driven<X> {
+    #[inline(always)]
+    fn total(&self, spring: f64, t: f64, v: f64) -> f64 {
+        (-spring - self.drag * v) + self.input.at(t)
+    }
+}
+
+/// The oscillator of one member, scaled to the step.
+pub struct Oscillator<F> {
+    stiffness: f64,
+    speed: f64,
+    force: F,
+}
+
+impl<F: Force> System for Oscillator<F> {
+    type V = SVector<f64, 1>;
+    type Y = SVector<f64, 1>;
+
+    #[inline(always)]
+    fn dv(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
+        out[0] = self.force.total(self.stiffness * y[0], t, v[0]);
+    }
+
+    #[inline(always)]
+    fn dy(&mut self, _t: f64, v: &Self::V, _y: &Self::Y, out: &mut Self::Y) {
+        out[0] = self.speed * v[0];
+    }
+
+    #[inline(always)]
+    fn velocity(&mut self, d: &Self::Y, out: &mut Self::V) {
+        out[0] = d[0] / self.speed;
+    }
+}
+
+/// Makes a member's force from its constants.
+pub trait Drive: Send + 'static {
+    /// What it makes.
+    type Force<'a>: Force;
+    /// From the scaled constants and the sampled inputs.
+    fn force<'a>(constants: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a>;
+}
+
+/// Spring, drag, and two inputs of amplitude, frequency and phase.
+const CONSTANTS: usize = 8;
+
+impl Drive for Free {
+    type Force<'a> = Free;
+    #[inline(always)]
+    fn force<'a>(_: &[f64; CONSTANTS], _: &'a [Samples], _: usize) -> Free {
+        Free
+    }
+}
+
+impl Drive for Damped {
+    type Force<'a> = Damped;
+    #[inline(always)]
+    fn force<'a>(c: &[f64; CONSTANTS], _: &'a [Samples], _: usize) -> Damped {
+        Damped { drag: c[1] }
+    }
+}
+
+/// Makes a signal from the slot of constants or the table that is its own.
+pub trait Source: Send + 'static {
+    /// What it makes.
+    type Signal<'a>: Signal;
+    /// How many slots of constants it takes, and how many tables.
+    const SLOTS: usize;
+    /// From the constants of `slot` or the table of that number.
+    fn signal<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], slot: usize, table: usize, lane: usize) -> Self::Signal<'a>;
+}
+
+/// A sinusoid.
+pub struct FromSine;
+/// A table.
+pub struct FromTable;
+
+impl Source for FromSine {
+    type Signal<'a> = Sine;
+    const SLOTS: usize = 1;
+    #[inline(always)]
+    fn signal<'a>(c: &[f64; CONSTANTS], _: &'a [Samples], slot: usize, _: usize, _: usize) -> Sine {
+        Sine { amplitude: c[2 + 3 * slot], omega: c[3 + 3 * slot], phase: c[4 + 3 * slot] }
+    }
+}
+
+impl Source for FromTable {
+    type Signal<'a> = Held<'a>;
+    const SLOTS: usize = 0;
+    #[inline(always)]
+    fn signal<'a>(_: &[f64; CONSTANTS], inputs: &'a [Samples], _: usize, table: usize, lane: usize) -> Held<'a> {
+        Held { samples: &inputs[table], lane }
+    }
+}
+
+impl<X: Source> Drive for Driven<X> {
+    type Force<'a> = Driven<X::Signal<'a>>;
+    #[inline(always)]
+    fn force<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a> {
+        Driven { drag: c[1], input: X::signal(c, inputs, 0, 0, lane) }
+    }
+}
+
+impl<A: Source, B: Source> Drive for Driven<(A, B)> {
+    type Force<'a> = Driven<Both<A::Signal<'a>, B::Signal<'a>>>;
+    #[inline(always)]
+    fn force<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a> {
+        let first = A::signal(c, inputs, 0, 0, lane);
+        let second = B::signal(c, inputs, A::SLOTS, 1 - A::SLOTS, lane);
+        Driven { drag: c[1], input: Both(first, second) }
+    }
+}
+
+struct Family<F, D> {
+    /// For x and a: whether it is a sinusoid, held, or not there.
+    inputs: [Option<Kind>; 2],
+    form: PhantomData<fn() -> (F, D)>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Held,
+    Sine,
+}
+
+impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
+    type Member<'a> = Oscillator<D::Force<'a>>;
+
+    fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
+        let [stiffness, by_x, by_a] = F::factors(h, p[0]);
+        let mut c = [0.0; CONSTANTS];
+        c[0] = stiffness;
+        c[1] = (2.0 * p[1]) * (h * p[0]);
+        let mut slot = 2;
+        for (kind, factor, of) in [(self.inputs[0], by_x, 2), (self.inputs[1], by_a, 5)] {
+            if kind == Some(Kind::Sine) {
+                c[slot..slot + 3].copy_from_slice(&[factor * p[of], p[of + 1], p[of + 2]]);
+                slot += 3;
+            }
+        }
+        c
+    }
+
+    fn input_factor(&self, h: f64, p: [f64; CONSTANTS], i: usize) -> f64 {
+        let [_, by_x, by_a] = F::factors(h, p[0]);
+        if i == 0 && self.inputs[0] == Some(Kind::Held) { by_x } else { by_a }
+    }
+
+    #[inline(always)]
+    fn member<'a>(h: f64, c: [f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Member<'a> {
+        Oscillator { stiffness: c[0], speed: F::speed(c[0], h), force: D::force(&c, inputs, lane) }
+    }
+}
+
+fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize>(
+    inputs: [Option<Kind>; 2],
+    clock: &Clock,
+    width: Width,
+) -> Box<dyn Group> {
+    let family = Family::<F, D> { inputs, form: PhantomData };
+    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, 32>(family, clock, width)
+}
+
+fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+    if St::RECORD.needs == Needs::Acceleration && spec.has("damped") {
+        return Err(Error::VelocityDependent { method: St::RECORD.name, system: "oscillator", term: "damping" });
+    }
+    let kind = |held, sine| if spec.has(held) { Some(Kind::Held) } else { spec.has(sine).then_some(Kind::Sine) };
+    let inputs = [kind("x:held", "x:sine"), kind("a:held", "a:sine")];
+    let mut kinds: Vec<Kind> = inputs.into_iter().flatten().collect();
+    kinds.sort(); // a sum of two does not care for their order, and this saves kernels
+    Ok(match (kinds.as_slice(), spec.has("damped")) {
+        ([], false) => of_force::<F, Free, St, 80>(inputs, clock, width),
+        ([], true) => of_force::<F, Damped, St, 64>(inputs, clock, width),
+        ([Kind::Held], _) => of_force::<F, Driven<FromTable>, St, 64>(inputs, clock, width),
+        ([Kind::Sine], _) => of_force::<F, Driven<FromSine>, St, 32>(inputs, clock, width),
+        ([Kind::Held, Kind::Held], _) => of_force::<F, Driven<(FromTable, FromTable)>, St, 64>(inputs, clock, width),
+        ([Kind::Held, Kind::Sine], _) => of_force::<F, Driven<(FromTable, FromSine)>, St, 32>(inputs, clock, width),
+        ([Kind::Sine, Kind::Sine], _) => of_force::<F, Driven<(FromSine, FromSine)>, St, 32>(inputs, clock, width),
+        _ => return Err(spec.unknown_options()),
+    })
+}
+
+/// A group of oscillators.
+pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+    match (spec.has("canonical"), spec.has("physical")) {
+        (true, false) => of_form::<Canonical, St>(spec, clock, width),
+        (false, true) => of_form::<Physical, St>(spec, clock, width),
+        _ => Err(spec.unknown_options()),
+    }
+}

@@ -1,0 +1,248 @@
+//! The lane tile: small systems, many members.
+//!
+//! A tile holds `L` members, one number of every member to a row: `[[f64; L]; N]`. The innermost loop runs over the lanes and
+//! calls the fully inlined step on nalgebra vectors of one member; the compiler turns it into vector instructions, and a tile
+//! that fits stays in registers for as many steps as are taken at once.
+
+use std::{array::from_fn, marker::PhantomData};
+
+use nalgebra::SVector;
+
+use crate::{
+    block::Work,
+    group::{Clock, Group, NARROW, Row, Spec, Table, Width},
+    isa::{Avx2, Avx512, Baseline, Isa, Level, Task},
+    stepper::Stepper,
+    system::System,
+};
+
+/// A family of small systems: `P` velocities, `Q` coordinates, `C` parameters and as many constants.
+pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + 'static {
+    /// The system of one member. It may look into the sampled inputs.
+    type Member<'a>: System<V = SVector<f64, P>, Y = SVector<f64, Q>>;
+
+    /// A member's constants: its parameters, scaled to the step.
+    fn constants(&self, h: f64, parameters: [f64; C]) -> [f64; C];
+
+    /// The factor that scales a member's `i`-th sampled input to the step.
+    fn input_factor(&self, _h: f64, _parameters: [f64; C], _i: usize) -> f64 {
+        1.0
+    }
+
+    /// A member's system from its constants.
+    fn member<'a>(h: f64, constants: [f64; C], inputs: &'a [Samples], lane: usize) -> Self::Member<'a>;
+}
+
+/// A sampled input over the lanes of a tile.
+#[derive(Clone, Debug)]
+pub struct Samples {
+    rows: Vec<f64>,
+    lanes: usize,
+    start: f64,
+    interval: f64,
+}
+
+/// A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
+pub const HOLD_SLACK: f64 = 1e-6;
+
+impl Samples {
+    /// The samples of the lanes' members, each times its lane's factor.
+    pub fn new<const L: usize>(table: &Table, factor: impl Fn(usize) -> f64, member: impl Fn(usize) -> usize) -> Self {
+        let over_lanes = |row: &Row| -> [f64; L] { from_fn(|l| factor(l) * row.at(member(l))) };
+        let rows = table.samples.iter().flat_map(over_lanes).collect();
+        Samples { rows, lanes: L, start: table.start, interval: table.interval }
+    }
+
+    /// The lanes' values at time `t`: the last sample not after it, or the first or last one outside.
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> &[f64] {
+        let last = (self.rows.len() / self.lanes).saturating_sub(1);
+        // A cast of a negative number gives 0, of a large one the largest: both are what holding means.
+        let i = ((t - self.start) / self.interval + HOLD_SLACK).floor() as usize;
+        let i = i.min(last) * self.lanes;
+        self.rows.get(i..i + self.lanes).unwrap_or(&[])
+    }
+}
+
+struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> {
+    clock: Clock,
+    isa: I,
+    family: S,
+    constants: [[f64; L]; C],
+    inputs: Vec<Samples>,
+    v: [[f64; L]; P],
+    y: [[f64; L]; Q],
+    stepper: PhantomData<fn() -> St>,
+}
+
+/// The kernel: `n` steps of every lane.
+struct Steps<'a, S, St, const P: usize, const Q: usize, const C: usize, const L: usize> {
+    clock: Clock,
+    k: i64,
+    n: i64,
+    constants: &'a [[f64; L]; C],
+    inputs: &'a [Samples],
+    v: &'a mut [[f64; L]; P],
+    y: &'a mut [[f64; L]; Q],
+    family: PhantomData<fn() -> (S, St)>,
+}
+
+impl<S, St, const P: usize, const Q: usize, const C: usize, const L: usize> Task for Steps<'_, S, St, P, Q, C, L>
+where
+    S: Small<P, Q, C>,
+    St: Stepper,
+{
+    #[inline(always)]
+    fn run(self) {
+        // Copies: the compiler can prove that nothing else looks at them, and keeps small ones in registers over all steps.
+        let (constants, mut v, mut y) = (*self.constants, *self.v, *self.y);
+        let h = self.clock.h;
+        for k in self.k..self.k + self.n {
+            let t = self.clock.at(k);
+            for l in 0..L {
+                let mut s = S::member(h, from_fn(|c| constants[c][l]), self.inputs, l);
+                let mut vl = SVector::from_fn(|i, _| v[i][l]);
+                let mut yl = SVector::from_fn(|i, _| y[i][l]);
+                let mut work = Work::new(St::RECORD.evaluations, &vl, &yl);
+                St::step(&mut s, t, h, &mut vl, &mut yl, &mut work);
+                for i in 0..P {
+                    v[i][l] = vl[i];
+                }
+                for i in 0..Q {
+                    y[i][l] = yl[i];
+                }
+            }
+        }
+        (*self.v, *self.y) = (v, y);
+    }
+}
+
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> Tile<S, St, I, P, Q, C, L>
+where
+    S: Small<P, Q, C>,
+    St: Stepper,
+    I: Isa,
+{
+    fn boxed(family: S, isa: I, clock: &Clock) -> Box<dyn Group> {
+        Box::new(Self {
+            clock: *clock,
+            isa,
+            family,
+            constants: [[0.0; L]; C],
+            inputs: Vec::new(),
+            v: [[0.0; L]; P],
+            y: [[0.0; L]; Q],
+            stepper: PhantomData,
+        })
+    }
+
+    /// Calls `f` with each lane's system and blocks, and keeps the `v` that it leaves.
+    #[inline(always)]
+    fn each_v(
+        &mut self,
+        f: impl for<'a> Fn(&mut S::Member<'a>, &mut SVector<f64, P>, &SVector<f64, Q>, &mut Work<S::Member<'a>>),
+    ) {
+        for l in 0..L {
+            let mut s = S::member(self.clock.h, from_fn(|c| self.constants[c][l]), &self.inputs, l);
+            let mut v = SVector::from_fn(|i, _| self.v[i][l]);
+            let y = SVector::from_fn(|i, _| self.y[i][l]);
+            let mut work = Work::new(St::RECORD.evaluations, &v, &y);
+            f(&mut s, &mut v, &y, &mut work);
+            for i in 0..P {
+                self.v[i][l] = v[i];
+            }
+        }
+    }
+}
+
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> Group for Tile<S, St, I, P, Q, C, L>
+where
+    S: Small<P, Q, C>,
+    St: Stepper,
+    I: Isa,
+{
+    fn lanes(&self) -> usize {
+        L
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
+        let h = self.clock.h;
+        let member = |l: usize| first + l.min(count - 1);
+        let mut parameters = [[0.0; L]; C];
+        for (lanes, row) in parameters.iter_mut().zip(&spec.rows) {
+            row.fill(first, count, lanes);
+        }
+        let of_lane = |l: usize| from_fn(|i| parameters[i][l]);
+        for l in 0..L {
+            let constants = self.family.constants(h, of_lane(l));
+            for (row, c) in self.constants.iter_mut().zip(constants) {
+                row[l] = c;
+            }
+        }
+        let samples = |(i, table)| Samples::new::<L>(table, |l| self.family.input_factor(h, of_lane(l), i), member);
+        self.inputs = spec.tables.iter().enumerate().map(samples).collect();
+    }
+
+    fn slots(&self) -> (&[f64], &[f64]) {
+        (self.v.as_flattened(), self.y.as_flattened())
+    }
+
+    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        (self.v.as_flattened_mut(), self.y.as_flattened_mut())
+    }
+
+    fn start(&mut self, k: i64) {
+        let (t, choice) = (self.clock.at(k), self.clock.start);
+        self.each_v(|s, v, y, work| St::start(s, choice, t, v, y, work));
+    }
+
+    fn advance(&mut self, k: i64, n: i64) {
+        self.isa.run(Steps::<S, St, P, Q, C, L> {
+            clock: self.clock,
+            k,
+            n,
+            constants: &self.constants,
+            inputs: &self.inputs,
+            v: &mut self.v,
+            y: &mut self.y,
+            family: PhantomData,
+        });
+    }
+
+    fn finish(&mut self, k: i64) {
+        let (t, choice) = (self.clock.at(k), self.clock.start);
+        self.each_v(|s, v, y, work| St::finish(s, choice, t, v, y, work));
+    }
+}
+
+/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, or a narrow one.
+pub fn group<S, St, const P: usize, const Q: usize, const C: usize, const WIDE: usize, const HALF: usize>(
+    family: S,
+    clock: &Clock,
+    width: Width,
+) -> Box<dyn Group>
+where
+    S: Small<P, Q, C>,
+    St: Stepper,
+{
+    if clock.level == Level::Avx512
+        && let Some(isa) = Avx512::detect()
+    {
+        return match width {
+            Width::Wide => Tile::<S, St, _, P, Q, C, WIDE>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
+        };
+    }
+    if clock.level == Level::Avx2
+        && let Some(isa) = Avx2::detect()
+    {
+        return match width {
+            Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
+        };
+    }
+    match width {
+        Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, Baseline, clock),
+        Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, Baseline, clock),
+    }
+}

@@ -1,0 +1,149 @@
+//! The Python binding: arrays in, arrays out, the GIL released, errors mapped. No arithmetic and no decisions here.
+
+mod model;
+mod world;
+
+use numpy::{PyReadwriteArray1, PyReadwriteArrayDyn};
+use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
+use stepwell_core::{
+    batch::{self, Arrays, Plan},
+    error::Error,
+    group::Clock,
+    isa::Level,
+    stepper::{Needs, Record},
+    table,
+};
+
+use model::{ModelSpec, core_error};
+
+/// Everything that a method says of itself.
+fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
+    let d = PyDict::new(py);
+    d.set_item("name", r.name)?;
+    d.set_item("title", r.title)?;
+    d.set_item("other_names", r.other_names)?;
+    d.set_item("false_friends", r.false_friends)?;
+    d.set_item("order", r.order)?;
+    d.set_item("evaluations", r.evaluations)?;
+    d.set_item("family", r.family)?;
+    d.set_item("limit", r.limit)?;
+    d.set_item("nodes", r.nodes)?;
+    d.set_item("needs_acceleration", r.needs == Needs::Acceleration)?;
+    d.set_item("carry", r.carry)?;
+    d.set_item("starts", r.starts)?;
+    d.set_item("section", r.section)?;
+    d.set_item("reference", r.reference)?;
+    d.set_item("about", r.about)?;
+    Ok(d)
+}
+
+/// The records of all methods, by name.
+#[pyfunction]
+fn catalogue(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    table::RECORDS.iter().map(|r| describe(py, r)).collect()
+}
+
+/// The names of all systems that have a kernel.
+#[pyfunction]
+fn systems() -> Vec<&'static str> {
+    table::SYSTEMS.to_vec()
+}
+
+/// The CPU level in use.
+#[pyfunction]
+fn isa() -> PyResult<&'static str> {
+    Level::choose().map(Level::name).map_err(core_error)
+}
+
+/// The CPU levels that this machine has, ascending.
+#[pyfunction]
+fn isa_levels() -> Vec<&'static str> {
+    Level::available().into_iter().map(Level::name).collect()
+}
+
+/// The steps, counted from the first, at which a run keeps its state.
+#[pyfunction]
+#[pyo3(signature = (steps, every))]
+fn saves(steps: i64, every: Option<i64>) -> Vec<i64> {
+    batch::saves(steps, every).collect()
+}
+
+/// Makes a run, in place on `v` and `y`, and fills what is kept.
+#[pyfunction]
+#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, first_bad, progress))]
+#[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
+fn run(
+    py: Python<'_>,
+    model: &ModelSpec,
+    t0: f64,
+    dt: f64,
+    start: usize,
+    first: i64,
+    steps: i64,
+    every: Option<i64>,
+    threads: usize,
+    carried: bool,
+    mut v: PyReadwriteArrayDyn<'_, f64>,
+    mut y: PyReadwriteArrayDyn<'_, f64>,
+    mut saved_v: PyReadwriteArrayDyn<'_, f64>,
+    mut saved_y: PyReadwriteArrayDyn<'_, f64>,
+    mut first_bad: PyReadwriteArray1<'_, i64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)? };
+    let arrays = Arrays {
+        v: v.as_slice_mut()?,
+        y: y.as_slice_mut()?,
+        saved_v: saved_v.as_slice_mut()?,
+        saved_y: saved_y.as_slice_mut()?,
+        first_bad: first_bad.as_slice_mut()?,
+    };
+    let rows = model.rows(py)?;
+    let tables = model.tables(py)?;
+    let members = arrays.first_bad.len();
+    let plan = Plan {
+        model: model.model(&rows, &tables)?,
+        clock,
+        first,
+        steps,
+        every,
+        members,
+        threads,
+        carried,
+        carries: model.carries(),
+    };
+    let mut raised = None;
+    let mut monitor = |share: f64| {
+        Python::attach(|py| {
+            let told = progress.as_ref().map_or(Ok(()), |p| p.call1(py, (share,)).map(drop));
+            match told.and_then(|()| py.check_signals()) {
+                Ok(()) => true,
+                Err(error) => {
+                    raised = Some(error);
+                    false
+                }
+            }
+        })
+    };
+    let result = py.detach(|| batch::run(&plan, arrays, &mut monitor));
+    match (result, raised) {
+        (_, Some(error)) => Err(error),
+        (Err(Error::Interrupted), None) => Err(PyKeyboardInterrupt::new_err(())),
+        (Err(error), None) => Err(core_error(error)),
+        (Ok(()), None) => Ok(()),
+    }
+}
+
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add_function(wrap_pyfunction!(catalogue, m)?)?;
+    m.add_function(wrap_pyfunction!(systems, m)?)?;
+    m.add_function(wrap_pyfunction!(isa, m)?)?;
+    m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
+    m.add_function(wrap_pyfunction!(saves, m)?)?;
+    m.add_function(wrap_pyfunction!(run, m)?)?;
+    m.add_class::<ModelSpec>()?;
+    m.add_class::<world::World>()?;
+    Ok(())
+}

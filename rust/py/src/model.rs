@@ -1,0 +1,88 @@
+//! What to step: names, parameters and tables that stay Python's.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::{exceptions::PyValueError, prelude::*};
+use stepwell_core::{
+    error::Error,
+    group::{Row, Spec, Table},
+    table::{self, Model},
+};
+
+/// The core's words as a Python error; Python has checked everything before, so users should not meet one.
+pub fn core_error(error: Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// A system and a method, or a linear map.
+#[pyclass(module = "stepwell._core", frozen)]
+pub struct ModelSpec {
+    system: String,
+    options: Vec<String>,
+    size: usize,
+    rows: Vec<Py<PyArray1<f64>>>,
+    tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
+    method: String,
+    matrix: Option<(Vec<f64>, usize)>,
+}
+
+/// The parameters, borrowed for a run.
+pub type Rows<'py> = Vec<PyReadonlyArray1<'py, f64>>;
+/// The tables, borrowed for a run: start, interval, samples.
+pub type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
+
+#[pymethods]
+impl ModelSpec {
+    /// `matrix` is the nodes and the number of rows in the v slot, if the transition-matrix form is asked for.
+    #[new]
+    #[pyo3(signature = (system, options, size, rows, tables, method, matrix=None))]
+    fn new(
+        system: String,
+        options: Vec<String>,
+        size: usize,
+        rows: Vec<Py<PyArray1<f64>>>,
+        tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
+        method: String,
+        matrix: Option<(Vec<f64>, usize)>,
+    ) -> Self {
+        ModelSpec { system, options, size, rows, tables, method, matrix }
+    }
+}
+
+impl ModelSpec {
+    /// Whether the v slot holds something else than v between steps.
+    pub fn carries(&self) -> bool {
+        self.matrix.is_none() && table::record(&self.method).is_some_and(|r| r.carry.is_some())
+    }
+
+    /// Borrows the parameters.
+    pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
+        self.rows.iter().map(|r| Ok(r.bind(py).try_readonly()?)).collect()
+    }
+
+    /// Borrows the tables.
+    pub fn tables<'py>(&self, py: Python<'py>) -> PyResult<Tables<'py>> {
+        self.tables.iter().map(|(start, interval, t)| Ok((*start, *interval, t.bind(py).try_readonly()?))).collect()
+    }
+
+    /// What the core steps.
+    pub fn model<'a>(&'a self, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+        let spec = Spec {
+            system: &self.system,
+            options: self.options.iter().map(String::as_str).collect(),
+            size: self.size,
+            rows: rows.iter().map(|r| Ok(Row(r.as_slice()?))).collect::<PyResult<_>>()?,
+            tables: tables
+                .iter()
+                .map(|(start, interval, t)| {
+                    let width = t.as_array().ncols().max(1);
+                    let samples = t.as_slice()?.chunks_exact(width).map(Row).collect();
+                    Ok(Table { samples, start: *start, interval: *interval })
+                })
+                .collect::<PyResult<_>>()?,
+        };
+        Ok(match &self.matrix {
+            None => Model::Direct { spec, method: &self.method },
+            Some((nodes, v_rows)) => Model::Matrix { spec, nodes, v_rows: *v_rows },
+        })
+    }
+}
