@@ -17,7 +17,7 @@ use crate::{
 
 enum Input<const L: usize> {
     Sine([Sine; L]),
-    Held(Samples),
+    Held(Samples<L>),
 }
 
 struct Map<const L: usize> {
@@ -61,7 +61,7 @@ impl<const L: usize> Task for Steps<'_, L> {
                             u[l] = sines[l].at(at);
                         }
                     }
-                    Input::Held(samples) => u.copy_from_slice(samples.at(at)),
+                    Input::Held(samples) => u.copy_from_slice(samples.view().at(at)),
                 }
             }
             let s = lanes(self.state);
@@ -109,7 +109,7 @@ impl<I: Isa, const L: usize> Group for Matrix<I, L> {
             if *kind == "held"
                 && let Some(table) = tables.next()
             {
-                inputs.push(Input::Held(Samples::new::<L>(table, |_| 1.0, member)));
+                inputs.push(Input::Held(Samples::new(table, |_| 1.0, member)));
             } else {
                 let p = |i: usize, l: usize| spec.at(next + i, member(l));
                 inputs.push(Input::Sine(std::array::from_fn(|l| Sine { amplitude: p(0, l), omega: p(1, l), phase: p(2, l) })));

@@ -1,6 +1,6 @@
 //! Inputs: what drives a system from outside, as a function of time.
 
-use crate::{tile::Samples, trig};
+use crate::{tile::View, trig};
 
 /// An input of one member.
 pub trait Signal {
@@ -28,18 +28,17 @@ impl Signal for Sine {
 
 /// A sampled input, held between samples. A constant is one sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Held<'a> {
+pub struct Held<'a, const L: usize> {
     /// The samples of all lanes.
-    pub samples: &'a Samples,
+    pub samples: View<'a, L>,
     /// Which lane.
     pub lane: usize,
 }
 
-impl Signal for Held<'_> {
+impl<const L: usize> Signal for Held<'_, L> {
     #[inline(always)]
     fn at(&self, t: f64) -> f64 {
-        let row = self.samples.at(t);
-        if self.lane < row.len() { row[self.lane] } else { f64::NAN }
+        self.samples.at(t)[self.lane]
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
 /// A family of small systems: `P` velocities, `Q` coordinates, `C` parameters and as many constants.
 pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + 'static {
     /// The system of one member. It may look into the sampled inputs.
-    type Member<'a>: System<V = SVector<f64, P>, Y = SVector<f64, Q>>;
+    type Member<'a, const L: usize>: System<V = SVector<f64, P>, Y = SVector<f64, Q>>;
 
     /// A member's constants: its parameters, scaled to the step.
     fn constants(&self, h: f64, parameters: [f64; C]) -> [f64; C];
@@ -30,14 +30,18 @@ pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + 'static 
     }
 
     /// A member's system from its constants.
-    fn member<'a>(h: f64, constants: [f64; C], inputs: &'a [Samples], lane: usize) -> Self::Member<'a>;
+    fn member<'a, const L: usize>(
+        h: f64,
+        constants: [f64; C],
+        inputs: &[View<'a, L>; INPUTS],
+        lane: usize,
+    ) -> Self::Member<'a, L>;
 }
 
-/// A sampled input over the lanes of a tile.
+/// A sampled input over the lanes of a group.
 #[derive(Clone, Debug)]
-pub struct Samples {
-    rows: Vec<f64>,
-    lanes: usize,
+pub struct Samples<const L: usize> {
+    rows: Vec<[f64; L]>,
     start: f64,
     interval: f64,
 }
@@ -45,22 +49,46 @@ pub struct Samples {
 /// A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
 pub const HOLD_SLACK: f64 = 1e-6;
 
-impl Samples {
+impl<const L: usize> Samples<L> {
     /// The samples of the lanes' members, each times its lane's factor.
-    pub fn new<const L: usize>(table: &Table, factor: impl Fn(usize) -> f64, member: impl Fn(usize) -> usize) -> Self {
+    pub fn new(table: &Table, factor: impl Fn(usize) -> f64, member: impl Fn(usize) -> usize) -> Self {
         let over_lanes = |row: &Row| -> [f64; L] { from_fn(|l| factor(l) * row.at(member(l))) };
-        let rows = table.samples.iter().flat_map(over_lanes).collect();
-        Samples { rows, lanes: L, start: table.start, interval: table.interval }
+        Samples { rows: table.samples.iter().map(over_lanes).collect(), start: table.start, interval: table.interval }
+    }
+
+    /// The same samples, to look into.
+    #[inline(always)]
+    pub fn view(&self) -> View<'_, L> {
+        View { rows: &self.rows, start: self.start, interval: self.interval }
+    }
+}
+
+/// How many sampled inputs a small system may have.
+pub const INPUTS: usize = 2;
+
+/// A sampled input to look into.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a, const L: usize> {
+    rows: &'a [[f64; L]],
+    start: f64,
+    interval: f64,
+}
+
+impl<'a, const L: usize> View<'a, L> {
+    /// The views of a group's inputs; an input that is not there has no samples.
+    #[inline(always)]
+    fn all(inputs: &'a [Samples<L>]) -> [Self; INPUTS] {
+        from_fn(|i| inputs.get(i).map_or(View { rows: &[], start: 0.0, interval: 1.0 }, Samples::view))
     }
 
     /// The lanes' values at time `t`: the last sample not after it, or the first or last one outside.
+    ///
+    /// Written without a branch, so that a loop over the lanes can look once for all of them.
     #[inline(always)]
-    pub fn at(&self, t: f64) -> &[f64] {
-        let last = (self.rows.len() / self.lanes).saturating_sub(1);
+    pub fn at(&self, t: f64) -> &'a [f64; L] {
         // A cast of a negative number gives 0, of a large one the largest: both are what holding means.
         let i = ((t - self.start) / self.interval + HOLD_SLACK).floor() as usize;
-        let i = i.min(last) * self.lanes;
-        self.rows.get(i..i + self.lanes).unwrap_or(&[])
+        self.rows.get(i).or(self.rows.last()).unwrap_or(&[f64::NAN; L])
     }
 }
 
@@ -69,7 +97,7 @@ struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: u
     isa: I,
     family: S,
     constants: [[f64; L]; C],
-    inputs: Vec<Samples>,
+    inputs: Vec<Samples<L>>,
     v: [[f64; L]; P],
     y: [[f64; L]; Q],
     stepper: PhantomData<fn() -> St>,
@@ -81,7 +109,7 @@ struct Steps<'a, S, St, const P: usize, const Q: usize, const C: usize, const L:
     k: i64,
     n: i64,
     constants: &'a [[f64; L]; C],
-    inputs: &'a [Samples],
+    inputs: &'a [Samples<L>],
     v: &'a mut [[f64; L]; P],
     y: &'a mut [[f64; L]; Q],
     family: PhantomData<fn() -> (S, St)>,
@@ -96,11 +124,11 @@ where
     fn run(self) {
         // Copies: the compiler can prove that nothing else looks at them, and keeps small ones in registers over all steps.
         let (constants, mut v, mut y) = (*self.constants, *self.v, *self.y);
-        let h = self.clock.h;
+        let (h, inputs) = (self.clock.h, View::all(self.inputs));
         for k in self.k..self.k + self.n {
             let t = self.clock.at(k);
             for l in 0..L {
-                let mut s = S::member(h, from_fn(|c| constants[c][l]), self.inputs, l);
+                let mut s = S::member(h, from_fn(|c| constants[c][l]), &inputs, l);
                 let mut vl = SVector::from_fn(|i, _| v[i][l]);
                 let mut yl = SVector::from_fn(|i, _| y[i][l]);
                 let mut work = Work::new(St::RECORD.evaluations, &vl, &yl);
@@ -140,10 +168,11 @@ where
     #[inline(always)]
     fn each_v(
         &mut self,
-        f: impl for<'a> Fn(&mut S::Member<'a>, &mut SVector<f64, P>, &SVector<f64, Q>, &mut Work<S::Member<'a>>),
+        f: impl for<'a> Fn(&mut S::Member<'a, L>, &mut SVector<f64, P>, &SVector<f64, Q>, &mut Work<S::Member<'a, L>>),
     ) {
+        let inputs = View::all(&self.inputs);
         for l in 0..L {
-            let mut s = S::member(self.clock.h, from_fn(|c| self.constants[c][l]), &self.inputs, l);
+            let mut s = S::member(self.clock.h, from_fn(|c| self.constants[c][l]), &inputs, l);
             let mut v = SVector::from_fn(|i, _| self.v[i][l]);
             let y = SVector::from_fn(|i, _| self.y[i][l]);
             let mut work = Work::new(St::RECORD.evaluations, &v, &y);
@@ -179,7 +208,7 @@ where
                 row[l] = c;
             }
         }
-        let samples = |(i, table)| Samples::new::<L>(table, |l| self.family.input_factor(h, of_lane(l), i), member);
+        let samples = |(i, table)| Samples::new(table, |l| self.family.input_factor(h, of_lane(l), i), member);
         self.inputs = spec.tables.iter().enumerate().map(samples).collect();
     }
 

@@ -10,7 +10,7 @@ use crate::{
     group::{Clock, Group, Spec, Width},
     stepper::Stepper,
     system::System,
-    tile::{self, Samples, Small},
+    tile::{self, INPUTS, Small, View},
 };
 
 /// Three bodies, scaled to the step.
@@ -64,14 +64,14 @@ impl System for ThreeBodies {
 struct Family;
 
 impl Small<6, 6, 1> for Family {
-    type Member<'a> = ThreeBodies;
+    type Member<'a, const L: usize> = ThreeBodies;
 
     fn constants(&self, h: f64, [strength]: [f64; 1]) -> [f64; 1] {
         [h * strength]
     }
 
     #[inline(always)]
-    fn member<'a>(h: f64, [strength]: [f64; 1], _inputs: &'a [Samples], _lane: usize) -> ThreeBodies {
+    fn member<'a, const L: usize>(h: f64, [strength]: [f64; 1], _inputs: &[View<'a, L>; INPUTS], _lane: usize) -> ThreeBodies {
         ThreeBodies { strength, h }
     }
 }

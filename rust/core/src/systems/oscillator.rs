@@ -18,7 +18,7 @@ use crate::{
     signal::{Both, Held, Signal, Sine},
     stepper::{Needs, Stepper},
     system::System,
-    tile::{self, Samples, Small},
+    tile::{self, INPUTS, Small, View},
 };
 
 /// The choice of state variables.
@@ -123,26 +123,26 @@ impl<F: Force> System for Oscillator<F> {
 /// Makes a member's force from its constants.
 pub trait Drive: Send + 'static {
     /// What it makes.
-    type Force<'a>: Force;
+    type Force<'a, const L: usize>: Force;
     /// From the scaled constants and the sampled inputs.
-    fn force<'a>(constants: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a>;
+    fn force<'a, const L: usize>(constants: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Force<'a, L>;
 }
 
 /// Spring, drag, and two inputs of amplitude, frequency and phase.
 const CONSTANTS: usize = 8;
 
 impl Drive for Free {
-    type Force<'a> = Free;
+    type Force<'a, const L: usize> = Free;
     #[inline(always)]
-    fn force<'a>(_: &[f64; CONSTANTS], _: &'a [Samples], _: usize) -> Free {
+    fn force<'a, const L: usize>(_: &[f64; CONSTANTS], _: &[View<'a, L>; INPUTS], _: usize) -> Free {
         Free
     }
 }
 
 impl Drive for Damped {
-    type Force<'a> = Damped;
+    type Force<'a, const L: usize> = Damped;
     #[inline(always)]
-    fn force<'a>(c: &[f64; CONSTANTS], _: &'a [Samples], _: usize) -> Damped {
+    fn force<'a, const L: usize>(c: &[f64; CONSTANTS], _: &[View<'a, L>; INPUTS], _: usize) -> Damped {
         Damped { drag: c[1] }
     }
 }
@@ -150,11 +150,11 @@ impl Drive for Damped {
 /// Makes a signal from the slot of constants or the table that is its own.
 pub trait Source: Send + 'static {
     /// What it makes.
-    type Signal<'a>: Signal;
+    type Signal<'a, const L: usize>: Signal;
     /// How many slots of constants it takes, and how many tables.
     const SLOTS: usize;
     /// From the constants of `slot` or the table of that number.
-    fn signal<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], slot: usize, table: usize, lane: usize) -> Self::Signal<'a>;
+    fn signal<'a, const L: usize>(c: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], slot: usize, table: usize, lane: usize) -> Self::Signal<'a, L>;
 }
 
 /// A sinusoid.
@@ -163,35 +163,35 @@ pub struct FromSine;
 pub struct FromTable;
 
 impl Source for FromSine {
-    type Signal<'a> = Sine;
+    type Signal<'a, const L: usize> = Sine;
     const SLOTS: usize = 1;
     #[inline(always)]
-    fn signal<'a>(c: &[f64; CONSTANTS], _: &'a [Samples], slot: usize, _: usize, _: usize) -> Sine {
+    fn signal<'a, const L: usize>(c: &[f64; CONSTANTS], _: &[View<'a, L>; INPUTS], slot: usize, _: usize, _: usize) -> Sine {
         Sine { amplitude: c[2 + 3 * slot], omega: c[3 + 3 * slot], phase: c[4 + 3 * slot] }
     }
 }
 
 impl Source for FromTable {
-    type Signal<'a> = Held<'a>;
+    type Signal<'a, const L: usize> = Held<'a, L>;
     const SLOTS: usize = 0;
     #[inline(always)]
-    fn signal<'a>(_: &[f64; CONSTANTS], inputs: &'a [Samples], _: usize, table: usize, lane: usize) -> Held<'a> {
-        Held { samples: &inputs[table], lane }
+    fn signal<'a, const L: usize>(_: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], _: usize, table: usize, lane: usize) -> Held<'a, L> {
+        Held { samples: inputs[table], lane }
     }
 }
 
 impl<X: Source> Drive for Driven<X> {
-    type Force<'a> = Driven<X::Signal<'a>>;
+    type Force<'a, const L: usize> = Driven<X::Signal<'a, L>>;
     #[inline(always)]
-    fn force<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a> {
+    fn force<'a, const L: usize>(c: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Force<'a, L> {
         Driven { drag: c[1], input: X::signal(c, inputs, 0, 0, lane) }
     }
 }
 
 impl<A: Source, B: Source> Drive for Driven<(A, B)> {
-    type Force<'a> = Driven<Both<A::Signal<'a>, B::Signal<'a>>>;
+    type Force<'a, const L: usize> = Driven<Both<A::Signal<'a, L>, B::Signal<'a, L>>>;
     #[inline(always)]
-    fn force<'a>(c: &[f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Force<'a> {
+    fn force<'a, const L: usize>(c: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Force<'a, L> {
         let first = A::signal(c, inputs, 0, 0, lane);
         let second = B::signal(c, inputs, A::SLOTS, 1 - A::SLOTS, lane);
         Driven { drag: c[1], input: Both(first, second) }
@@ -211,7 +211,7 @@ enum Kind {
 }
 
 impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
-    type Member<'a> = Oscillator<D::Force<'a>>;
+    type Member<'a, const L: usize> = Oscillator<D::Force<'a, L>>;
 
     fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
         let [stiffness, by_x, by_a] = F::factors(h, p[0]);
@@ -234,7 +234,7 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     }
 
     #[inline(always)]
-    fn member<'a>(h: f64, c: [f64; CONSTANTS], inputs: &'a [Samples], lane: usize) -> Self::Member<'a> {
+    fn member<'a, const L: usize>(h: f64, c: [f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Member<'a, L> {
         Oscillator { stiffness: c[0], speed: F::speed(c[0], h), force: D::force(&c, inputs, lane) }
     }
 }
