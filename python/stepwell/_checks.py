@@ -26,8 +26,8 @@ def known(argument: str, name: object, names: Iterable[str]) -> str:
     if isinstance(name, str) and name in names:
         return name
     near = difflib.get_close_matches(str(name).lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.".replace("' Known", "'. Known"))
+    hint = f"; did you mean {near[0]!r}?" if near else "."
+    raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.")
 
 
 def numbers(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> Array:

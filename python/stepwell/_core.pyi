@@ -6,6 +6,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["ModelSpec", "World", "__version__", "catalogue", "isa", "isa_levels", "run", "saves", "systems"]
 __version__: str
 
 @final

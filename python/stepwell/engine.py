@@ -19,9 +19,12 @@ from . import _core
 from ._checks import Array, Shape
 from .methods import Method
 from .reference import run as reference
+from .reference.types import Blocks, Signal
 from .systems import Sampled, System
-from .systems.base import Parameters, row
+from .systems.base import Parameters, row, rows
 from .systems.inputs import Input, table
+
+Looped = tuple[Array, Array, list[Blocks], NDArray[np.int64]]
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def advance(plan: Plan, v: Array, y: Array, *, carried: bool = False) -> Outcome
 def _numpy(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
 
-    def step(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+    def step(t: float, v: Array, y: Array) -> Blocks:
         return steps.step(s, t, plan.dt, v, y)
 
     slot = v if carried else _start(plan, v, y)
@@ -83,18 +86,17 @@ def _numpy(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
     return _finished(plan, slot, kept, first_bad)
 
 
-def _loop(plan: Plan, step: Any, v: Array, y: Array, block_axes: tuple[int, int]) -> Any:
-    def told(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, block_axes: tuple[int, int]) -> Looped:
+    done, every = 0, max(1, plan.steps // 100)
+
+    def told(t: float, v: Array, y: Array) -> Blocks:
         nonlocal done
         done += 1
         if plan.progress is not None and done % every == 0:
             plan.progress(done / plan.steps)
-        return step(t, v, y)  # type: ignore[no-any-return]
+        return step(t, v, y)
 
-    done, every = 0, max(1, plan.steps // 100)
-    return reference.run(
-        told, v, y, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves
-    )
+    return reference.run(told, v, y, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves)
 
 
 def _start(plan: Plan, v: Array, y: Array) -> Array:
@@ -106,7 +108,7 @@ def _start(plan: Plan, v: Array, y: Array) -> Array:
         return np.asarray(plan.method.steps.start(s, plan.choice, plan.t0 + plan.first * plan.dt, v, y))
 
 
-def _finished(plan: Plan, slot: Array, kept: list[tuple[Array, Array]], first_bad: Any) -> Outcome:
+def _finished(plan: Plan, slot: Array, kept: list[Blocks], first_bad: Any) -> Outcome:
     """The states from the kept slots."""
     v = [pair[0] for pair in kept]
     y = [pair[1] for pair in kept]
@@ -160,7 +162,7 @@ def _rust(plan: Plan, model: _core.ModelSpec, v: Array, y: Array, carried: bool,
 # ---- the transition-matrix form
 
 
-def transition(plan: Plan) -> tuple[Array, Array, list[Any]]:
+def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
     """P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), and the inputs.
 
     Both are found by stepping: P from unit vectors of the slots, Q from zero with a unit pulse of one input at one node.
@@ -175,7 +177,10 @@ def transition(plan: Plan) -> tuple[Array, Array, list[Any]]:
         return np.concatenate([out.slot.reshape(n_v, *batch), last_y.reshape(n_y, *batch)])
 
     unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(plan.batch)), (n, n, *plan.batch))
-    v, y = unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch), unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch)
+    v, y = (
+        unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch),
+        unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch),
+    )
     p = step(plan.system.without_inputs(), (n, *plan.batch), v, y)
 
     inputs = plan.system.inputs()
@@ -200,21 +205,21 @@ def _matrix(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
     if plan.backend == "numpy":
         linear = reference.linear_step(p, q, signals, plan.method.nodes, plan.dt)
 
-        def step(t: float, v: Array, y: Array) -> tuple[Array, Array]:
+        def step(t: float, v: Array, y: Array) -> Blocks:
             s = linear(t, np.concatenate([v, y]))
             return s[:n_v], s[n_v:]
 
         flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, (1, 1))
     else:
-        rows = [row(r, plan.batch) for r in (*p.reshape(-1, *plan.batch), *q.reshape(-1, *plan.batch))]
-        parameters = Parameters(size=n_v + n_y, rows=rows)
+        maps = [rows(a.reshape((a.shape[0] * a.shape[1], *plan.batch)), plan.batch) for a in (p, q)]
+        parameters = Parameters(size=n_v + n_y, rows=maps)
         for given in _given_inputs(plan.system):
             if isinstance(given, Sampled):
                 parameters.options.append("held")
                 parameters.tables.append(table(given, plan.batch))
             else:
                 parameters.options.append("sine")
-                rows += [row(a, plan.batch) for a in (given.amplitude, given.omega, given.phase)]
+                parameters.rows += [row(a, plan.batch) for a in (given.amplitude, given.omega, given.phase)]
         spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
         out = _rust(plan, spec, flat_v, flat_y, carried=True, carries=False)
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad

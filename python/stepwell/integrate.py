@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from . import _checks, engine
 from ._checks import Array
 from .errors import ArgumentError, DivergenceWarning, DTypeError, UnsupportedError
-from .methods import Method, method as find_method
+from .methods import Method
+from .methods import method as find_method
 from .result import Run, Status
 from .systems import System
 
@@ -83,6 +85,7 @@ def integrate(
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
+    system.check_time(max(abs(t0 + k * dt) for k in (start_step, start_step + steps)))
     every = None if every is None else _checks.count("every", every, 1)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     choice = how.start_choice(start)
@@ -101,7 +104,7 @@ def integrate(
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
-        out = engine.advance(engine.replace(plan, progress=told), v, y, carried=carry is not None)
+        out = engine.advance(replace(plan, progress=told), v, y, carried=carry is not None)
     run = Run(
         t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
         v=out.v,
@@ -137,7 +140,7 @@ def fits_together(system: System, method: Method) -> None:
 def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Array:
     """A state over the whole batch."""
     axes = array.shape[len(block) :]
-    return np.broadcast_to(array.reshape(*block, *(1,) * (len(batch) - len(axes)), *axes), (*block, *batch))
+    return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
 
 
 def _bar(title: str) -> Any:

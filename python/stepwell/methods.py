@@ -8,18 +8,19 @@ from typing import Any, Protocol, cast
 
 from . import _checks, _core
 from .errors import ArgumentError
+from .reference.types import Array, Blocks, Scaled
 
 
 class Steps(Protocol):
     """What a file in ``reference/steppers`` defines. ``start`` and ``finish`` are there if the method has a carry."""
 
-    def step(self, s: Any, t: float, h: float, v: Any, y: Any) -> tuple[Any, Any]:
+    def step(self, s: Scaled, t: float, h: float, v: Array, y: Array, /) -> Blocks:
         """One step."""
 
-    def start(self, s: Any, choice: int, t: float, v: Any, y: Any) -> Any:
+    def start(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
         """What the method carries in the place of v."""
 
-    def finish(self, s: Any, choice: int, t: float, v: Any, y: Any) -> Any:
+    def finish(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
         """The velocity from what the method carries."""
 
 
@@ -80,7 +81,12 @@ class Method:
 
     def _text(self) -> str:
         limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
-        lines = [f"{self.title}: order {self.order}, {self.evaluations} rate evaluation(s) per step.", "", self.about, ""]
+        lines = [
+            f"{self.title}: order {self.order}, {self.evaluations} rate evaluation(s) per step.",
+            "",
+            self.about,
+            "",
+        ]
         if self.other_names:
             lines.append(f"Also called: {', '.join(self.other_names)}.")
         if self.false_friends:

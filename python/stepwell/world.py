@@ -8,9 +8,10 @@ import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
-from .errors import ArgumentError, DTypeError
+from .errors import ArgumentError, DTypeError, ShapeError
 from .integrate import fits_together
-from .methods import Method, method as find_method
+from .methods import Method
+from .methods import method as find_method
 from .systems import System
 
 
@@ -63,7 +64,7 @@ class World:
         if np.shares_memory(v, y):
             raise ArgumentError("v and y: expected two arrays to step in place, got arrays that share memory")
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
-            raise _checks.ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
+            raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         plan = engine.Plan(system, self.method, batch, self.dt)
         model = engine.model(system.kernel, system.parameters(batch), self.method)
         self._core = _core.World(

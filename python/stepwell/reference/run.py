@@ -1,9 +1,28 @@
 """The loop around a step, and the transition-matrix form (Appendix B): the specification of the core's driver."""
 
+from collections.abc import Callable, Iterable, Sequence
+
 import numpy as np
+from numpy.typing import NDArray
+
+from .types import Array, Blocks, Signal
+
+Step = Callable[[float, Array, Array], Blocks]
+Saves = Iterable[int]
 
 
-def run(step, v, y, block_axes, *, h, t0, first, steps, saves):
+def run(
+    step: Step,
+    v: Array,
+    y: Array,
+    block_axes: tuple[int, int],
+    *,
+    h: float,
+    t0: float,
+    first: int,
+    steps: int,
+    saves: Saves,
+) -> tuple[Array, Array, list[Blocks], NDArray[np.int64]]:
     """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves`` and who diverged when.
 
     ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is
@@ -24,12 +43,14 @@ def run(step, v, y, block_axes, *, h, t0, first, steps, saves):
     return v, y, kept, first_bad
 
 
-def linear_step(p, q, inputs, nodes, h):
+def linear_step(
+    p: Array, q: Array, inputs: Sequence[Signal], nodes: Sequence[float], h: float
+) -> Callable[[float, Array], Array]:
     """One step of s ← P·s + Σ Q·u, with s the rows of v and y; the sums run over s, then over the nodes and their inputs."""
     columns = [(node * h, signal) for node in nodes for signal in inputs]
 
-    def step(t, s):
-        following = p[:, 0] * s[0]
+    def step(t: float, s: Array) -> Array:
+        following: Array = p[:, 0] * s[0]
         for j in range(1, len(s)):
             following = following + p[:, j] * s[j]
         for j, (later, signal) in enumerate(columns):

@@ -3,6 +3,7 @@
 import math
 
 from . import trig
+from .types import Array
 
 #: A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
 HOLD_SLACK = 1e-6
@@ -11,14 +12,14 @@ HOLD_SLACK = 1e-6
 class Sine:
     """amplitude · sin(omega·t + phase)."""
 
-    def __init__(self, amplitude, omega, phase):
+    def __init__(self, amplitude: Array, omega: Array, phase: Array) -> None:
         self.amplitude, self.omega, self.phase = amplitude, omega, phase
 
-    def at(self, t):
+    def at(self, t: float) -> Array:
         """The value at time t."""
         return self.amplitude * trig.sin(self.omega * t + self.phase)
 
-    def scaled(self, factor):
+    def scaled(self, factor: Array) -> "Sine":
         """The same input, times a factor."""
         return Sine(factor * self.amplitude, self.omega, self.phase)
 
@@ -26,14 +27,15 @@ class Sine:
 class Held:
     """``values[i]`` from start + i·interval until the next sample; the first before, the last after. A constant is one sample."""
 
-    def __init__(self, values, interval, start, factor=1.0):
+    def __init__(self, values: Array, interval: float, start: float, factor: Array | float = 1.0) -> None:
         self.values, self.interval, self.start, self.factor = values, interval, start, factor
 
-    def at(self, t):
+    def at(self, t: float) -> Array:
         """The value at time t."""
         i = math.floor((t - self.start) / self.interval + HOLD_SLACK)
-        return self.factor * self.values[max(0, min(i, len(self.values) - 1))]
+        value: Array = self.factor * self.values[max(0, min(i, len(self.values) - 1))]
+        return value
 
-    def scaled(self, factor):
+    def scaled(self, factor: Array) -> "Held":
         """The same input, times a factor."""
         return Held(self.values, self.interval, self.start, factor)

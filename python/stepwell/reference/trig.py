@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .types import Array
+
 TWO_OVER_PI = 0.636619772367581343
 MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which then stands in the low bits
 HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
@@ -23,7 +25,7 @@ C = (
 )
 
 
-def sin(x):
+def sin(x: Array) -> Array:
     """Sin x: reduced by π/2 in three parts, then fdlibm's polynomials."""
     y = np.asarray(x * TWO_OVER_PI + MAGIC)
     n = y - MAGIC
@@ -34,4 +36,5 @@ def sin(x):
     c = (1.0 - 0.5 * z) + (z * z) * (C[0] + z * (C[1] + z * (C[2] + z * (C[3] + z * (C[4] + z * C[5])))))
     a = np.asarray(np.where(quadrant & np.uint64(1) == 0, s, c))
     sign = (quadrant & np.uint64(2)) << np.uint64(62)
-    return (a.view(np.uint64) ^ sign).view(np.float64)
+    signed: Array = (a.view(np.uint64) ^ sign).view(np.float64)
+    return signed

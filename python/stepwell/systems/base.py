@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from .._checks import Array, Shape
+from ..reference.types import Scaled, Signal
 
 
 @dataclass
 class Parameters:
-    """A system as the core takes it: options, size, one row per parameter, tables of samples (values, interval, start)."""
+    """A system as the core takes it: options, size, rows of parameters, tables of samples (values, interval, start).
+
+    Arrays have two axes: what is counted, and the members, or 1 for all members.
+    """
 
     options: list[str] = field(default_factory=list)
     size: int = 0
@@ -45,7 +49,7 @@ class System(ABC):
     batch: Shape = ()
 
     @abstractmethod
-    def scaled(self, h: float, batch: Shape) -> Any:
+    def scaled(self, h: float, batch: Shape) -> Scaled:
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape."""
 
     @abstractmethod
@@ -56,9 +60,12 @@ class System(ABC):
     def energy(self, v: Array, y: Array) -> Array:
         """The energy of states with the blocks' axes first and axes of the batch last."""
 
+    def check_time(self, last: float) -> None:  # noqa: B027 (most systems do not care for the time)
+        """Raise if the system's inputs make no sense up to a time."""
+
     # What the transition-matrix form asks of a linear system.
 
-    def inputs(self) -> dict[str, Any]:
+    def inputs(self) -> dict[str, Signal]:
         """Its inputs by name, as reference signals."""
         return {}
 
@@ -72,7 +79,14 @@ class System(ABC):
 
 
 def row(values: Array, batch: Shape) -> Array:
-    """One parameter as a row for the core: one number, or one for each member."""
-    if values.ndim == 0:
-        return values.reshape(1)
-    return np.ascontiguousarray(np.broadcast_to(values, batch)).reshape(-1)
+    """One parameter as a row for the core."""
+    return rows(values[np.newaxis], batch)
+
+
+def rows(values: Array, batch: Shape) -> Array:
+    """Parameters, counted along the first axis, as rows for the core."""
+    count, own = len(values), values.shape[1:]
+    if not own:
+        return np.ascontiguousarray(values.reshape(count, 1))
+    aligned = values.reshape(count, *(1,) * (len(batch) - len(own)), *own)
+    return np.ascontiguousarray(np.broadcast_to(aligned, (count, *batch))).reshape(count, int(np.prod(batch)))

@@ -10,7 +10,7 @@ from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
 from ..reference.systems import chain as reference
-from .base import Parameters, System, row
+from .base import Parameters, System, rows
 
 
 class Chain(System):
@@ -58,7 +58,7 @@ class Chain(System):
 
     def parameters(self, batch: Shape) -> Parameters:
         """Size and rows for the core, as ``chain.rs`` documents them."""
-        return Parameters(size=self.n, rows=[row(r, batch) for array in (self.stiffness, self.mass) for r in array])
+        return Parameters(size=self.n, rows=[rows(array, batch) for array in (self.stiffness, self.mass)])
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""

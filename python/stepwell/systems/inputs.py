@@ -8,8 +8,12 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..errors import ShapeError
+from ..errors import ArgumentError, ShapeError
 from ..reference.signal import Held, Sine
+from .base import rows
+
+#: Beyond this angle a floating-point number cannot tell one part of a period from another.
+LAST_ANGLE = 2.0**50
 
 
 class Sinusoid:
@@ -32,7 +36,15 @@ class Sinusoid:
     def __repr__(self) -> str:
         return f"Sinusoid(amplitude={self.amplitude}, omega={self.omega}, phase={self.phase})"
 
-    def signal(self) -> Any:
+    def check(self, last: float) -> None:
+        """Raise if the angle leaves the range of the sine by a time."""
+        angle = float(np.abs(self.omega).max() * abs(last) + np.abs(self.phase).max())
+        if angle > LAST_ANGLE:
+            raise ArgumentError(
+                f"omega, phase: a sinusoid's angle may grow to {LAST_ANGLE:.3g} rad, but reaches {angle:.3g} rad by t = {last:g}"
+            )
+
+    def signal(self) -> Sine:
         """The reference signal."""
         return Sine(self.amplitude, self.omega, self.phase)
 
@@ -60,7 +72,7 @@ class Sampled:
     def __repr__(self) -> str:
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
 
-    def signal(self) -> Any:
+    def signal(self) -> Held:
         """The reference signal."""
         return Held(self.values, self.interval, self.start)
 
@@ -77,9 +89,4 @@ def as_input(argument: str, value: Any) -> Input | None:
 
 def table(sampled: Sampled, batch: Shape) -> tuple[Array, float, float]:
     """The samples as the core takes them: a row per sample, of one number or one for each member."""
-    values = sampled.values
-    if values.ndim > 1:
-        values = np.broadcast_to(
-            values.reshape(len(values), *(1,) * (len(batch) - len(sampled.batch)), *sampled.batch), (len(values), *batch)
-        )
-    return np.ascontiguousarray(values.reshape(len(values), -1)), sampled.interval, sampled.start
+    return rows(sampled.values, batch), sampled.interval, sampled.start

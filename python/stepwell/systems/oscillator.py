@@ -9,6 +9,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..reference.systems import oscillator as reference
+from ..reference.types import Signal
 from .base import Parameters, System, row
 from .inputs import Input, Sampled, Sinusoid, as_input, table
 
@@ -33,9 +34,7 @@ class Oscillator(System):
     kernel = "oscillator"
     linear = True
 
-    def __init__(
-        self, omega: Any = 1.0, damping: Any = None, *, x: Any = None, a: Any = None, form: str = "canonical"
-    ) -> None:
+    def __init__(self, omega: Any = 1.0, damping: Any = None, *, x: Any = None, a: Any = None, form: str = "canonical") -> None:
         self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
         self.damping = None if damping is None else _checks.numbers("damping", damping)
         self.x = as_input("x", x)
@@ -64,7 +63,7 @@ class Oscillator(System):
     def parameters(self, batch: Shape) -> Parameters:
         """Options, rows and tables for the core, as ``oscillator.rs`` documents them."""
         options = [self.form] + ["damped"] * (self.damping is not None)
-        zero = np.zeros(1)
+        zero = np.zeros((1, 1))
         rows = [row(self.omega, batch), zero if self.damping is None else row(self.damping, batch)]
         tables = []
         for name, given in (("x", self.x), ("a", self.a)):
@@ -84,7 +83,13 @@ class Oscillator(System):
             return 0.5 * (v * v + y * y)
         return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
 
-    def inputs(self) -> dict[str, Any]:
+    def check_time(self, last: float) -> None:
+        """Raise if a sinusoid's angle leaves the range of the sine by a time."""
+        for given in self._inputs().values():
+            if isinstance(given, Sinusoid):
+                given.check(last)
+
+    def inputs(self) -> dict[str, Signal]:
         """Its inputs by name, as reference signals."""
         return {name: given.signal() for name, given in self._inputs().items()}
 

@@ -2,8 +2,8 @@
 //!
 //! One libm `sin` in a step costs a factor of eighteen and differs between machines. This one reduces by π/2 in three parts
 //! (Cody and Waite) and evaluates the minimax polynomials of fdlibm's kernels on [−π/4, π/4]. Up to 10⁶ rad it is within 1 ulp
-//! of 1; beyond, its error stays below the one that the rounding of the argument itself makes. The largest argument is
-//! 2⁵¹·π/2; anything above gives some number in [−1, 1] or NaN.
+//! of 1; beyond, its error stays below the one that the rounding of the argument itself makes. Arguments past 2⁵⁰ are garbage
+//! in, garbage out, huge numbers included; callers refuse them.
 
 /// 2/π
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;

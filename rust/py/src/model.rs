@@ -1,6 +1,6 @@
 //! What to step: names, parameters and tables that stay Python's.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use stepwell_core::{
     error::Error,
@@ -19,16 +19,22 @@ pub struct ModelSpec {
     system: String,
     options: Vec<String>,
     size: usize,
-    rows: Vec<Py<PyArray1<f64>>>,
+    rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     method: String,
     matrix: Option<(Vec<f64>, usize)>,
 }
 
 /// The parameters, borrowed for a run.
-pub type Rows<'py> = Vec<PyReadonlyArray1<'py, f64>>;
+pub type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
 /// The tables, borrowed for a run: start, interval, samples.
 pub type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
+
+/// The rows of an array, each of one number or one for each member.
+fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
+    let width = array.as_array().ncols().max(1);
+    Ok(array.as_slice()?.chunks_exact(width).map(Row).collect())
+}
 
 #[pymethods]
 impl ModelSpec {
@@ -39,7 +45,7 @@ impl ModelSpec {
         system: String,
         options: Vec<String>,
         size: usize,
-        rows: Vec<Py<PyArray1<f64>>>,
+        rows: Vec<Py<PyArray2<f64>>>,
         tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
         method: String,
         matrix: Option<(Vec<f64>, usize)>,
@@ -70,14 +76,10 @@ impl ModelSpec {
             system: &self.system,
             options: self.options.iter().map(String::as_str).collect(),
             size: self.size,
-            rows: rows.iter().map(|r| Ok(Row(r.as_slice()?))).collect::<PyResult<_>>()?,
+            rows: rows.iter().map(by_row).collect::<PyResult<Vec<_>>>()?.concat(),
             tables: tables
                 .iter()
-                .map(|(start, interval, t)| {
-                    let width = t.as_array().ncols().max(1);
-                    let samples = t.as_slice()?.chunks_exact(width).map(Row).collect();
-                    Ok(Table { samples, start: *start, interval: *interval })
-                })
+                .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
         };
         Ok(match &self.matrix {

@@ -57,7 +57,8 @@ impl World {
         let (v, y) = (v.as_slice_mut()?, y.as_slice_mut()?);
         let mut left = n;
         while left > self.patience {
-            self.world.step(self.patience, v, y);
+            // Long enough to let other threads run, and to look for Ctrl-C.
+            py.detach(|| self.world.step(self.patience, v, y));
             left -= self.patience;
             py.check_signals()?;
         }

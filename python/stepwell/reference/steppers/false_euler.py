@@ -1,7 +1,9 @@
 """False Euler (§7)."""
 
+from ..types import Array, Blocks, Scaled
 
-def step(s, t, h, v, y):
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The new ``v`` is used at once."""
     v = v + s.dv(t, v, y)
     return v, y + s.dy(t, v, y)

@@ -1,7 +1,9 @@
 """False Heun (§10)."""
 
+from ..types import Array, Blocks, Scaled
 
-def step(s, t, h, v, y):
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """Heun with the new ``v`` in both equations for ``y``."""
     dv1 = s.dv(t, v, y)
     v1 = v + dv1

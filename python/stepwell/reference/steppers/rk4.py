@@ -1,9 +1,11 @@
 """The classical Runge-Kutta method (§12 names its professional kin)."""
 
+from ..types import Array, Blocks, Scaled
+
 SIXTH = 1.0 / 6.0
 
 
-def step(s, t, h, v, y):
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """Four evaluations: at the start, twice in the middle, at the end."""
     half = t + 0.5 * h
     dv1, dy1 = s.dv(t, v, y), s.dy(t, v, y)

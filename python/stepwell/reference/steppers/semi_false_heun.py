@@ -1,7 +1,9 @@
 """Semi-False Heun (§11)."""
 
+from ..types import Array, Blocks, Scaled
 
-def step(s, t, h, v, y):
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """Heun with the new ``v`` in the second equation for ``y`` only."""
     dv1 = s.dv(t, v, y)
     dy1 = s.dy(t, v, y)

@@ -1,7 +1,9 @@
 """Standard Euler (§5)."""
 
+from ..types import Array, Blocks, Scaled
 
-def step(s, t, h, v, y):
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """Both blocks move by the old rates."""
     dv = s.dv(t, v, y)
     dy = s.dy(t, v, y)

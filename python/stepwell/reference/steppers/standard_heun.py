@@ -1,7 +1,9 @@
 """Standard Heun (§9)."""
 
+from ..types import Array, Blocks, Scaled
 
-def step(s, t, h, v, y):
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """A predictor, then the mean of the increments at both ends."""
     dv1 = s.dv(t, v, y)
     dy1 = s.dy(t, v, y)

@@ -2,28 +2,31 @@
 
 import numpy as np
 
+from ..types import Array
+
 
 class Chain:
     """Spring j pulls with f_j = k_j·(y_j − y_{j−1}), the walls at 0; v̇ᵢ = (f_{i+1} − f_i)/mᵢ, ẏ = v."""
 
-    def __init__(self, h, stiffness, mass):
+    def __init__(self, h: float, stiffness: Array, mass: Array) -> None:
         self.h = h
         self.stiffness = stiffness
         self.by_mass = h / mass
 
-    def dv(self, t, v, y):
-        """h·v̇"""
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇."""
         k = self.stiffness
         first = k[:1] * y[:1]
         between = k[1:-1] * (y[1:] - y[:-1])
         last = k[-1:] * -y[-1:]
         f = np.concatenate([first, between, last])
-        return (f[1:] - f[:-1]) * self.by_mass
+        dv: Array = (f[1:] - f[:-1]) * self.by_mass
+        return dv
 
-    def dy(self, t, v, y):
-        """h·ẏ"""
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
         return self.h * v
 
-    def velocity(self, d):
+    def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h

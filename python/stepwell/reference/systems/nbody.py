@@ -2,15 +2,17 @@
 
 import numpy as np
 
+from ..types import Array
+
 
 class NBody:
     """v̇ᵢ = G·m·Σⱼ (yⱼ − yᵢ)/r², ẏ = v. Blocks are of shape (bodies, 2)."""
 
-    def __init__(self, h, strength):
+    def __init__(self, h: float, strength: Array) -> None:
         self.h = h
         self.strength = h * strength
 
-    def dv(self, t, v, y):
+    def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇: both bodies of a pair move, in opposite directions."""
         dv = np.zeros_like(y)
         for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -20,10 +22,10 @@ class NBody:
             dv[j] = dv[j] - d * pull
         return dv
 
-    def dy(self, t, v, y):
-        """h·ẏ"""
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
         return self.h * v
 
-    def velocity(self, d):
+    def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h

@@ -1,5 +1,9 @@
 """The linear oscillator (§3): ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x + a."""
 
+import numpy as np
+
+from ..types import Array, Signal
+
 
 class Oscillator:
     """Canonical: v̇ = −ω₀(y + 2Dv − x) + a/ω₀, ẏ = ω₀v. Physical: v̇ = −ω₀²y − 2Dω₀v + ω₀²x + a, ẏ = v.
@@ -7,21 +11,21 @@ class Oscillator:
     ``damping`` None means that there is no such term; a driven oscillator always has it.
     """
 
-    def __init__(self, h, form, omega, damping, x, a):
+    def __init__(self, h: float, form: str, omega: Array, damping: Array | None, x: Signal | None, a: Signal | None) -> None:
         if form == "canonical":
             self.stiffness = self.speed = by_x = h * omega
             by_a = h / omega
         else:
             self.stiffness = by_x = h * (omega * omega)
-            self.speed = by_a = h
+            self.speed = by_a = np.asarray(h)
         inputs = [signal.scaled(by) for signal, by in ((x, by_x), (a, by_a)) if signal is not None]
         if damping is None and inputs:
-            damping = 0.0
+            damping = np.zeros(())
         self.drag = None if damping is None else (2.0 * damping) * (h * omega)
         self.inputs = inputs
 
-    def dv(self, t, v, y):
-        """h·v̇"""
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇."""
         dv = -(self.stiffness * y)
         if self.drag is not None:
             dv = dv - self.drag * v
@@ -32,10 +36,10 @@ class Oscillator:
             dv = dv + drive
         return dv
 
-    def dy(self, t, v, y):
-        """h·ẏ"""
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
         return self.speed * v
 
-    def velocity(self, d):
+    def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.speed

@@ -1,0 +1,97 @@
+"""Every method × system × form that there is, with random parameters. Tests iterate over these and never list methods by hand."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+
+Make = Callable[[np.random.Generator, int], sw.System]
+
+
+def _omega(rng: np.random.Generator, b: int) -> Any:
+    return rng.uniform(0.5, 2.0, b)
+
+
+def _sine(rng: np.random.Generator, b: int) -> sw.Sinusoid:
+    return sw.Sinusoid(rng.uniform(0.1, 1.0, b), rng.uniform(0.0, 9.0, b), rng.uniform(-3.0, 3.0, b))
+
+
+def _held(rng: np.random.Generator, b: int) -> sw.Sampled:
+    return sw.Sampled(rng.normal(size=(13, b)), interval=0.07, start=-0.1)
+
+
+#: One maker for each kernel variant of each system.
+SYSTEMS: dict[str, Make] = {
+    "free": lambda r, b: sw.Oscillator(_omega(r, b)),
+    "free, physical": lambda r, b: sw.Oscillator(_omega(r, b), form="physical"),
+    "one omega for all": lambda r, b: sw.Oscillator(1.25),
+    "damped": lambda r, b: sw.Oscillator(_omega(r, b), r.uniform(0.0, 1.2, b)),
+    "damped, physical": lambda r, b: sw.Oscillator(_omega(r, b), 0.3, form="physical"),
+    "constant x": lambda r, b: sw.Oscillator(_omega(r, b), x=r.normal(size=b)),
+    "constant x and a, physical": lambda r, b: sw.Oscillator(_omega(r, b), x=0.5, a=r.normal(size=b), form="physical"),
+    "sinusoid x": lambda r, b: sw.Oscillator(_omega(r, b), x=_sine(r, b)),
+    "sinusoid a, damped, physical": lambda r, b: sw.Oscillator(_omega(r, b), 0.1, a=_sine(r, b), form="physical"),
+    "sinusoids x and a, damped": lambda r, b: sw.Oscillator(_omega(r, b), 0.1, x=_sine(r, b), a=sw.Sinusoid(1.0, 2.0)),
+    "sampled x, sinusoid a": lambda r, b: sw.Oscillator(_omega(r, b), x=_held(r, b), a=_sine(r, b)),
+    "sinusoid x, sampled a, damped": lambda r, b: sw.Oscillator(
+        _omega(r, b), 0.2, x=_sine(r, b), a=sw.Sampled(r.normal(size=7), interval=0.11)
+    ),
+    "sampled x and a, physical": lambda r, b: sw.Oscillator(_omega(r, b), x=_held(r, b), a=_held(r, b), form="physical"),
+    "three bodies": lambda r, b: sw.NBody(G=r.uniform(0.5, 2.0, b)),
+    "chain of one": lambda r, b: sw.Chain(1, stiffness=r.uniform(0.5, 2.0, (2, b))),
+    "chain of five": lambda r, b: sw.Chain(5, stiffness=r.uniform(0.0, 2.0, (6, b)), mass=r.uniform(0.5, 2.0, 5)),
+    "chain of nineteen": lambda r, b: sw.Chain(19, mass=r.uniform(0.5, 2.0, (1, b))),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One method, one system, one form, one way to start."""
+
+    method: str
+    system: str
+    form: str
+    start: str | None
+
+    def make(self, b: int, seed: int = 0) -> tuple[sw.System, dict[str, Any]]:
+        """The system for a batch of b members, and the other arguments of a run."""
+        rng = np.random.default_rng([seed, b])
+        system = SYSTEMS[self.system](rng, b)
+        v, y = (rng.normal(size=(*shape, b)) for shape in (system.v_shape, system.y_shape))
+        return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
+
+    def run(self, b: int, seed: int = 0, **options: Any) -> sw.Run:
+        """A run of b members."""
+        system, arguments = self.make(b, seed)
+        return sw.integrate(system, **({"steps": 23, "every": 5} | arguments | options))
+
+    def __str__(self) -> str:
+        return ", ".join(filter(None, [self.method, self.system, self.form, self.start]))
+
+
+def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
+    """Every case that is not refused."""
+    rng = np.random.default_rng()
+    names = [m.name for m in sw.methods()] if methods is None else list(methods)
+    for method, system in itertools.product(names, SYSTEMS):
+        made, record = SYSTEMS[system](rng, 1), sw.method(method)
+        if record.needs_acceleration and (made.velocity_term or not made.second_order):
+            continue
+        for form in ("direct", "matrix") if made.linear else ("direct",):
+            for start in record.starts or (None,):
+                yield Case(method, system, form, start)
+
+
+def assert_same(a: sw.Run, b: sw.Run) -> None:
+    """To the last bit: every kept number, and who diverged when."""
+    np.testing.assert_array_equal(a.t, b.t)
+    np.testing.assert_array_equal(a.v, b.v)
+    np.testing.assert_array_equal(a.y, b.y)
+    np.testing.assert_array_equal(a.first_bad_step, b.first_bad_step)
+    if a.carry is not None or b.carry is not None:
+        np.testing.assert_array_equal(a.carry, b.carry)

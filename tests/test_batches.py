@@ -1,0 +1,205 @@
+"""What a run keeps, how shapes broadcast, who diverged and when."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+FREE = sw.Oscillator(1.0)
+
+
+def quiet(*arguments: Any, **options: Any) -> sw.Run:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.DivergenceWarning)
+        return sw.integrate(*arguments, **options)
+
+
+def test_one_trajectory() -> None:
+    run = sw.integrate(FREE, "false_euler", v=0.0, y=1.0, dt=0.3, steps=200, every=1)
+    assert run.t.shape == run.v.shape == run.y.shape == run.energy.shape == (201,)
+    assert run.status.shape == run.first_bad_step.shape == ()
+    assert run.status == sw.Status.OK
+    assert run.first_bad_step == -1
+    np.testing.assert_array_equal(run.t, 0.3 * np.arange(201))
+
+
+def test_the_last_state_alone() -> None:
+    last = sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.3, steps=200)
+    every = sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.3, steps=200, every=1)
+    assert last.y.shape == (1,)
+    assert last.t[0] == 60.0
+    assert last.y[-1] == every.y[-1]
+
+
+def test_a_batch() -> None:
+    omega = np.linspace(0.5, 2.0, 1000)
+    run = sw.integrate(sw.Oscillator(omega), "standard_heun", v=0.0, y=1.0, dt=0.01, steps=1000, every=100, threads=2)
+    assert run.y.shape == (11, 1000)
+    assert run.status.shape == (1000,)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("form", ["direct", "matrix"])
+def test_everything_broadcasts(backend: str, form: str) -> None:
+    omega = np.linspace(0.5, 2.0, 4)[:, None, None]
+    damping = np.linspace(0.0, 0.5, 3)[:, None]
+    y = np.arange(5.0)
+    system = sw.Oscillator(omega, damping, x=sw.Sampled(np.arange(6.0).reshape(2, 3, 1), 0.5))
+    options = {"dt": 0.1, "steps": 12, "every": 4, "backend": backend, "form": form}
+    run = sw.integrate(system, "rk4", v=0.0, y=y, **options)
+    assert run.y.shape == (4, 4, 3, 5)
+    assert run.status.shape == (4, 3, 5)
+    one = sw.Oscillator(omega[2, 0, 0], damping[1, 0], x=sw.Sampled([1.0, 4.0], 0.5))
+    np.testing.assert_array_equal(run.y[:, 2, 1, 3], sw.integrate(one, "rk4", v=0.0, y=3.0, **options).y)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_blocks_come_first_and_batches_last(backend: str) -> None:
+    rng = np.random.default_rng(3)
+    options = {"dt": 0.01, "steps": 4, "every": 2, "backend": backend}
+    bodies = sw.integrate(sw.NBody(G=np.ones((2, 1))), "rk4", v=0.0, y=rng.normal(size=(3, 2, 7)), **options)
+    assert bodies.y.shape == (3, 3, 2, 2, 7)
+    assert bodies.energy.shape == (3, 2, 7)
+    chain = sw.integrate(sw.Chain(4, stiffness=np.ones((5, 6))), "rk4", v=0.0, y=rng.normal(size=(4, 2, 6)), **options)
+    assert chain.y.shape == (3, 4, 2, 6)
+    assert chain.energy.shape == (3, 2, 6)
+
+
+@pytest.mark.parametrize(("steps", "every", "kept"), [(10, 3, [0, 3, 6, 9, 10]), (9, 3, [0, 3, 6, 9]), (5, 100, [0, 5])])
+def test_every_keeps_the_first_and_the_last(steps: int, every: int, kept: list[int]) -> None:
+    run = sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.5, steps=steps, every=every, start_step=100, t0=7.0)
+    np.testing.assert_array_equal(run.t, 7.0 + (100 + np.array(kept, dtype=float)) * 0.5)
+
+
+def test_energy_of_each_system() -> None:
+    free = sw.integrate(sw.Oscillator(2.0), "rk4", v=3.0, y=4.0, dt=1e-3, steps=1, every=1)
+    assert free.energy[0] == 12.5
+    physical = sw.integrate(sw.Oscillator(2.0, form="physical"), "rk4", v=3.0, y=4.0, dt=1e-3, steps=1, every=1)
+    assert physical.energy[0] == 4.5 + 32.0
+    # Each energy is conserved to the method's order on an undriven, undamped system: fourth order, 1000 steps of 0.01.
+    rng = np.random.default_rng(5)
+    for system in (sw.NBody(), sw.Chain(3, stiffness=[1.0, 2.0, 0.5, 1.5], mass=[1.0, 3.0, 0.7])):
+        y = rng.normal(size=system.y_shape)
+        run = sw.integrate(system, "rk4", v=0.1, y=3 * y, dt=1e-3, steps=1000, every=100)
+        assert np.ptp(run.energy) < 1e-9 * (1 + abs(run.energy[0]))
+        assert np.ptp(0.5 * (run.v**2).reshape(11, -1).sum(axis=1)) > 1e-4  # something moved
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_who_diverged_and_when(backend: str) -> None:
+    """False Euler past its limit: each member leaves the range at its own step, and its neighbours do not notice."""
+    phi = np.array([0.5, 2.5, 1.9, 3.0, 1.0])
+    options = {"v": 0.0, "y": 1.0, "dt": 1.0, "steps": 3000, "backend": backend}
+    with pytest.warns(sw.DivergenceWarning, match=r"2 of 5 member\(s\) diverged; first member 3 at step \d+ \(t = \d+\)"):
+        run = sw.integrate(sw.Oscillator(phi), "false_euler", **options)
+    np.testing.assert_array_equal(run.status, [0, 1, 0, 1, 0])
+    for i, p in enumerate(phi):
+        first = run.first_bad_step[i]
+        assert (first == -1) == (p < 2)
+        if first > 0:
+            # Exact: finite one step before, not at it.
+            before = sw.integrate(sw.Oscillator(p), "false_euler", **(options | {"steps": int(first) - 1}))
+            at = quiet(sw.Oscillator(p), "false_euler", **(options | {"steps": int(first)}))
+            assert np.isfinite([before.v, before.y]).all()
+            assert not np.isfinite([at.v, at.y]).all()
+            # It grows by r = −p ± √(p²−1), p = 1 − Φ²/2, a step: overflow where r^n passes the largest double.
+            growth = np.log(p**2 / 2 - 1 + np.sqrt((p**2 / 2 - 1) ** 2 - 1))
+            assert first == pytest.approx(np.log(np.finfo(float).max) / growth, abs=5)
+    alone = sw.integrate(sw.Oscillator(1.9), "false_euler", **options)
+    assert run.y[-1, 2] == alone.y[-1]
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    phi=st.lists(st.floats(2.01, 40.0), min_size=1, max_size=90),
+    steps=st.integers(1, 3000),
+    every=st.sampled_from([None, 1, 10, 1023, 1024, 1025]),
+    start_step=st.sampled_from([0, 5, 10**6]),
+)
+def test_the_first_bad_step_is_exact(phi: list[float], steps: int, every: int | None, start_step: int) -> None:
+    """Whatever lies between two looks: the reference looks at every step."""
+    system = sw.Oscillator(np.array(phi))
+    options = {"v": 0.0, "y": 1.0, "dt": 1.0, "steps": steps, "every": every, "start_step": start_step}
+    rust = quiet(system, "false_euler", **options)
+    reference = quiet(system, "false_euler", **options, backend="numpy")
+    np.testing.assert_array_equal(rust.first_bad_step, reference.first_bad_step)
+
+
+def test_the_warning_of_a_single_member() -> None:
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 1 member\(s\) diverged; first the only member at step") as caught:
+        sw.integrate(sw.Oscillator(9.0), "false_euler", v=0.0, y=1.0, dt=1.0, steps=3000)
+    assert caught[0].filename == __file__
+
+
+def test_the_warning_names_a_member_of_a_grid() -> None:
+    omega = np.ones((4, 6))
+    omega[2, 5] = 9.0
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 24 member\(s\) diverged; first member \(2, 5\) at step"):
+        sw.integrate(sw.Oscillator(omega), "false_euler", v=0.0, y=1.0, dt=1.0, steps=3000)
+
+
+def test_a_collision_is_reported() -> None:
+    """Two bodies in one place: the run says so, and the other members do not notice."""
+    y = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])[..., None] + np.zeros(3)
+    y[1, 1] = [0.5, 0.0, 0.7]
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 member\(s\) diverged; first member 1 at step 1"):
+        run = sw.integrate(sw.NBody(), "false_euler", v=0.0, y=y, dt=0.01, steps=10)
+    np.testing.assert_array_equal(run.first_bad_step, [-1, 1, -1])
+    assert np.isfinite(run.y[..., [0, 2]]).all()
+
+
+def test_threads_share_a_large_batch_of_odd_size() -> None:
+    omega = np.linspace(0.5, 2.0, 10_007)
+    one = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.01, steps=100, every=50, threads=1)
+    for threads in (2, 3, 64, None):
+        many = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.01, steps=100, every=50, threads=threads)
+        np.testing.assert_array_equal(one.y, many.y)
+
+
+def test_inputs_are_not_touched() -> None:
+    v, y = np.zeros(40), np.ones(40)
+    sw.integrate(FREE, "false_euler", v=v, y=y, dt=0.1, steps=10)
+    np.testing.assert_array_equal(v, 0.0)
+    np.testing.assert_array_equal(y, 1.0)
+
+
+def test_integers_and_lists_are_welcome() -> None:
+    run = sw.integrate(sw.Oscillator([1, 2]), "rk4", v=0, y=[1, 2], dt=1, steps=np.int64(1))
+    assert run.y.dtype == np.float64
+
+
+def test_a_sample_is_not_missed_by_rounding() -> None:
+    """Users of other tools lose output times to accumulated rounding; here k·dt finds sample k for every k."""
+    n, dt = 5000, 0.1
+    samples = np.arange(n, dtype=float)
+    run = sw.integrate(
+        sw.Oscillator(1e-8, a=sw.Sampled(samples, dt), form="physical"),
+        "standard_euler",
+        v=0.0,
+        y=0.0,
+        dt=dt,
+        steps=n,
+        every=1,
+    )
+    np.testing.assert_array_equal(np.round(np.diff(run.v) / dt), samples)
+
+
+def test_a_run_says_what_it_is() -> None:
+    run = sw.integrate(FREE, "false_euler", v=0.0, y=1.0, dt=0.3, steps=2)
+    assert repr(run) == (
+        "<run of Oscillator(omega=1.0, form='canonical') by false_euler: 2 steps of 0.3 from t = 0.6, 1 kept, "
+        "1 member(s), 0 diverged>"
+    )
+
+
+def test_progress_shows_a_bar(capsys: pytest.CaptureFixture[str]) -> None:
+    for backend in ("rust", "numpy"):
+        run = sw.integrate(FREE, "rk4", v=0.0, y=np.ones(500), dt=0.1, steps=20_00, progress=True, backend=backend)
+        assert run.steps == 2000
+        assert "Runge-Kutta 4, 2000 steps" in capsys.readouterr().out

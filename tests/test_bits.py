@@ -1,0 +1,178 @@
+"""The promise: Rust equals the NumPy reference to the last bit, on every CPU level, thread count and batch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS, Case, assert_same, cases
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+ALL = list(cases())
+DIRECT = [c for c in ALL if c.form == "direct"]
+
+
+@pytest.mark.parametrize("case", ALL, ids=str)
+def test_equals_the_reference(case: Case) -> None:
+    # A lone member, a lane group with one idle lane, a full one, one member too many, and several groups.
+    for b in (1, 31, 32, 33, 257):
+        assert_same(case.run(b), case.run(b, backend="numpy"))
+
+
+@pytest.mark.parametrize("case", ALL, ids=str)
+def test_does_not_depend_on_the_cpu_level(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    best = case.run(161)
+    for level in sw.isa_levels():
+        monkeypatch.setenv("STEPWELL_ISA", level)
+        assert sw.isa() == level
+        assert_same(case.run(161), best)
+        assert_same(case.run(3), case.run(3, backend="numpy"))
+
+
+@pytest.mark.parametrize("case", ALL, ids=str)
+def test_does_not_depend_on_threads(case: Case) -> None:
+    one = case.run(700, threads=1)
+    for threads in (2, 7):
+        assert_same(case.run(700, threads=threads), one)
+
+
+@pytest.mark.parametrize("case", ALL, ids=str)
+def test_does_not_depend_on_company(case: Case) -> None:
+    together = case.run(90)
+    system, arguments = case.make(90)
+    for i in (0, 7, 63, 89):
+        alone = sw.integrate(
+            _member(system, i),
+            **(arguments | {"v": arguments["v"][..., i], "y": arguments["y"][..., i]}),
+            steps=23,
+            every=5,
+        )
+        np.testing.assert_array_equal(alone.y, together.y[..., i])
+        np.testing.assert_array_equal(alone.v, together.v[..., i])
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("case", ALL, ids=str)
+def test_whole_equals_pieces(case: Case, backend: str) -> None:
+    whole = case.run(40, steps=60, every=1, t0=0.3, backend=backend)
+    system, arguments = case.make(40)
+    same = {k: arguments[k] for k in ("method", "dt", "form")} | {"every": 1, "backend": backend}
+    run = sw.integrate(system, **(arguments | same), t0=0.3, steps=17)
+    for steps in (1, 30, 12):
+        before = run.start_step + run.steps
+        run = sw.integrate(system, **same, **run.resume, steps=steps)
+        np.testing.assert_array_equal(run.t, whole.t[before : before + steps + 1])
+        np.testing.assert_array_equal(run.y, whole.y[before : before + steps + 1])
+        np.testing.assert_array_equal(run.v, whole.v[before : before + steps + 1])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    case=st.sampled_from(ALL),
+    seed=st.integers(0, 2**32),
+    b=st.integers(1, 300),
+    dt=st.floats(1e-4, 3.0),
+    t0=st.floats(-1e3, 1e6),
+    start_step=st.integers(0, 10**9),
+    every=st.sampled_from([None, 1, 2, 7]),
+)
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+def test_equals_the_reference_anywhere(case: Case, seed: int, b: int, dt: float, **options: Any) -> None:
+    options |= {"dt": dt, "steps": 9}
+    assert_same(case.run(b, seed, **options), case.run(b, seed, **options, backend="numpy"))
+
+
+@pytest.mark.parametrize("case", DIRECT, ids=str)
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+def test_diverging_members_too(case: Case) -> None:
+    # Steps far past every limit: the same overflow in the same step.
+    options = {"dt": 60.0, "steps": 400, "every": 100}
+    rust = case.run(70, **options)
+    assert_same(rust, case.run(70, **options, backend="numpy"))
+
+
+def test_extremes_of_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Denormal numbers and huge ones: no level flushes to zero.
+    for level in sw.isa_levels():
+        monkeypatch.setenv("STEPWELL_ISA", level)
+        for scale in (5e-324, 1e-308, 1e-160, 1e160, 1e300):
+            arguments = {"v": scale * np.linspace(-1, 1, 50), "y": scale, "dt": 0.1, "steps": 50, "every": 1}
+            rust = sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments)
+            assert_same(rust, sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments, backend="numpy"))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.floats(-(2.0**49), 2.0**49), min_size=1, max_size=40))
+def test_the_sine_is_the_same(phases: list[float]) -> None:
+    # Through a system, because there is no other way in: v after one step from rest is the sine.
+    system = sw.Oscillator(1.0, a=sw.Sinusoid(1.0, 0.0, np.array(phases)))
+    arguments = {"v": 0.0, "y": 0.0, "dt": 1.0, "steps": 1}
+    rust = sw.integrate(system, "standard_euler", **arguments)
+    assert_same(rust, sw.integrate(system, "standard_euler", **arguments, backend="numpy"))
+
+
+def test_nothing_in_the_core_breaks_the_promise() -> None:
+    """The grep gate: no contraction, no library power or trigonometry, no reordered sum, no unsafe outside isa.rs."""
+    forbidden = (
+        "mul_add",
+        "powi(",
+        "powf(",
+        ".recip()",
+        ".dot(",
+        ".norm",
+        ".sum()",
+        ".sin()",
+        ".cos()",
+        ".exp()",
+        "fast-math",
+    )
+    core = Path(__file__).parents[1] / "rust"
+    files = sorted(core.glob("*/src/**/*.rs"))
+    assert len(files) > 20
+    for path in files:
+        code = path.read_text().split("#[cfg(test)]")[0]
+        lines = [line.split("//")[0] for line in code.splitlines()]
+        found = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in forbidden if word in line]
+        if path.name != "isa.rs":
+            found += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
+        assert not found
+
+
+def test_the_reference_sums_in_a_written_order() -> None:
+    """NumPy's sum, dot and matmul reorder; ``**`` is not a product. The reference may use none of them."""
+    forbidden = (".sum(", ".dot(", " @ ", "einsum", "**", "np.sin", "np.cos", "math.sin", "math.cos", "fma")
+    folder = Path(sw.__file__).parent / "reference"
+    for path in sorted(folder.rglob("*.py")):
+        text = path.read_text()
+        assert not [word for word in forbidden if word in text], path.name
+
+
+def test_every_variant_is_tried() -> None:
+    """A system without a case here would not be compared with the reference."""
+    from stepwell import _core
+
+    rng = np.random.default_rng()
+    assert {make(rng, 1).kernel for make in SYSTEMS.values()} == set(_core.systems())
+
+
+def _member(system: sw.System, i: int) -> sw.System:
+    """The i-th member of a batch of systems, alone."""
+
+    def one(value: Any) -> Any:
+        if isinstance(value, sw.Sinusoid):
+            return sw.Sinusoid(one(value.amplitude), one(value.omega), one(value.phase))
+        if isinstance(value, sw.Sampled):
+            return sw.Sampled(value.values[..., i] if value.values.ndim > 1 else value.values, value.interval, value.start)
+        return value[i] if isinstance(value, np.ndarray) and value.ndim else value
+
+    if isinstance(system, sw.Oscillator):
+        return sw.Oscillator(one(system.omega), one(system.damping), x=one(system.x), a=one(system.a), form=system.form)
+    if isinstance(system, sw.NBody):
+        return sw.NBody(G=one(system.G))
+    assert isinstance(system, sw.Chain)
+    k, m = (a[..., i] if a.ndim > 1 and a.shape[-1] > 1 else a for a in (system.stiffness, system.mass))
+    return sw.Chain(system.n, stiffness=k, mass=m)

@@ -1,0 +1,295 @@
+"""Bad input: a clear error before any work, tested by its text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import errors
+
+FREE = sw.Oscillator(1.0)
+GOOD: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 10}
+
+
+def run(system: Any = FREE, method: Any = "false_euler", **options: Any) -> sw.Run:
+    return sw.integrate(system, method, **(GOOD | options))
+
+
+def world(system: sw.System = FREE, method: str = "false_euler", **options: Any) -> sw.World:
+    return sw.World(system, method, **({"v": np.zeros(3), "y": np.ones(3), "dt": 0.1} | options))
+
+
+def readonly() -> Any:
+    array = np.zeros(3)
+    array.flags.writeable = False
+    return array
+
+
+E = errors
+BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
+    # names
+    (
+        lambda: run(method="fals_euler"),
+        E.UnknownNameError,
+        "method: there is no 'fals_euler'; did you mean 'false_euler'? Known: ",
+    ),
+    (lambda: run(method="False Euler"), E.UnknownNameError, "there is no 'False Euler'; did you mean 'false_euler'?"),
+    (lambda: run(method=3), E.UnknownNameError, "method: there is no 3. Known: standard_euler, "),
+    (lambda: sw.method("heun"), E.UnknownNameError, "did you mean "),
+    (lambda: run(backend="nunpy"), E.UnknownNameError, "backend: there is no 'nunpy'; did you mean 'numpy'?"),
+    (lambda: run(form="matrx"), E.UnknownNameError, "form: there is no 'matrx'; did you mean 'matrix'?"),
+    (
+        lambda: sw.Oscillator(form="canonic"),
+        E.UnknownNameError,
+        "form: there is no 'canonic'; did you mean 'canonical'?",
+    ),
+    (
+        lambda: run(method="verlet", start="second"),
+        E.UnknownNameError,
+        "start: there is no 'second'; did you mean 'second_order'?",
+    ),
+    (lambda: run(start="first_order"), E.ArgumentError, "start: false_euler starts in one way only, got 'first_order'"),
+    (lambda: sw.NBody(force="newtn"), E.UnknownNameError, "force: there is no 'newtn'"),
+    (
+        lambda: run(system="oscillator"),
+        E.DTypeError,
+        "system: expected a stepwell system such as Oscillator(), got str",
+    ),
+    # what a method cannot do
+    (
+        lambda: run(sw.Oscillator(damping=0.1), "verlet"),
+        E.UnsupportedError,
+        "verlet needs forces that do not depend on the velocity, but Oscillator(omega=1.0, damping=0.1, form='canonical') has "
+        "damping; use false_euler, or leave damping out",
+    ),
+    (
+        lambda: world(sw.Oscillator(damping=0.1), "verlet"),
+        E.UnsupportedError,
+        "verlet needs forces that do not depend on",
+    ),
+    (
+        lambda: run(sw.NBody(), y=np.ones((3, 2)), form="matrix"),
+        E.UnsupportedError,
+        "only linear systems have a transition matrix",
+    ),
+    (lambda: run(carry=1.0), E.ArgumentError, "carry: false_euler carries nothing but v between steps"),
+    (
+        lambda: sw.NBody(masses=[1, 2, 3]),
+        E.UnsupportedError,
+        "only three equal masses have a kernel so far, got [1, 2, 3]",
+    ),
+    (lambda: sw.NBody(masses=[1, 1]), E.UnsupportedError, "only three equal masses have a kernel so far, got [1, 1]"),
+    # numbers
+    (lambda: run(dt=0.0), E.ArgumentError, "dt: expected numbers above zero in units of time, got 0"),
+    (lambda: run(dt=-0.1), E.ArgumentError, "dt: expected numbers above zero in units of time, got -0.1"),
+    (lambda: run(dt=np.nan), E.NotFiniteError, "dt: expected finite numbers in units of time, got nan"),
+    (lambda: run(dt=[0.1, 0.2]), E.ShapeError, "dt: expected one number in units of time, got an array of shape (2,)"),
+    (lambda: run(dt="fast"), E.DTypeError, "dt: expected real numbers in units of time, got 'fast'"),
+    (lambda: run(dt=None), E.DTypeError, "dt: expected real numbers in units of time, got None"),
+    (lambda: run(steps=0), E.ArgumentError, "steps: expected 1 or more, got 0"),
+    (lambda: run(steps=-5), E.ArgumentError, "steps: expected 1 or more, got -5"),
+    (lambda: run(steps=2.5), E.DTypeError, "steps: expected a whole number, got 2.5 (float)"),
+    (lambda: run(steps=True), E.DTypeError, "steps: expected a whole number, got True (bool)"),
+    (
+        lambda: run(steps=2**60),
+        E.ArgumentError,
+        "steps: expected 1 or more, up to 9007199254740992, got 1152921504606846976",
+    ),
+    (lambda: run(every=0), E.ArgumentError, "every: expected 1 or more, got 0"),
+    (lambda: run(threads=0), E.ArgumentError, "threads: expected 1 or more, got 0"),
+    (lambda: run(threads=10**6), E.ArgumentError, "threads: expected 1 or more, up to 4096, got 1000000"),
+    (lambda: run(start_step=-1), E.ArgumentError, "start_step: expected 0 or more, got -1"),
+    (lambda: run(t0=np.inf), E.NotFiniteError, "t0: expected finite numbers in units of time, got inf"),
+    (lambda: run(v=[0.0, np.nan, 1.0]), E.NotFiniteError, "v: expected finite numbers, got nan at index (1,)"),
+    (lambda: run(y=-np.inf), E.NotFiniteError, "y: expected finite numbers, got -inf"),
+    (lambda: run(y=1j), E.DTypeError, "y: expected real numbers, got 1j"),
+    (lambda: run(y=np.ones(3, complex)), E.DTypeError, "y: expected real numbers, got an array of dtype complex128"),
+    (lambda: run(y=[[1.0], [1.0, 2.0]]), E.ShapeError, "y: expected a number or a regular array, got list"),
+    (lambda: run(y=[True, False]), E.DTypeError, "y: expected real numbers, got an array of dtype bool"),
+    (lambda: sw.Oscillator(0.0), E.ArgumentError, "omega: expected numbers above zero in rad per unit of time, got 0"),
+    (
+        lambda: sw.Oscillator([1.0, -2.0]),
+        E.ArgumentError,
+        "omega: expected numbers above zero in rad per unit of time, got -2 at index (1,)",
+    ),
+    (lambda: sw.Oscillator(damping=np.nan), E.NotFiniteError, "damping: expected finite numbers, got nan"),
+    (lambda: sw.Oscillator(x="wave"), E.DTypeError, "x: expected real numbers, got 'wave'"),
+    (
+        lambda: sw.Sinusoid(1.0, np.inf),
+        E.NotFiniteError,
+        "omega: expected finite numbers in rad per unit of time, got inf",
+    ),
+    (
+        lambda: sw.Sampled([], 1.0),
+        E.ShapeError,
+        "values: expected at least one sample along the first axis, got shape (0,)",
+    ),
+    (
+        lambda: sw.Sampled(1.0, 1.0),
+        E.ShapeError,
+        "values: expected at least one sample along the first axis, got shape ()",
+    ),
+    (lambda: sw.Sampled([1.0], 0.0), E.ArgumentError, "interval: expected numbers above zero in units of time, got 0"),
+    (
+        lambda: run(sw.Oscillator(a=sw.Sinusoid(1.0, 1e9)), t0=1e9),
+        E.ArgumentError,
+        "omega, phase: a sinusoid's angle may grow to 1.13e+15 rad, but reaches 1e+18 rad by t = 1e+09",
+    ),
+    (lambda: sw.Chain(0), E.ArgumentError, "n: expected 1 or more, got 0"),
+    (lambda: sw.Chain(2, mass=[1.0, 0.0]), E.ArgumentError, "mass: expected numbers above zero, got 0"),
+    (lambda: sw.Chain(2, stiffness=-1.0), E.ArgumentError, "stiffness: expected numbers of zero or more, got -1"),
+    (
+        lambda: sw.Chain(2, stiffness=np.ones(5)),
+        E.ShapeError,
+        "stiffness: expected 3 springs (or 1) along the first axis, got shape (5,)",
+    ),
+    # shapes
+    (
+        lambda: run(v=np.zeros(3), y=np.zeros(4)),
+        E.ShapeError,
+        "these batch shapes do not broadcast to one: v (3,), y (4,)",
+    ),
+    (
+        lambda: run(sw.Oscillator(np.ones(5)), y=np.ones(4)),
+        E.ShapeError,
+        "do not broadcast to one: system (5,), y (4,)",
+    ),
+    (lambda: sw.Oscillator(np.ones(3), np.ones(4)), E.ShapeError, "do not broadcast to one: omega (3,), damping (4,)"),
+    (lambda: run(y=np.zeros(0)), E.ShapeError, "y: expected at least one member, got an empty batch of shape (0,)"),
+    (
+        lambda: sw.Oscillator(np.zeros(0)),
+        E.ShapeError,
+        "omega: expected at least one member, got an empty batch of shape (0,)",
+    ),
+    (
+        lambda: run(sw.NBody(), y=np.zeros((2, 3))),
+        E.ShapeError,
+        "y: expected shape (3, 2, batch…) = (bodies, dim, batch…), got (2, 3); batch axes come last",
+    ),
+    (
+        lambda: run(sw.Chain(4), y=np.zeros(3)),
+        E.ShapeError,
+        "y: expected shape (4, batch…) = (masses, batch…), got (3,)",
+    ),
+    (
+        lambda: run(sw.Oscillator(np.ones((10**6, 1)), np.ones(10**6))),
+        E.TooLargeError,
+        "the kept states of 1000000000000 members need 2.98e+04 GiB, but this machine has",
+    ),
+    (
+        lambda: run(y=np.ones(1000), steps=10**12, every=1),
+        E.TooLargeError,
+        "GiB; keep less with every= or split the batch",
+    ),
+    # in place
+    (lambda: world(v=[0.0] * 3), E.DTypeError, "v: expected a NumPy array to step in place, got list"),
+    (lambda: world(v=np.zeros(3, np.float32)), E.DTypeError, "v: expected dtype float64 to step in place, got float32"),
+    (lambda: world(y=np.ones(3, ">f8")), E.DTypeError, "y: expected dtype float64 to step in place, got >f8"),
+    (
+        lambda: world(v=np.zeros(6)[::2]),
+        E.ArgumentError,
+        "v: expected a C-contiguous array to step in place, got strides (16,)",
+    ),
+    (
+        lambda: world(v=readonly()),
+        E.ArgumentError,
+        "v: expected a writeable array to step in place, got a read-only one",
+    ),
+    (lambda: world(v=np.zeros(4)), E.ShapeError, "v: expected shape (3,), got (4,)"),
+    (lambda: world(v=np.full(3, np.nan)), E.NotFiniteError, "v: expected finite numbers, got nan at index (0,)"),
+    (lambda: world(y=np.ones((0,)), v=np.ones((0,))), E.ShapeError, "expected at least one member, got an empty batch"),
+    (
+        lambda: world(sw.Oscillator(np.ones(2))),
+        E.ShapeError,
+        "these batch shapes do not broadcast to one: system (2,), v and y (3,)",
+    ),
+    (
+        lambda: world(sw.Oscillator(np.ones((2, 1)))),
+        E.ShapeError,
+        "v and y: the system's batch (2, 1) does not broadcast to theirs, (3,)",
+    ),
+    (lambda: world(dt=0.0), E.ArgumentError, "dt: expected numbers above zero"),
+    (lambda: world().step(-1), ValueError, "n must be a number of steps, zero or more; got -1"),
+]
+
+
+@pytest.mark.parametrize(("call", "error", "text"), BAD, ids=[text[:60] for _, _, text in BAD])
+def test_a_clear_error(call: Callable[[], Any], error: type[Exception], text: str) -> None:
+    with pytest.raises(error, match=re.escape(text)) as caught:
+        call()
+    if error is not ValueError:
+        assert isinstance(caught.value, sw.StepwellError)
+
+
+def test_aliased_arrays() -> None:
+    both = np.zeros(6)
+    for v, y in ((both[:3], both[:3]), (both[:4], both[2:])):
+        with pytest.raises(errors.ArgumentError, match="got arrays that share memory"):
+            world(v=v, y=y)
+    world(v=both[:3], y=both[3:])  # neighbours are fine
+
+
+def test_a_cpu_level_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STEPWELL_ISA", "avx1024")
+    with pytest.raises(ValueError, match='STEPWELL_ISA="avx1024" is not a CPU level of this machine; it has baseline'):
+        run()
+
+
+def test_one_tree() -> None:
+    """Whoever catches StepwellError catches all; whoever knows Python's own classes is served too."""
+    tree = [e for e in vars(errors).values() if isinstance(e, type) and issubclass(e, Exception)]
+    for error in tree:
+        assert issubclass(error, sw.StepwellError) or error is sw.DivergenceWarning
+    assert issubclass(errors.ArgumentError, ValueError)
+    assert issubclass(errors.UnknownNameError, LookupError)
+    assert issubclass(errors.DTypeError, TypeError)
+    assert issubclass(errors.TooLargeError, MemoryError)
+
+
+def test_the_core_refuses_too() -> None:
+    """Python checks first; whoever uses the core directly still gets an error and no panic."""
+    from stepwell import _core
+
+    def core(
+        system: str = "oscillator", options: Any = ("canonical",), method: str = "rk4", size: int = 0, **arrays: Any
+    ) -> None:
+        row = arrays.pop("row", np.ones((1, 1)))
+        model = _core.ModelSpec(system, list(options), size, [row], [], method)
+        given = {
+            "v": np.zeros((1, 4)),
+            "y": np.zeros((1, 4)),
+            "saved_v": np.zeros((0, 1, 4)),
+            "saved_y": np.zeros((0, 1, 4)),
+        }
+        clock = {
+            "t0": 0.0,
+            "dt": 0.1,
+            "start": 0,
+            "first": 0,
+            "steps": 1,
+            "every": None,
+            "threads": 1,
+            "carried": False,
+        }
+        _core.run(model, **clock, **(given | arrays), first_bad=np.full(4, -1), progress=None)  # type: ignore[arg-type]
+
+    core()
+    for options, text in (
+        ({"system": "oscilator"}, 'there is no system "oscilator"'),
+        ({"method": "rk5"}, 'there is no method "rk5"'),
+        ({"options": ["canonical", "physical"]}, "has no kernel for the options"),
+        (
+            {"options": ["canonical", "damped"], "method": "verlet"},
+            "verlet needs forces that do not depend on the velocity",
+        ),
+        ({"system": "chain", "options": [], "size": 0}, "has no kernel for the options"),
+        ({"v": np.zeros((2, 4))}, "v: expected 4, got 8"),
+        ({"saved_y": np.zeros((3, 1, 4))}, "saved_v: expected 4, got 0"),
+        ({"row": np.ones((1, 3))}, "a parameter: expected 4, got 3"),
+    ):
+        with pytest.raises(ValueError, match=re.escape(text)):
+            core(**options)  # type: ignore[arg-type]

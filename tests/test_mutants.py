@@ -1,0 +1,100 @@
+"""Deliberately wrong methods: each must be caught by the comparison of backends, and by the truths.
+
+A mutant is a reference stepper with one thing changed. The first test shows that equality with the core notices; the second that
+the truths would notice even if both languages had the same mistake. So no mutant survives the suite.
+"""
+
+from __future__ import annotations
+
+import inspect
+import types
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import assert_same, cases
+from truths import CLOSED_FORMS, forced_error, matrix_of, quadrature_error, slope
+
+#: method: what to replace, by what, and what kind of mistake it is.
+MUTANTS = [
+    ("false_euler", "return v, y + s.dy(t, v, y)", "return v, y + s.dy(t, v - s.dv(t, v, y), y)", "old v for new v"),
+    ("standard_euler", "dy = s.dy(t, v, y)", "dy = s.dy(t, v + dv, y)", "new v for old v"),
+    ("damped_euler", "return v + s.dv(t, v, y), y", "return v + s.dv(t, v, y - s.dy(t, v, y)), y", "old y for new y"),
+    ("standard_heun", "dv2 = s.dv(t + h, v1, y1)", "dv2 = s.dv(t, v1, y1)", "wrong stage time"),
+    ("standard_heun", "dy2 = s.dy(t + h, v1, y1)", "dy2 = s.dy(t + h, v, y1)", "old v for new v"),
+    ("standard_heun", "v + 0.5 * (dv1 + dv2)", "v + (dv1 + dv2)", "a lost half"),
+    ("false_heun", "dy1 = s.dy(t, v1, y)", "dy1 = s.dy(t, v, y)", "old v for new v"),
+    ("false_heun", "dv2 = s.dv(t + h, v1, y1)", "dv2 = s.dv(t, v1, y1)", "wrong stage time"),
+    ("false_heun", "y + 0.5 * (dy1 + dy2)", "y + (dy1 + dy2)", "a lost half"),
+    ("semi_false_heun", "dy2 = s.dy(t + h, v2, y1)", "dy2 = s.dy(t + h, v1, y1)", "old v for new v"),
+    ("semi_false_heun", "dv2 = s.dv(t + h, v1, y1)", "dv2 = s.dv(t, v1, y1)", "wrong stage time"),
+    ("semi_false_heun", "y + 0.5 * (dy1 + dy2)", "y + (dy1 + dy2)", "a lost half"),
+    ("rk4", "half = t + 0.5 * h", "half = t + h", "wrong stage time"),
+    ("rk4", "dv4, dy4 = s.dv(t + h, v4, y4)", "dv4, dy4 = s.dv(t, v4, y4)", "wrong stage time"),
+    ("rk4", "v3, y3 = v + 0.5 * dv2, y + 0.5 * dy2", "v3, y3 = v + dv2, y + dy2", "a lost half"),
+    ("rk4", "v2, y2 = v + 0.5 * dv1, y + 0.5 * dy1", "v2, y2 = v + 0.5 * dv1, y", "old y for new y"),
+    ("verlet", "(2.0 * y - y_prev) + d", "(2.0 * y - y_prev) + 0.5 * d", "a half too much"),
+    ("verlet", "y_prev = y_prev + 0.5 * s.dy", "y_prev = y_prev + s.dy", "a lost half at the start"),
+    ("verlet", "v = v + 0.5 * s.dv", "v = v + s.dv", "a lost half at the end"),
+    ("verlet", "y_prev = y - s.dy(t, v, y)", "y_prev = y + s.dy(t, v, y)", "a wrong sign at the start"),
+]
+IDS = [f"{method}: {mistake} #{i}" for i, (method, _, _, mistake) in enumerate(MUTANTS)]
+
+
+@pytest.fixture
+def mutate(monkeypatch: pytest.MonkeyPatch) -> object:
+    def replace(name: str, old: str, new: str) -> None:
+        original = sw.method(name).steps
+        assert isinstance(original, types.ModuleType)
+        source = inspect.getsource(original)
+        assert source.count(old) == 1, f"the mutant no longer fits {name}"
+        mutant: dict[str, object] = {"__package__": original.__package__}
+        exec(compile(source.replace(old, new), f"mutant of {name}", "exec"), mutant)
+        for function in ("step", "start", "finish"):
+            if function in mutant:
+                monkeypatch.setattr(original, function, mutant[function])
+
+    return replace
+
+
+def _equal_to_the_core(method: str) -> bool:
+    try:
+        for case in cases(iter([method])):
+            assert_same(case.run(5), case.run(5, backend="numpy"))
+    except AssertionError:
+        return False
+    return True
+
+
+def _true(method: str) -> bool:
+    closed = all(
+        np.allclose(matrix_of(method, phi, "canonical", "numpy"), CLOSED_FORMS[method](phi), rtol=0, atol=1e-11)
+        for phi in (0.1, 0.7, 1.9)
+    )
+    order = sw.method(method).order
+    return (
+        closed
+        and quadrature_error(method, "numpy") < 1e-12
+        and all(
+            abs(slope(lambda dt: forced_error(method, dt, block, "numpy")) - order) <= 0.1  # noqa: B023
+            for block in ("v", "y")
+        )
+    )
+
+
+@pytest.mark.parametrize(("method", "old", "new", "mistake"), MUTANTS, ids=IDS)
+def test_equality_notices(mutate: object, method: str, old: str, new: str, mistake: str) -> None:
+    assert _equal_to_the_core(method)
+    mutate(method, old, new)  # type: ignore[operator]
+    assert not _equal_to_the_core(method)
+
+
+@pytest.mark.parametrize(("method", "old", "new", "mistake"), MUTANTS, ids=IDS)
+def test_the_truths_notice(mutate: object, method: str, old: str, new: str, mistake: str) -> None:
+    assert _true(method)
+    mutate(method, old, new)  # type: ignore[operator]
+    assert not _true(method)
+
+
+def test_every_method_with_truths_has_a_mutant() -> None:
+    assert {m[0] for m in MUTANTS} == set(CLOSED_FORMS)

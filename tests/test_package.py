@@ -1,0 +1,111 @@
+"""The package as a whole: records, import time, what it needs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core
+
+REFERENCE = Path(sw.__file__).parent / "reference"
+
+
+def test_every_method_has_both_files() -> None:
+    """A method stands in one Rust file and one reference file of the same name."""
+    rust = Path(__file__).parents[1] / "rust" / "core" / "src"
+    names = {m.name for m in sw.methods()}
+    assert names == {p.stem for p in (REFERENCE / "steppers").glob("*.py")} - {"__init__"}
+    assert names == {p.stem for p in (rust / "steppers").glob("*.rs")}
+    assert set(_core.systems()) == {p.stem for p in (REFERENCE / "systems").glob("*.py")} - {"__init__"}
+
+
+@pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
+def test_every_record_is_complete(method: sw.Method) -> None:
+    assert method.title
+    assert method.order >= 1
+    assert method.evaluations >= 1
+    assert method.limit >= 0
+    assert method.section.startswith("§")
+    assert method.nodes
+    assert list(method.nodes) == sorted(set(method.nodes))
+    assert all(0 <= c <= 1 for c in method.nodes)
+    assert len(method.about) > 40
+    assert method.reference
+    assert method.__doc__
+    for told in (method.title, *method.other_names, *method.false_friends, method.reference, method.about):
+        assert told in method.__doc__
+    assert sw.method(method.name) is method
+    assert hasattr(method.steps, "start") == hasattr(method.steps, "finish") == (method.carry is not None)
+
+
+@pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
+def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
+    """Counted on the reference: one evaluation is one of each block."""
+
+    class Counting:
+        def __init__(self) -> None:
+            self.v = self.y = 0
+
+        def dv(self, t: float, v: float, y: float) -> float:
+            self.v += 1
+            assert any(t == pytest.approx(c * 0.25) for c in method.nodes)
+            return 0.0
+
+        def dy(self, t: float, v: float, y: float) -> float:
+            self.y += 1
+            return 0.0
+
+    counting = Counting()
+    method.steps.step(counting, 0.0, 0.25, 0.0, 1.0)
+    assert (counting.v, counting.y) == (method.evaluations, method.evaluations)
+
+
+def test_methods_are_in_the_documents_order() -> None:
+    sections = [int(m.section.strip("§")) for m in sw.methods()]
+    assert sections == sorted(sections)
+
+
+def test_import_is_quick_and_small() -> None:
+    """No plotting, no terminal library, no reference steppers: those are imported when used."""
+    code = "import numpy, sys; before = set(sys.modules); import stepwell; print(*sorted(set(sys.modules) - before))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    for heavy in ("matplotlib", "rich", "numba", "scipy", "hypothesis", "asyncio", "argparse"):
+        assert not [m for m in loaded if m.split(".")[0] == heavy]
+    assert not [m for m in loaded if m.startswith("stepwell.reference.steppers.")]
+    # A coarse guard of the 20 ms promise, which the benchmarks measure: modules cost time.
+    assert len(loaded) < 60, loaded
+
+
+def test_a_fork_can_still_use_threads() -> None:
+    """No pool of threads that a forked child would wait for in vain: multiprocessing works."""
+    if sys.platform == "win32":
+        return
+    code = (
+        "import multiprocessing as mp, numpy as np, stepwell as sw\n"
+        "def run(_):\n"
+        "    r = sw.integrate(sw.Oscillator(np.ones(10000)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=100, threads=2)\n"
+        "    return r.y[-1, 0]\n"
+        "if __name__ == '__main__':\n"
+        "    here = run(0)\n"
+        "    with mp.get_context('fork').Pool(2) as pool:\n"
+        "        assert pool.map_async(run, range(4)).get(timeout=20) == [here] * 4\n"
+        "    print('ok')\n"
+    )
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "ok", done.stderr
+
+
+def test_two_python_threads_at_once() -> None:
+    """The GIL is released: runs in several Python threads do not disturb each other."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    def run(i: int) -> float:
+        r = sw.integrate(sw.Oscillator(1.0 + i / 10), "rk4", v=0.0, y=np.ones(200), dt=0.01, steps=5000)
+        return float(r.y[-1, 0])
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(run, range(8))) == [run(i) for i in range(8)]

@@ -1,0 +1,157 @@
+"""The methods against truths that do not come from this library: closed forms, the document's own programs, exact solutions.
+
+Bit equality shows that two spellings agree. This file shows that what they agree on is right; ``test_mutants.py`` shows that it
+would notice if it were not. The methods of the document have their closed forms here; orders and limits are tested for every
+method that there is, from its record.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import stepwell as sw
+from truths import CLOSED_FORMS, PROGRAMS, WEIGHTS, forced_error, matrix_of, quadrature_error, slope
+
+METHODS = [m.name for m in sw.methods()]
+PHIS = (1e-3, 0.1, 0.7, 1.2, 1.9)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("form", ["canonical", "physical"])
+@pytest.mark.parametrize("method", CLOSED_FORMS)
+def test_transition_matrix_is_the_closed_form(method: str, form: str, backend: str) -> None:
+    for phi in PHIS:
+        # A few dozen roundings of numbers that are at most Φ⁴ in size, here 13: 50 ulp of it.
+        # Verlet's v is a difference of two y divided by Φ, and so is its rounding.
+        bound = 50 * np.finfo(float).eps * max(1.0, phi**4, 1 / phi if sw.method(method).carry else 0.0)
+        np.testing.assert_allclose(matrix_of(method, phi, form, backend), CLOSED_FORMS[method](phi), rtol=0, atol=bound)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", WEIGHTS)
+def test_stage_times_and_weights(method: str, backend: str) -> None:
+    """Where only a(t) acts, a method is a rule of quadrature: a wrong stage time or weight shows at once."""
+    assert quadrature_error(method, backend) < 1e-12
+    assert set(WEIGHTS[method]) <= {*sw.method(method).nodes, 1.0}
+
+
+@pytest.mark.parametrize("method", sorted(PROGRAMS))
+def test_the_documents_own_program(method: str) -> None:
+    """Appendix B, transcribed line by line: same y after 200 steps up to rounding, at three angles per step."""
+    for phi in (0.05, 0.5, 1.0):
+        start = "first_order" if method == "verlet" else None
+        run = sw.integrate(sw.Oscillator(1.0), method, v=0.0, y=1.0, dt=phi, steps=200, every=1, start=start)
+        theirs = PROGRAMS[method](phi, 200)
+        # Each of 200 steps rounds a handful of times by eps/2 relative to the amplitude, and for the stable methods errors add
+        # up linearly, or quadratically for the two-step Verlet (its double root at Φ → 0): n² eps at most.
+        size = np.abs(theirs).max()
+        np.testing.assert_allclose(run.y, theirs, rtol=0, atol=200**2 * np.finfo(float).eps * size)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("block", ["v", "y"])
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_order_on_a_forced_system(method: str, block: str, backend: str) -> None:
+    """A damped oscillator (undamped for Verlet) driven by a sinusoid: a wrong stage time costs the order here."""
+    measured = slope(lambda dt: forced_error(method, dt, block, backend))
+    assert measured == pytest.approx(sw.method(method).order, abs=0.1)
+
+
+@pytest.mark.parametrize("start", sw.method("verlet").starts)
+def test_order_of_each_start_of_verlet(start: str) -> None:
+    expected = {"second_order": 2, "first_order": 1}[start]
+    for block in ("v", "y"):
+        assert slope(lambda dt: forced_error("verlet", dt, block, start=start)) == pytest.approx(expected, abs=0.1)  # noqa: B023
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_order_in_the_clover(method: str) -> None:
+    """Three bodies on the unit circle, angular speed 1: a nonlinear system with an exact solution."""
+    c = np.sqrt(0.75)
+    y0 = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
+    v0 = np.array([[-0.5, c], [-0.5, -c], [1.0, 0.0]])
+
+    def error(dt: float) -> float:
+        run = sw.integrate(sw.NBody(), method, v=v0, y=y0, dt=dt, steps=round(1.0 / dt))
+        turn = np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])  # clockwise: rows times it
+        return float(np.abs(run.y[-1] - y0 @ turn).max())
+
+    assert slope(error) == pytest.approx(sw.method(method).order, abs=0.1)
+
+
+def test_clover_stays_bounded_by_false_euler() -> None:
+    """The document's figure: T = 0.3, stable ad infinitum; the radius stays within [0.914, 1.127] for 100 000 steps."""
+    c = np.sqrt(0.75)
+    y0 = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
+    v0 = np.array([[-0.5, c], [-0.5, -c], [1.0, 0.0]])
+    run = sw.integrate(sw.NBody(), "false_euler", v=v0, y=y0, dt=0.3, steps=100_000, every=1)
+    radius = np.linalg.norm(run.y, axis=-1)
+    assert radius.min() > 0.914
+    assert radius.max() < 1.127
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_chain_follows_its_modes(method: str) -> None:
+    """n equal masses and springs: mode j oscillates with ω = 2 sin(jπ/2(n+1)), as an oscillator of that ω does."""
+    n, j, dt = 9, 4, 0.3
+    omega = 2 * np.sin(j * np.pi / (2 * (n + 1)))
+    shape = np.sin(j * np.pi * np.arange(1, n + 1) / (n + 1))
+    chain = sw.integrate(sw.Chain(n), method, v=0.3 * shape, y=shape, dt=dt, steps=50)
+    single = sw.integrate(sw.Oscillator(omega, form="physical"), method, v=0.3, y=1.0, dt=dt, steps=50)
+    # 50 steps of some 10 roundings each, amplified at most by the method's growth (r₁ < 1.06 a step for the worst here).
+    np.testing.assert_allclose(chain.y[-1], single.y[-1] * shape, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(chain.v[-1], single.v[-1] * shape, rtol=0, atol=1e-11)
+
+
+def test_damped_euler_in_both_forms() -> None:
+    """The document's damped form, D = Φ/2, against the exchanged blocks: the same sequence up to rounding."""
+    from stepwell.reference.steppers.damped_euler import damped_form
+
+    phi, v, y = 0.9, 0.2, 1.0
+    run = sw.integrate(sw.Oscillator(phi), "damped_euler", v=v, y=y, dt=1.0, steps=500, every=1)
+    for k in range(501):
+        # |P^k| ≤ 3 for this Φ (the ellipse's axes), 4 roundings a step of at most eps: 12 k eps.
+        assert abs(run.v[k] - v) <= 12 * (k + 1) * np.finfo(float).eps
+        assert abs(run.y[k] - y) <= 12 * (k + 1) * np.finfo(float).eps
+        v, y = damped_form(phi, v, y)
+
+
+def test_damped_euler_is_false_euler_with_the_blocks_exchanged() -> None:
+    """On ẏ = ω₀v, v̇ = −ω₀y the exchange is (v, y) → (−y, v) or (y, −v), and the same to the last bit."""
+    damped = sw.integrate(sw.Oscillator(0.9), "damped_euler", v=0.2, y=1.0, dt=1.0, steps=300, every=1)
+    false = sw.integrate(sw.Oscillator(0.9), "false_euler", v=1.0, y=-0.2, dt=1.0, steps=300, every=1)
+    np.testing.assert_array_equal(damped.y, false.v)
+    np.testing.assert_array_equal(damped.v, -false.y)
+
+
+def test_verlet_of_first_order_is_false_euler() -> None:
+    """The seed's start makes Verlet's y False Euler's, up to the rounding of a two-step recursion (n² eps)."""
+    arguments = {"v": 0.4, "y": 1.0, "dt": 0.5, "steps": 100, "every": 1}
+    verlet = sw.integrate(sw.Oscillator(1.0), "verlet", start="first_order", **arguments)
+    euler = sw.integrate(sw.Oscillator(1.0), "false_euler", **arguments)
+    np.testing.assert_allclose(verlet.y, euler.y, rtol=0, atol=100**2 * np.finfo(float).eps)
+    np.testing.assert_allclose(verlet.v, euler.v, rtol=0, atol=100**2 * np.finfo(float).eps / 0.5)
+
+
+@pytest.mark.parametrize("method", [m for m in METHODS if sw.method(m).limit])
+def test_each_limit_from_both_sides(method: str) -> None:
+    """Bounded a thousandth below the recorded limit, growing a thousandth above."""
+    limit = sw.method(method).limit
+    phi = limit * np.array([0.999, 1.001])
+    run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=4000, every=100)
+    size = np.abs(run.y).max(axis=0)
+    # Below, the axes of the ellipse of False Euler are in the ratio √((2+Φ)/(2−Φ)) < 45. Above, an eigenvalue passes 1 by at
+    # least 1e-3·|dz/dlnΦ|; the flattest of these methods grows by more than e⁷ in 4000 steps.
+    assert size[0] < 50
+    assert size[1] > 1e3
+
+
+@pytest.mark.parametrize("method", ["standard_euler", "standard_heun"])
+def test_never_stable_means_never(method: str) -> None:
+    """Φ = 0.05: Standard Euler and Heun grow at the predicted rate, r₁² = 1 + Φ² and 1 + Φ⁴/4."""
+    phi, steps = 0.05, 100_000
+    assert sw.method(method).limit == 0
+    gain = {"standard_euler": 1 + phi**2, "standard_heun": 1 + phi**4 / 4}[method]
+    run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=steps)
+    # The radius is exact but for the rounding of each step: relative steps·eps in the logarithm.
+    assert np.log(run.energy[-1] * 2) == pytest.approx(steps * np.log(gain), abs=10 * steps * np.finfo(float).eps)

@@ -1,0 +1,182 @@
+"""What is known of the methods from elsewhere, written without this library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+
+def _false_euler(f: float) -> Matrix:
+    return np.array([[1, -f], [f, 1 - f**2]])
+
+
+def _rk4(f: float) -> Matrix:
+    c, s = 1 - f**2 / 2 + f**4 / 24, f - f**3 / 6
+    return np.array([[c, -s], [s, c]])
+
+
+#: Transition matrices of (v, y) on v̇ = −ω₀y, ẏ = ω₀v, as functions of Φ. Verlet's is that of its synchronised velocity.
+CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
+    "standard_euler": lambda f: np.array([[1, -f], [f, 1]]),
+    "damped_euler": lambda f: np.array([[1 - f**2, -f], [f, 1]]),
+    "false_euler": _false_euler,
+    "verlet": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 4)], [f, 1 - f**2 / 2]]),
+    "standard_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f, 1 - f**2 / 2]]),
+    "false_heun": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 2)], [f * (1 - f**2 / 2), 1 - f**2 + f**4 / 2]]),
+    "semi_false_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f * (1 - f**2 / 2), 1 - f**2 / 2]]),
+    "rk4": _rk4,
+}
+
+
+def matrix_of(method: str, phi: float, form: str, backend: str) -> Matrix:
+    """The transition matrix found by stepping (1, 0) and (0, 1), in canonical variables."""
+    omega = 1.0 if form == "canonical" else 1.7
+    scale = 1.0 if form == "canonical" else omega  # physical v = ω₀·canonical v
+    system = sw.Oscillator(omega, form=form)
+    v, y = np.array([scale, 0.0]), np.array([0.0, 1.0])
+    run = sw.integrate(system, method, v=v, y=y, dt=phi / omega, steps=1, backend=backend)
+    return np.array([run.v[-1] / scale, run.y[-1]])
+
+
+_HEUN = {0.0: 1 / 2, 1.0: 1 / 2}
+#: Weights b of v₁ = v₀ + h·Σ b(c)·a(t + c·h) where only a(t) acts: each method is then a rule of quadrature.
+WEIGHTS: dict[str, dict[float, float]] = {
+    "standard_euler": {0.0: 1.0},
+    "damped_euler": {0.0: 1.0},
+    "false_euler": {0.0: 1.0},
+    "verlet": _HEUN,  # of its synchronised velocity
+    "standard_heun": _HEUN,
+    "false_heun": _HEUN,
+    "semi_false_heun": _HEUN,
+    "rk4": {0.0: 1 / 6, 0.5: 2 / 3, 1.0: 1 / 6},
+}
+
+
+def quadrature_error(method: str, backend: str) -> float:
+    """How far one step under a(t) alone is from the rule; ω₀ = 1e-6 adds less than ω₀²."""
+    t0, h = 0.7, 0.3
+    system = sw.Oscillator(1e-6, a=sw.Sinusoid(1.0, 2.1, 0.4), form="physical")
+    run = sw.integrate(system, method, v=0.0, y=0.0, dt=h, steps=1, t0=t0, backend=backend)
+    rule = h * sum(b * np.sin(2.1 * (t0 + c * h) + 0.4) for c, b in WEIGHTS[method].items())
+    return abs(float(run.v[-1]) - rule)
+
+
+# ---- Appendix B, line by line, v0 = 0 and y0 = 1
+
+
+def _euler(phi: float, n: int) -> Matrix:
+    v0, y0, out = 0.0, 1.0, [1.0]
+    for _ in range(n):
+        v1 = v0 - phi * y0
+        y1 = y0 + phi * v0
+        v0, y0 = v1, y1
+        out.append(y0)
+    return np.array(out)
+
+
+def _damped(phi: float, n: int) -> Matrix:
+    v0, y0, out, d = 0.0, 1.0, [1.0], 0.5 * phi
+    for _ in range(n):
+        v1 = v0 - phi * (y0 + 2 * d * v0)
+        y1 = y0 + phi * v0
+        v0, y0 = v1, y1
+        out.append(y0)
+    return np.array(out)
+
+
+def _false(phi: float, n: int) -> Matrix:
+    v0, y0, out = 0.0, 1.0, [1.0]
+    for _ in range(n):
+        v1 = v0 - phi * y0
+        y1 = y0 + phi * v1
+        v0, y0 = v1, y1
+        out.append(y0)
+    return np.array(out)
+
+
+def _verlet(phi: float, n: int) -> Matrix:
+    y0, y2, out = 1.0, 1.0, [1.0]
+    for _ in range(n):
+        y1 = 2 * y0 - y2 + phi * phi * -y0
+        y2, y0 = y0, y1
+        out.append(y0)
+    return np.array(out)
+
+
+def _heun(kind: str) -> Callable[[float, int], Matrix]:
+    def program(phi: float, n: int) -> Matrix:
+        v0, y0, out = 0.0, 1.0, [1.0]
+        for _ in range(n):
+            dv1 = -phi * y0
+            v11 = v0 + dv1
+            dy1 = phi * (v11 if kind == "false" else v0)
+            y11 = y0 + dy1
+            dv2 = -phi * y11
+            v12 = v0 + dv2
+            dy2 = phi * (v11 if kind == "standard" else v12)
+            v0, y0 = v0 + 0.5 * (dv1 + dv2), y0 + 0.5 * (dy1 + dy2)
+            out.append(y0)
+        return np.array(out)
+
+    return program
+
+
+PROGRAMS: dict[str, Callable[[float, int], Matrix]] = {
+    "standard_euler": _euler,
+    "damped_euler": _damped,
+    "false_euler": _false,
+    "verlet": _verlet,
+    "standard_heun": _heun("standard"),
+    "false_heun": _heun("false"),
+    "semi_false_heun": _heun("semi"),
+}
+
+
+# ---- a forced oscillator and its exact solution
+
+OMEGA, DRIVE, FORCE, END = 1.3, 2.1, 0.8, 2.0
+
+
+def forced_exact(t: float, damping: float, v0: float, y0: float) -> tuple[float, float]:
+    """(v, y) of ÿ + 2Dω₀ẏ + ω₀²y = F sin(Ωt), v the physical velocity: particular plus damped homogeneous solution."""
+    k, c = OMEGA**2 - DRIVE**2, 2 * damping * OMEGA * DRIVE
+    a, b = FORCE * k / (k * k + c * c), -FORCE * c / (k * k + c * c)  # a sin + b cos
+    decay, ring = damping * OMEGA, OMEGA * np.sqrt(1 - damping**2)
+    p = y0 - b
+    q = (v0 - a * DRIVE + decay * p) / ring
+    e, cos, sin = np.exp(-decay * t), np.cos(ring * t), np.sin(ring * t)
+    y = e * (p * cos + q * sin) + a * np.sin(DRIVE * t) + b * np.cos(DRIVE * t)
+    v = e * ((q * ring - decay * p) * cos - (p * ring + decay * q) * sin) + DRIVE * (
+        a * np.cos(DRIVE * t) - b * np.sin(DRIVE * t)
+    )
+    return float(v), float(y)
+
+
+def forced_error(method: str, dt: float, block: str, backend: str = "rust", start: str | None = None) -> float:
+    """Error of one block at t = 2 on the forced system."""
+    damping = None if sw.method(method).needs_acceleration else 0.2
+    system = sw.Oscillator(OMEGA, damping, a=sw.Sinusoid(FORCE, DRIVE), form="physical")
+    arguments: dict[str, Any] = {
+        "v": 0.3,
+        "y": 1.0,
+        "dt": dt,
+        "steps": round(END / dt),
+        "backend": backend,
+        "start": start,
+    }
+    run = sw.integrate(system, method, **arguments)
+    v, y = forced_exact(END, damping or 0.0, 0.3, 1.0)
+    return abs(float(run.v[-1]) - v) if block == "v" else abs(float(run.y[-1]) - y)
+
+
+def slope(error: Callable[[float], float]) -> float:
+    """The order that two halvings show, extrapolated: each halving leaves about half of what is wrong with the slope."""
+    e = [error(dt) for dt in (1 / 50, 1 / 100, 1 / 200)]
+    first, second = np.log2(e[0] / e[1]), np.log2(e[1] / e[2])
+    return float(2 * second - first)
