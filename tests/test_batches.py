@@ -198,8 +198,49 @@ def test_a_run_says_what_it_is() -> None:
     )
 
 
-def test_progress_shows_a_bar(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_shows_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """On stderr, on a terminal only: what a program prints stays as it is."""
+    options: dict[str, Any] = {"v": 0.0, "y": np.ones(500), "dt": 0.1, "steps": 2000, "progress": True}
     for backend in ("rust", "numpy"):
-        run = sw.integrate(FREE, "rk4", v=0.0, y=np.ones(500), dt=0.1, steps=20_00, progress=True, backend=backend)
-        assert run.steps == 2000
-        assert "Runge-Kutta 4, 2000 steps" in capsys.readouterr().out
+        sw.integrate(FREE, "rk4", **options, backend=backend)
+        assert capsys.readouterr().out == ""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    for backend in ("rust", "numpy"):
+        sw.integrate(FREE, "rk4", **options, backend=backend)
+        shown = capsys.readouterr()
+        assert "Runge-Kutta 4, 2000 steps" in shown.err
+        assert "Runge-Kutta 4" not in shown.out
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_progress_goes_up(backend: str) -> None:
+    from stepwell import engine, method
+
+    shares: list[float] = []
+    steps = 10**6 if backend == "rust" else 1000
+    plan = engine.Plan(FREE, method("rk4"), (500,), 0.1, steps=steps, threads=1, backend=backend, progress=shares.append)
+    engine.advance(plan, np.zeros(500), np.ones(500))
+    assert len(shares) > 10
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] < 0.5 < shares[-1] <= 1
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("form", ["direct", "matrix"])
+@pytest.mark.parametrize("method", ["false_euler", "verlet"])
+def test_a_run_goes_on_after_somebody_diverged(method: str, form: str, backend: str) -> None:
+    """In pieces as in one piece: who diverged before stays as it is and is not named again; who does now is."""
+    system = sw.Oscillator(np.linspace(1.0, 5.0, 70))
+    options: dict[str, Any] = {"dt": 1.0, "every": 50, "form": form, "backend": backend}
+    whole = quiet(system, method, v=0.0, y=1.0, steps=900, **options)
+    assert 0 < np.count_nonzero(whole.first_bad_step > 400) < np.count_nonzero(whole.first_bad_step > 0)
+    first = quiet(system, method, v=0.0, y=1.0, steps=400, **options)
+    late = np.count_nonzero(whole.first_bad_step > 400)
+    with pytest.warns(sw.DivergenceWarning, match=rf"^{late} of 70 member"):
+        second = sw.integrate(system, method, steps=500, **options, **first.resume)
+    np.testing.assert_array_equal(second.first_bad_step, whole.first_bad_step)
+    np.testing.assert_array_equal(second.y, whole.y[8:])
+    np.testing.assert_array_equal(second.v, whole.v[8:])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.integrate(system, method, steps=5, **options, **second.resume)

@@ -70,3 +70,19 @@ def test_arrays_outlive_their_names() -> None:
     y = w.y
     w.step(10)
     assert y[0] != 1.0
+
+
+def test_another_thread_may_step() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    v, y = np.zeros(3), np.ones(3)
+    w = sw.World(sw.Oscillator(1.0), "false_euler", v=v, y=y, dt=0.1)
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(w.step, 10).result()
+    assert w.step_number == 10
+
+
+def test_the_arrays_cannot_be_swapped() -> None:
+    w = sw.World(sw.Oscillator(1.0), "false_euler", v=np.zeros(3), y=np.ones(3), dt=0.1)
+    with pytest.raises(AttributeError):
+        w.v = np.zeros(3)  # type: ignore[misc]

@@ -30,8 +30,8 @@ def known(argument: str, name: object, names: Iterable[str]) -> str:
     raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.")
 
 
-def numbers(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> Array:
-    """Return ``value`` as float64, if it is real and finite, and positive if asked."""
+def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
+    """Return ``value`` as float64, if it is real, finite unless told otherwise, and positive if asked."""
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -39,8 +39,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, unit: str = ""
     if array.dtype.kind not in "iuf":
         raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
     array = np.asarray(array, dtype=np.float64)
-    wrong = ~np.isfinite(array)
-    if wrong.any():
+    if finite and (wrong := ~np.isfinite(array)).any():
         raise NotFiniteError(f"{argument}: expected finite numbers{_in(unit)}, got {array[wrong][0]}{_where(wrong)}")
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
@@ -68,9 +67,9 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     return n
 
 
-def block(argument: str, value: Any, shape: Shape, axes: str) -> Array:
+def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = True) -> Array:
     """Return a state block whose leading axes are ``shape``; a single number fills the whole block."""
-    array = numbers(argument, value)
+    array = numbers(argument, value, finite=finite)
     if array.ndim == 0:
         return np.broadcast_to(array, shape)
     if array.shape[: len(shape)] != shape:
@@ -89,6 +88,19 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
         empty = ", ".join(name for name, shape in shapes.items() if 0 in shape)
         raise ShapeError(f"{empty}: expected at least one member, got an empty batch of shape {shape}")
     return shape
+
+
+def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape) -> NDArray[np.int64]:
+    """Return the first bad step of each member, −1 for none; only members that have one may hold what is not finite."""
+    if first_bad_step is None:
+        return np.full(batch, -1, dtype=np.int64)
+    steps = np.asarray(first_bad_step)
+    if steps.dtype.kind not in "iu" or steps.shape != batch:
+        raise ShapeError(f"first_bad_step: expected whole numbers of shape {batch}, got {steps.dtype} of shape {steps.shape}")
+    for argument, array in (("v", v), ("y", y)):
+        if (wrong := ~np.isfinite(array) & (steps < 0)).any():
+            raise NotFiniteError(f"{argument}: expected finite numbers, got {array[wrong][0]}{_where(wrong)}")
+    return np.array(steps, dtype=np.int64)
 
 
 def fits(what: str, rows: int, batch: Shape, remedy: str) -> None:

@@ -24,7 +24,8 @@ from .systems import Sampled, System
 from .systems.base import Parameters, row, rows
 from .systems.inputs import Input, table
 
-Looped = tuple[Array, Array, list[Blocks], NDArray[np.int64]]
+Steps = NDArray[np.int64]
+Looped = tuple[Array, Array, list[Blocks], Steps]
 
 
 @dataclass(frozen=True)
@@ -63,30 +64,34 @@ class Outcome:
     v: Array
     y: Array
     slot: Array
-    first_bad: NDArray[np.int64]
+    first_bad: Steps
 
 
-def advance(plan: Plan, v: Array, y: Array, *, carried: bool = False) -> Outcome:
-    """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch."""
+def advance(plan: Plan, v: Array, y: Array, before: Steps | None = None, *, carried: bool = False) -> Outcome:
+    """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch.
+
+    ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
+    """
+    before = np.full(plan.batch, -1, dtype=np.int64) if before is None else before
     if plan.form == "matrix":
-        return _matrix(plan, v, y, carried)
+        return _matrix(plan, v, y, before, carried)
     if plan.backend == "numpy":
-        return _numpy(plan, v, y, carried)
-    return _rust(plan, _model(plan), v, y, carried)
+        return _numpy(plan, v, y, before, carried)
+    return _rust(plan, _model(plan), v, y, before, carried)
 
 
-def _numpy(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
+def _numpy(plan: Plan, v: Array, y: Array, before: Steps, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         return steps.step(s, t, plan.dt, v, y)
 
     slot = v if carried else _start(plan, v, y)
-    slot, y, kept, first_bad = _loop(plan, step, slot, y, plan.block_axes)
+    slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes)
     return _finished(plan, slot, kept, first_bad)
 
 
-def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, block_axes: tuple[int, int]) -> Looped:
+def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Steps, block_axes: tuple[int, int]) -> Looped:
     done, every = 0, max(1, plan.steps // 100)
 
     def told(t: float, v: Array, y: Array) -> Blocks:
@@ -96,7 +101,9 @@ def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, block_axes: tupl
             plan.progress(done / plan.steps)
         return step(t, v, y)
 
-    return reference.run(told, v, y, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves)
+    return reference.run(
+        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves
+    )
 
 
 def _start(plan: Plan, v: Array, y: Array) -> Array:
@@ -130,13 +137,15 @@ def model(kernel: str, p: Parameters, method: Method, matrix: tuple[list[float],
     return _core.ModelSpec(kernel, p.options, p.size, p.rows, tables, method.name, matrix)
 
 
-def _rust(plan: Plan, model: _core.ModelSpec, v: Array, y: Array, carried: bool, carries: bool | None = None) -> Outcome:
+def _rust(
+    plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Steps, carried: bool, carries: bool | None = None
+) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
     slot, y = (np.array(a, dtype=np.float64, order="C") for a in (v, y))
     # The last state alone needs no second copy, unless the slot holds something else.
     keep = len(plan.saves) if plan.every is not None or carries else 0
     saved_v, saved_y = (np.empty((keep, *a.shape)) for a in (slot, y))
-    first_bad = np.full(plan.batch, -1, dtype=np.int64)
+    first_bad = before.copy()
     _core.run(
         model,
         t0=plan.t0,
@@ -195,7 +204,7 @@ def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
     return p, np.stack(q) if q else np.zeros((0, n, *plan.batch)), list(inputs.values())
 
 
-def _matrix(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
+def _matrix(plan: Plan, v: Array, y: Array, before: Steps, carried: bool) -> Outcome:
     p, q, signals = transition(plan)
     slot = v if carried else _start(plan, v, y)
     n_v, n_y = v.size // max(1, int(np.prod(plan.batch))), y.size // max(1, int(np.prod(plan.batch)))
@@ -209,7 +218,7 @@ def _matrix(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
             s = linear(t, np.concatenate([v, y]))
             return s[:n_v], s[n_v:]
 
-        flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, (1, 1))
+        flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, before, (1, 1))
     else:
         maps = [rows(a.reshape((a.shape[0] * a.shape[1], *plan.batch)), plan.batch) for a in (p, q)]
         parameters = Parameters(size=n_v + n_y, rows=maps)
@@ -221,7 +230,7 @@ def _matrix(plan: Plan, v: Array, y: Array, carried: bool) -> Outcome:
                 parameters.options.append("sine")
                 parameters.rows += [row(a, plan.batch) for a in (given.amplitude, given.omega, given.phase)]
         spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
-        out = _rust(plan, spec, flat_v, flat_y, carried=True, carries=False)
+        out = _rust(plan, spec, flat_v, flat_y, before, carried=True, carries=False)
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
     shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
     return _finished(plan, flat_v.reshape(blocks[0]), shaped, first_bad)

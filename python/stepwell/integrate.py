@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _checks, engine
 from ._checks import Array
@@ -34,6 +35,7 @@ def integrate(
     start_step: int = 0,
     start: str | None = None,
     carry: Any = None,
+    first_bad_step: Any = None,
     form: str = "direct",
     threads: int | None = None,
     backend: str = "rust",
@@ -57,6 +59,7 @@ def integrate(
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how a method with a choice starts; see ``method(…).starts``.
         carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used.
+        first_bad_step: members that diverged before, from ``run.resume``; only they may begin with NaN or infinities.
         form: ``"direct"``, or ``"matrix"`` for the transition matrix of a linear system (Appendix B).
         threads: how many threads share the members; None for as many as pay.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
@@ -92,8 +95,11 @@ def integrate(
     if carry is not None and how.carry is None:
         raise ArgumentError(f"carry: {how.name} carries nothing but v between steps")
 
-    v = _checks.block("carry" if carry is not None else "v", v if carry is None else carry, system.v_shape, system.axes)
-    y = _checks.block("y", y, system.y_shape, system.axes)
+    finite = first_bad_step is None
+    v = _checks.block("v", v, system.v_shape, system.axes, finite=finite)
+    if carry is not None:
+        v = _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
+    y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
     batch = _checks.batch_shape(
         {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     )
@@ -102,9 +108,10 @@ def integrate(
     kept = 1 if every is None else steps // every + 2
     _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+    before = _checks.diverged_before(first_bad_step, v, y, batch)
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
-        out = engine.advance(replace(plan, progress=told), v, y, carried=carry is not None)
+        out = engine.advance(replace(plan, progress=told), v, y, before, carried=carry is not None)
     run = Run(
         t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
         v=out.v,
@@ -120,7 +127,7 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
     )
-    _warn(run)
+    _warn(run, before)
     return run
 
 
@@ -151,12 +158,13 @@ def _bar(title: str) -> Any:
     return bar(title)
 
 
-def _warn(run: Run) -> None:
-    bad = run.first_bad_step >= 0
+def _warn(run: Run, before: NDArray[np.int64]) -> None:
+    """Warn of the members that diverged in this run."""
+    bad = (run.first_bad_step >= 0) & (before < 0)
     if not bad.any():
         return
     step = int(run.first_bad_step[bad].min())
-    first = tuple(int(i) for i in np.argwhere(run.first_bad_step == step)[0])
+    first = tuple(int(i) for i in np.argwhere(bad & (run.first_bad_step == step))[0])
     who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
     warnings.warn(
         f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {who} at step {step} "

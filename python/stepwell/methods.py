@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from functools import cache
 from typing import Any, Protocol, cast
 
@@ -98,9 +99,15 @@ class Method:
         return f"<method {self.name}: {self.title}, order {self.order}, {self.evaluations} evaluation(s) per step>"
 
 
+def _section(method: Method) -> int:
+    """The number of the document's section; what has none comes last."""
+    number = re.search(r"\d+", method.section)
+    return int(number[0]) if number else 99
+
+
 @cache
 def _catalogue() -> dict[str, Method]:
-    by_section = sorted(map(Method, _core.catalogue()), key=lambda m: (int(m.section.strip("§")), m.order, m.name))
+    by_section = sorted(map(Method, _core.catalogue()), key=lambda m: (_section(m), m.order, m.name))
     return {m.name: m for m in by_section}
 
 

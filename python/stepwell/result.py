@@ -64,10 +64,15 @@ class Run:
 
     @property
     def resume(self) -> dict[str, Any]:
-        """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit."""
-        state = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
+        """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
+
+        System, method, dt and form are yours to give again. Members that diverged go on as they are and are not named again.
+        """
+        state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         if self.start is not None:
             state["start"] = self.start
+        if self.status.any():
+            state["first_bad_step"] = self.first_bad_step
         return state | ({} if self.carry is None else {"carry": self.carry})
 
     def __repr__(self) -> str:

@@ -37,7 +37,7 @@ class World:
     anew from what you wrote. Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
     """
 
-    __slots__ = ("_core", "dt", "method", "step", "system", "v", "y")
+    __slots__ = ("_core", "_v", "_y", "dt", "method", "step", "system")
 
     def __init__(
         self,
@@ -59,12 +59,14 @@ class World:
         self.dt = _checks.number("dt", dt, positive=True, unit="units of time")
         t0 = _checks.number("t0", t0, unit="units of time")
         batch = np.shape(y)[len(system.y_shape) :]
-        self.v = _checks.in_place("v", v, (*system.v_shape, *batch))
-        self.y = _checks.in_place("y", y, (*system.y_shape, *batch))
+        self._v = _checks.in_place("v", v, (*system.v_shape, *batch))
+        self._y = _checks.in_place("y", y, (*system.y_shape, *batch))
         if np.shares_memory(v, y):
             raise ArgumentError("v and y: expected two arrays to step in place, got arrays that share memory")
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
+        first = _checks.count("start_step", start_step, 0)
+        system.check_time(abs(t0) + first * self.dt)
         plan = engine.Plan(system, self.method, batch, self.dt)
         model = engine.model(system.kernel, system.parameters(batch), self.method)
         self._core = _core.World(
@@ -72,13 +74,23 @@ class World:
             t0=t0,
             dt=self.dt,
             start=self.method.start_choice(start),
-            first=_checks.count("start_step", start_step, 0),
+            first=first,
             members=int(np.prod(plan.batch)),
             v=v,
             y=y,
         )
         #: ``step(n=1)`` makes n steps in place.
         self.step: Any = self._core.step
+
+    @property
+    def v(self) -> Array:
+        """The velocities, the array that was given."""
+        return self._v
+
+    @property
+    def y(self) -> Array:
+        """The coordinates, the array that was given."""
+        return self._y
 
     @property
     def t(self) -> float:

@@ -9,12 +9,14 @@ from .types import Array, Blocks, Signal
 
 Step = Callable[[float, Array, Array], Blocks]
 Saves = Iterable[int]
+Steps = NDArray[np.int64]
 
 
 def run(
     step: Step,
     v: Array,
     y: Array,
+    first_bad: Steps,
     block_axes: tuple[int, int],
     *,
     h: float,
@@ -22,15 +24,15 @@ def run(
     first: int,
     steps: int,
     saves: Saves,
-) -> tuple[Array, Array, list[Blocks], NDArray[np.int64]]:
+) -> tuple[Array, Array, list[Blocks], Steps]:
     """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves`` and who diverged when.
 
     ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is
-    t0 + k·h, never accumulated. A member has diverged at the first step whose state is not finite.
+    t0 + k·h, never accumulated. A member has diverged at the first step whose state is not finite;
+    ``first_bad`` has those of earlier runs, −1 for none.
     """
     keep = set(saves)
     kept = [(v, y)] if 0 in keep else []
-    first_bad = np.full(y.shape[block_axes[1] :], -1)
     blocks = tuple(tuple(range(n)) for n in block_axes)
     with np.errstate(all="ignore"):
         for i in range(steps):

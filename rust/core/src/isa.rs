@@ -77,7 +77,7 @@ impl Level {
 }
 
 /// A level as a type, so that hot loops are compiled for it. A value is the proof that this machine has the level.
-pub trait Isa: Copy + Send + 'static {
+pub trait Isa: Copy + Send + Sync + 'static {
     /// The proof, if this machine has the level.
     fn detect() -> Option<Self>;
     /// Runs the task with the instructions of this level.

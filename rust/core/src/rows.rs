@@ -40,7 +40,7 @@ pub fn lanes_mut<const L: usize>(rows: &mut Rows<L>) -> &mut [[f64; L]] {
 }
 
 /// A system of any size over `L` lanes.
-pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + 'static {
+pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + Sync + 'static {
     /// The system of the members that `member` names for each lane, scaled to the step.
     fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self;
 
@@ -89,7 +89,7 @@ impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> RowGroup<S, St, I, L> {
 
 impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> Group for RowGroup<S, St, I, L>
 where
-    Work<S>: Send,
+    Work<S>: Send + Sync,
 {
     fn lanes(&self) -> usize {
         L
@@ -137,7 +137,7 @@ where
 
 fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, size: usize) -> Box<dyn Group>
 where
-    Work<S>: Send,
+    Work<S>: Send + Sync,
 {
     if clock.level == Level::Avx512
         && let Some(isa) = Avx512::detect()
@@ -158,8 +158,8 @@ where
     Many: Large<LANES>,
     One: Large<1>,
     St: Stepper,
-    Work<Many>: Send,
-    Work<One>: Send,
+    Work<Many>: Send + Sync,
+    Work<One>: Send + Sync,
 {
     match width {
         Width::Wide => at_level::<Many, St, LANES>(clock, size),

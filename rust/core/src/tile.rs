@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// A family of small systems: `P` velocities, `Q` coordinates, `C` parameters and as many constants.
-pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + 'static {
+pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + Sync + 'static {
     /// The system of one member. It may look into the sampled inputs.
     type Member<'a, const L: usize>: System<V = SVector<f64, P>, Y = SVector<f64, Q>>;
 

@@ -1,16 +1,25 @@
 //! What to step: names, parameters and tables that stay Python's.
 
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::{prelude::*, types::PyType};
 use stepwell_core::{
     error::Error,
     group::{Row, Spec, Table},
     table::{self, Model},
 };
 
-/// The core's words as a Python error; Python has checked everything before, so users should not meet one.
+/// A message as the package's own error.
+pub fn argument_error(message: String) -> PyErr {
+    let class = Python::attach(|py| Ok(py.import("stepwell.errors")?.getattr("ArgumentError")?.cast_into::<PyType>()?.unbind()));
+    match class {
+        Ok(class) => Python::attach(|py| PyErr::from_type(class.into_bound(py), message)),
+        Err(error) => error,
+    }
+}
+
+/// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+    argument_error(error.to_string())
 }
 
 /// A system and a method, or a linear map.

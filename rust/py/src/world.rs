@@ -1,13 +1,13 @@
 //! The real-time loop over the user's own arrays.
 
 use numpy::{PyArrayDyn, PyArrayMethods};
-use pyo3::{exceptions::PyValueError, prelude::*};
+use pyo3::prelude::*;
 use stepwell_core::{group::Clock, isa::Level, world};
 
-use crate::model::{ModelSpec, core_error};
+use crate::model::{ModelSpec, argument_error, core_error};
 
 /// A prepared loop. It holds both arrays.
-#[pyclass(module = "stepwell._core", unsendable)]
+#[pyclass(module = "stepwell._core")]
 pub struct World {
     world: world::World,
     v: Py<PyArrayDyn<f64>>,
@@ -41,7 +41,7 @@ impl World {
         let (v_size, y_size) =
             (v.bind(py).try_readwrite()?.as_slice_mut()?.len(), y.bind(py).try_readwrite()?.as_slice_mut()?.len());
         if (v_size, y_size) != sizes {
-            return Err(PyValueError::new_err("v and y must be of the system's shape"));
+            return Err(argument_error("v and y must be of the system's shape".to_owned()));
         }
         let patience = ((1 << 22) / (sizes.0 + sizes.1).max(1) as i64).max(1);
         Ok(World { world, v, y, patience })
@@ -51,7 +51,7 @@ impl World {
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<()> {
         if n < 0 {
-            return Err(PyValueError::new_err(format!("n must be a number of steps, zero or more; got {n}")));
+            return Err(argument_error(format!("n must be a number of steps, zero or more; got {n}")));
         }
         let (mut v, mut y) = (self.v.bind(py).try_readwrite()?, self.y.bind(py).try_readwrite()?);
         let (v, y) = (v.as_slice_mut()?, y.as_slice_mut()?);

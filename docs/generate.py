@@ -1,0 +1,93 @@
+"""Writes the tables of README.md and docs/*.md that are made from the methods' records.
+
+A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->``. After a change to a record run
+``.venv/bin/python docs/generate.py``; the tests fail while a table is stale.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import stepwell as sw
+
+ROOT = Path(__file__).resolve().parent.parent
+PLACE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A Markdown table."""
+    head = list(head)
+    lines = [head, ["---"] * len(head), *map(list, rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def or_dash(names: Iterable[str]) -> str:
+    """The names, or a dash if there are none."""
+    return "; ".join(names) or "—"
+
+
+def methods() -> str:
+    """What each method is, costs and stands."""
+    head = "name", "title", "standard name", "order", "rate evaluations", "stable for Φ below"
+    return table(
+        head,
+        (
+            (
+                f"`{m.name}`",
+                m.title,
+                m.other_names[0] if m.other_names else "—",
+                str(m.order),
+                str(m.evaluations),
+                f"{m.limit:.6g}" if m.limit else "never stable",
+            )
+            for m in sw.methods()
+        ),
+    )
+
+
+def names() -> str:
+    """The document's names beside the standard ones."""
+    head = "document", "section", "name", "also called", "not to be taken for"
+    rows = ((m.title, m.section, f"`{m.name}`", or_dash(m.other_names), or_dash(m.false_friends)) for m in sw.methods())
+    return table(head, rows)
+
+
+def asks() -> str:
+    """What each method asks of a system, when it looks at it, and what it carries."""
+    head = "name", "asks for", "rates at (of a step)", "carries", "starts"
+    return table(
+        head,
+        (
+            (
+                f"`{m.name}`",
+                "ÿ = a(t, y)" if m.needs_acceleration else "two rates",
+                ", ".join(f"{node:g}" for node in m.nodes),
+                f"`{m.carry}`" if m.carry else "`v`",
+                or_dash(f"`{start}`" for start in m.starts),
+            )
+            for m in sw.methods()
+        ),
+    )
+
+
+TABLES = {"methods": methods, "names": names, "asks": asks}
+
+
+def current(text: str) -> str:
+    """A page with its tables as they should be."""
+    return PLACE.sub(lambda place: place[1] + TABLES[place[2]]() + place[3], text)
+
+
+def pages() -> list[Path]:
+    """The pages that may hold tables."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+if __name__ == "__main__":
+    for page in pages():
+        old = page.read_text(encoding="utf-8")
+        if (new := current(old)) != old:
+            page.write_text(new, encoding="utf-8")
+            print(f"{page.relative_to(ROOT)}: written anew")

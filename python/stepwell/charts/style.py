@@ -1,0 +1,75 @@
+"""How a method looks in every picture: the same marker and colour everywhere, told apart in grey by marker and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ArgumentError, UnsupportedError
+from ..methods import Method
+from ..methods import methods as every_method
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MARKERS = "osD^vPh*<>pd"
+COLOURS = (
+    "#000000",
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc3d8f",
+    "#8a6d00",
+    "#3a9bdc",
+    "#7a3fbf",
+    "#8c4a2f",
+    "#5f6b6d",
+    "#a3003f",
+    "#3b7d23",
+)
+#: The line tells the order: the more accurate, the more solid.
+LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2))}
+GREY = "#666666"
+
+#: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
+FONT: Any = {"font.size": 14.0, "axes.labelsize": 14.0, "legend.fontsize": 12.0}
+
+
+def look(method: Method) -> dict[str, Any]:
+    """Keywords for a line of that method."""
+    i = [m.name for m in every_method()].index(method.name)
+    return {
+        "color": COLOURS[i % len(COLOURS)],
+        "marker": MARKERS[i % len(MARKERS)],
+        "linestyle": LINES.get(method.order, "-"),
+        "linewidth": 1.6,
+        "markersize": 7.5,
+    }
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of that size in inches, on its own: pyplot's global state is not touched.
+
+    Raises:
+        UnsupportedError: if matplotlib is missing.
+    """
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise UnsupportedError("plot: a picture needs matplotlib; pip install 'stepwell[chart]'") from None
+    figure = Figure(figsize=(width, height), dpi=100)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure; the path's ending says in which format.
+
+    Raises:
+        ArgumentError: if there is no such format.
+    """
+    known = sorted(figure.canvas.get_supported_filetypes())
+    if Path(path).suffix.lower().removeprefix(".") not in known:
+        raise ArgumentError(f"path: expected an ending of a picture, one of {', '.join(known)}, got {str(path)!r}")
+    figure.savefig(path, facecolor="white")

@@ -1,0 +1,1 @@
+"""The scenes that come with stepwell, one file each."""

@@ -1,0 +1,236 @@
+"""The command line, through its entry point."""
+
+import csv
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import cli
+
+
+def told(capsys, *words):
+    """Exit code, standard output and standard error of one command."""
+    code = cli.main(list(words))
+    return code, *capsys.readouterr()
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"stepwell {sw.__version__}\n"
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_every_command_explains_itself(capsys, command):
+    with pytest.raises(SystemExit) as end:
+        cli.main([command, "--help"])
+    out = capsys.readouterr().out
+    assert end.value.code == 0
+    assert f"usage: stepwell {command}" in out
+    assert "--json" in out
+
+
+@pytest.mark.parametrize("words", [[], ["chrat"], ["run", "clover"], ["run", "clover", "--method", "rk4", "--dt", "x"]])
+def test_words_that_make_no_command_end_with_2(capsys, words):
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    assert end.value.code == 2
+    assert capsys.readouterr().err.startswith("usage: stepwell")
+
+
+# ---- lists
+
+
+def test_scenes_lists_every_scene(capsys):
+    code, out, err = told(capsys, "scenes", "--json")
+    listed = json.loads(out)
+    assert (code, err) == (0, "")
+    assert [(s["name"], s["dt"], s["horizon"]) for s in listed] == [(s.name, s.dt, s.horizon) for s in sw.scenes.scenes()]
+    code, out, err = told(capsys, "scenes")
+    assert (code, err) == (0, "")
+    for scene in sw.scenes.scenes():
+        assert scene.name in out
+
+
+def test_methods_lists_every_method(capsys):
+    code, out, err = told(capsys, "methods", "--json")
+    listed = json.loads(out)
+    assert (code, err) == (0, "")
+    assert [(m["name"], m["order"], m["limit"]) for m in listed] == [(m.name, m.order, m.limit) for m in sw.methods()]
+    code, out, err = told(capsys, "methods")
+    assert (code, err) == (0, "")
+    for method in sw.methods():
+        assert method.name in out
+
+
+def test_methods_describes_one(capsys):
+    assert told(capsys, "methods", "verlet") == (0, sw.method("verlet").__doc__ + "\n", "")
+    code, out, _ = told(capsys, "methods", "verlet", "--json")
+    assert code == 0
+    assert json.loads(out)["other_names"] == list(sw.method("verlet").other_names)
+
+
+# ---- run
+
+
+def test_run_says_what_integrate_says(capsys):
+    run = sw.scenes.clover().run("false_euler", 0.1, steps=50, every=1)
+    words = ("run", "clover", "--method", "false_euler", "--dt", "0.1", "--steps", "50")
+    code, out, err = told(capsys, *words, "--json")
+    report = json.loads(out)
+    assert (code, err) == (0, "")
+    assert (report["dt"], report["steps"], report["kept"], report["diverged_at_step"]) == (0.1, 50, 51, None)
+    assert report["last_y"] == run.y[-1].tolist()
+    assert report["largest_state_error"] == sw.scenes.clover().state_error(run).max()
+    code, out, err = told(capsys, *words)
+    assert (code, err) == (0, "")
+    assert f"last y                {run.y[-1].tolist()}\n" in out
+
+
+def test_run_takes_step_and_horizon_from_the_scene(capsys):
+    report = json.loads(told(capsys, "run", "clover", "--method", "rk4", "--json")[1])
+    assert (report["dt"], report["steps"], report["last_t"]) == (0.3, 100, 30.0)
+    report = json.loads(told(capsys, "run", "clover", "--method", "rk4", "--dt", "0.001", "--json")[1])
+    assert (report["steps"], report["kept"]) == (30_000, 1001)
+
+
+def test_run_writes_the_kept_states(capsys, tmp_path):
+    run = sw.scenes.clover().run("rk4", every=20)
+    for ending in ("csv", "npz"):
+        code, out, err = told(capsys, "run", "clover", "--method", "rk4", "--every", "20", "-o", str(tmp_path / f"run.{ending}"))
+        assert (code, err) == (0, "")
+        assert f"run.{ending}" in out
+    read = np.load(tmp_path / "run.npz")
+    for name, values in (("t", run.t), ("v", run.v), ("y", run.y), ("energy", run.energy)):
+        assert np.array_equal(read[name], values)
+    with (tmp_path / "run.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["t"]) for row in rows] == run.t.tolist()
+    assert [float(row["y[2, 1]"]) for row in rows] == run.y[:, 2, 1].tolist()
+    assert [float(row["state_error"]) for row in rows] == sw.scenes.clover().state_error(run).tolist()
+
+
+def test_a_diverged_run_is_a_warning_and_a_result(capsys):
+    words = ("run", "oscillator", "--method", "standard_euler", "--dt", "100", "--steps", "400", "--json")
+    code, out, err = told(capsys, *words)
+    report = json.loads(out)
+    assert code == 0
+    assert err.startswith("stepwell: warning: 1 of 1 member(s) diverged")
+    assert err.count("\n") == 1
+    assert report["diverged_at_step"] == 155
+    assert report["largest_state_error"] is report["last_y"] is None
+
+
+# ---- chart
+
+
+def test_chart_writes_a_picture_and_a_table_for_each_scene(capsys, tmp_path):
+    out_dir = tmp_path / "not yet there"
+    words = ("chart", "oscillator", "forced_oscillator", "-o", str(out_dir), "--methods", "rk4, verlet")
+    code, out, _ = told(capsys, *words, "--json")
+    charts = json.loads(out)
+    assert code == 0
+    assert [chart["scene"] for chart in charts] == ["oscillator", "forced_oscillator"]
+    assert [[row["method"] for row in chart["summary"]] for chart in charts] == [["rk4", "verlet"], ["rk4"]]
+    assert list(charts[1]["refused"]) == ["verlet"]
+    assert sorted(path.name for path in out_dir.iterdir()) == [
+        "forced_oscillator.csv",
+        "forced_oscillator.png",
+        "oscillator.csv",
+        "oscillator.png",
+    ]
+    assert [file for chart in charts for file in chart["files"]] == [
+        str(out_dir / f"{scene}.{ending}") for scene in ("oscillator", "forced_oscillator") for ending in ("png", "csv")
+    ]
+    assert (out_dir / "oscillator.png").read_bytes().startswith(b"\x89PNG")
+    with (out_dir / "oscillator.csv").open(encoding="utf-8") as file:
+        assert {row["method"] for row in csv.DictReader(file)} == {"rk4", "verlet"}
+
+
+def test_chart_prints_a_summary(capsys, tmp_path):
+    code, out, _ = told(capsys, "chart", "forced_oscillator", "-o", str(tmp_path), "--methods", "rk4,verlet")
+    cost = sw.charts.work_precision("forced_oscillator", ["rk4"]).curves[0].cheapest(1e-4)
+    assert code == 0
+    row = next(line for line in out.splitlines() if "Runge-Kutta 4" in line)
+    assert f" {cost:.3g} " in row
+    assert "Verlet is refused: verlet needs forces that do not depend on the velocity" in out.replace("\n", " ")
+    assert "forced_oscillator.png" in out
+
+
+# ---- what goes wrong
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["methods", "rk5"], "did you mean 'rk4'?"),
+        (["run", "clovr", "--method", "rk4"], "did you mean 'clover'?"),
+        (["run", "clover", "--method", "rk4", "--dt", "-1"], "dt: expected numbers above zero"),
+        (["run", "clover", "--method", "rk4", "--steps", "0"], "steps: expected 1 or more"),
+        (["run", "clover", "--method", "rk4", "--every", "0"], "every: expected 1 or more"),
+        (["run", "clover", "--method", "rk4", "-o", "run.txt"], "-o: expected a file ending in .csv or .npz"),
+        (["run", "forced_oscillator", "--method", "verlet"], "verlet needs forces that do not depend on the velocity"),
+        (["chart", "oscillator", "clovr"], "did you mean 'clover'?"),
+        (["chart", "oscillator", "--methods", "rk4,"], "method: there is no ''"),
+    ],
+)
+def test_an_error_is_one_line_and_ends_with_2(capsys, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = told(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("stepwell: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_written_is_one_line(capsys, tmp_path):
+    code, _, err = told(capsys, "run", "clover", "--method", "rk4", "-o", str(tmp_path / "no" / "run.csv"))
+    assert code == 2
+    assert "No such file or directory" in err
+    assert err.count("\n") == 1
+
+
+def test_ctrl_c_ends_with_130(capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sw.scenes.Scene, "run", interrupted)
+    assert told(capsys, "run", "clover", "--method", "rk4") == (130, "", "stepwell: interrupted\n")
+
+
+def test_without_rich_everything_but_tables_works(capsys, monkeypatch, tmp_path):
+    for module in [name for name in sys.modules if name.split(".")[0] == "rich"]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "rich", None)
+    chart = ("chart", "oscillator", "--methods", "rk4", "-o", str(tmp_path / "out"))
+    for words in (("scenes",), ("methods",), chart):
+        code, out, err = told(capsys, *words)
+        assert (code, out) == (2, "")
+        assert err == "stepwell: a table needs rich; pip install 'stepwell[chart]', or ask for --json\n"
+        assert not (tmp_path / "out").exists()
+    for words in (
+        ("scenes", "--json"),
+        ("methods", "--json"),
+        ("methods", "rk4"),
+        ("run", "clover", "--method", "rk4"),
+    ):
+        assert told(capsys, *words)[0] == 0
+    assert told(capsys, *chart, "--json")[0] == 0
+
+
+def test_a_reader_who_leaves_early_is_no_error():
+    """`stepwell methods --json | head`: the pipe is closed before anything is written to it."""
+    code = "import sys; from stepwell.cli import main; sys.stdin.read(); sys.exit(main(['methods', '--json']))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    process.stdout.close()
+    process.stdin.close()
+    with process:
+        assert process.stderr.read() == b""
+    assert process.returncode == 0

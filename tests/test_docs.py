@@ -1,0 +1,104 @@
+"""README and docs: every Python block runs and prints what it says, tables are current, files that are named exist."""
+
+import contextlib
+import importlib.util
+import io
+import re
+import warnings
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted((ROOT / "docs").glob("*.md"))
+#: Where a page may find the files that it names, by their last parts.
+FOLDERS = ["benches", "docs", "examples", "python", "rust", "tests"]
+
+FENCE = re.compile(r"(?:<!-- file: python/(\S+)/\w+\.py -->\n)?^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+SAID = re.compile(r"#\s*→ (.*)$", re.MULTILINE)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
+INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+
+
+def text(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def prose(page: Path) -> str:
+    return FENCE.sub("", text(page))
+
+
+def anchors(page: Path) -> set[str]:
+    titles = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def blocks(page: Path) -> list[tuple[int, str, str]]:
+    """Line number and code of every Python block, and the package that it says it is a file of, if it does."""
+    whole = text(page)
+    found = [m for m in FENCE.finditer(whole) if m[2] == "python"]
+    return [(whole[: m.start(3)].count("\n"), m[3], (m[1] or "").replace("/", ".")) for m in found]
+
+
+@pages
+def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    namespace = {"__name__": page.stem}
+    for line, code, package in blocks(page):
+        namespace["__package__"] = package
+        printed = io.StringIO()
+        # A block that changes the filters must not change them for the next one.
+        with contextlib.redirect_stdout(printed), warnings.catch_warnings():
+            exec(compile("\n" * line + code, str(page), "exec"), namespace)
+        said = SAID.findall(code)
+        assert printed.getvalue().splitlines() == said, f"{page.name}, block at line {line}"
+
+
+def test_blocks_are_found_and_compared():
+    # Guards the two expressions above: a fence that is not seen would be a test that cannot fail.
+    assert len(blocks(ROOT / "README.md")) >= 3
+    assert sum(len(SAID.findall(code)) for page in PAGES for _, code, _ in blocks(page)) >= 20
+
+
+def test_generated_tables_are_current():
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    generate = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(generate)
+    places = [place for page in generate.pages() for place in generate.PLACE.findall(text(page))]
+    assert {name for _, name, _ in places} == set(generate.TABLES)
+    for page in generate.pages():
+        assert generate.current(text(page)) == text(page), f"{page.name} is stale: run docs/generate.py"
+
+
+@pages
+def test_links_lead_somewhere(page):
+    for target in LINK.findall(prose(page)):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), f"{page.name} links to {target}"
+        if anchor:
+            assert anchor in anchors(file), f"{page.name} links to {target}"
+
+
+@pages
+def test_named_files_exist(page):
+    introduced = INTRODUCED.findall(text(page))
+    for name in NAMED.findall(prose(page)):
+        if any(file.endswith(name) for file in introduced):
+            continue
+        head, brace, rest = name.partition("{")
+        choices, _, tail = rest.partition("}")
+        for each in (head + choice + tail for choice in choices.split(",")) if brace else [name]:
+            found = list(ROOT.glob(each)) or [f for folder in FOLDERS for f in (ROOT / folder).rglob(each)]
+            assert found, f"{page.name} names {each}"
+
+
+@pages
+def test_no_page_names_a_place_of_one_machine(page):
+    # Written in two parts, so that this file does not name one either.
+    assert not re.search(r"(?<![\w.])/(?:tmp" + r"|work|root|home)/", text(page))
