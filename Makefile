@@ -45,6 +45,7 @@ format: .venv/test ## format Rust and Python
 	cargo fmt --all
 	$(BIN)/ruff check --fix --quiet .
 	$(BIN)/ruff format --quiet .
+	$(BIN)/python docs/generate.py
 
 clean: ## remove everything that was built
 	rm -rf .venv dist target out

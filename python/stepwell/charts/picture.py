@@ -152,7 +152,7 @@ def _label(curve: Curve) -> str:
     method, limit = curve.method, curve.largest_stable_step
     name = f"{method.title} ({method.other_names[0]})" if method.other_names else method.title
     # A method without a limit on the oscillator grows at every step; how far it gets depends on the horizon.
-    up_to = "stable up to dt" if method.limit else "grows; bounded here to dt"
+    up_to = "stable up to dt" if method.limit else "grows; fails past dt"
     stable = "stable throughout" if limit == math.inf else f"{up_to} = {limit:#.3g}" if limit else "never stable"
     return f"{textwrap.fill(name, 41, break_on_hyphens=False)}\norder {method.order}, {stable}"
 

@@ -1,0 +1,7 @@
+"""``python -m stepwell`` is the command ``stepwell``."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())
