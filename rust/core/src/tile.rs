@@ -123,7 +123,7 @@ where
     #[inline(always)]
     fn run(self) {
         // Copies: the compiler can prove that nothing else looks at them, and keeps small ones in registers over all steps.
-        let (constants, mut v, mut y) = (*self.constants, *self.v, *self.y);
+        let (constants, mut v, mut y) = (self.constants, *self.v, *self.y);
         let (h, inputs) = (self.clock.h, View::all(self.inputs));
         for k in self.k..self.k + self.n {
             let t = self.clock.at(k);

@@ -239,13 +239,13 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     }
 }
 
-fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize>(
+fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize>(
     inputs: [Option<Kind>; 2],
     clock: &Clock,
     width: Width,
 ) -> Box<dyn Group> {
     let family = Family::<F, D> { inputs, form: PhantomData };
-    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, 32>(family, clock, width)
+    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF>(family, clock, width)
 }
 
 fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
@@ -257,13 +257,13 @@ fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Re
     let mut kinds: Vec<Kind> = inputs.into_iter().flatten().collect();
     kinds.sort(); // a sum of two does not care for their order, and this saves kernels
     Ok(match (kinds.as_slice(), spec.has("damped")) {
-        ([], false) => of_force::<F, Free, St, 80>(inputs, clock, width),
-        ([], true) => of_force::<F, Damped, St, 64>(inputs, clock, width),
-        ([Kind::Held], _) => of_force::<F, Driven<FromTable>, St, 64>(inputs, clock, width),
-        ([Kind::Sine], _) => of_force::<F, Driven<FromSine>, St, 32>(inputs, clock, width),
-        ([Kind::Held, Kind::Held], _) => of_force::<F, Driven<(FromTable, FromTable)>, St, 64>(inputs, clock, width),
-        ([Kind::Held, Kind::Sine], _) => of_force::<F, Driven<(FromTable, FromSine)>, St, 32>(inputs, clock, width),
-        ([Kind::Sine, Kind::Sine], _) => of_force::<F, Driven<(FromSine, FromSine)>, St, 32>(inputs, clock, width),
+        ([], false) => of_force::<F, Free, St, 80, 16>(inputs, clock, width),
+        ([], true) => of_force::<F, Damped, St, 64, 32>(inputs, clock, width),
+        ([Kind::Held], _) => of_force::<F, Driven<FromTable>, St, 64, 32>(inputs, clock, width),
+        ([Kind::Sine], _) => of_force::<F, Driven<FromSine>, St, 16, 32>(inputs, clock, width),
+        ([Kind::Held, Kind::Held], _) => of_force::<F, Driven<(FromTable, FromTable)>, St, 64, 32>(inputs, clock, width),
+        ([Kind::Held, Kind::Sine], _) => of_force::<F, Driven<(FromTable, FromSine)>, St, 32, 32>(inputs, clock, width),
+        ([Kind::Sine, Kind::Sine], _) => of_force::<F, Driven<(FromSine, FromSine)>, St, 32, 32>(inputs, clock, width),
         _ => return Err(spec.unknown_options()),
     })
 }
