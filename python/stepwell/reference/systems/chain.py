@@ -15,11 +15,9 @@ class Chain:
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇."""
-        k = self.stiffness
-        first = k[:1] * y[:1]
-        between = k[1:-1] * (y[1:] - y[:-1])
-        last = k[-1:] * -y[-1:]
-        f = np.concatenate([first, between, last])
+        wall = np.zeros_like(y[:1])
+        places = np.concatenate([wall, y, wall])
+        f = self.stiffness * (places[1:] - places[:-1])
         dv: Array = (f[1:] - f[:-1]) * self.by_mass
         return dv
 

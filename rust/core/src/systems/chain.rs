@@ -19,6 +19,17 @@ pub struct Chain<const L: usize> {
     h: f64,
 }
 
+/// by·(b − a) in every lane. The row is made whole before it is stored, so the compiler need not ask whether the store changes
+/// what is read.
+#[inline(always)]
+fn pull<const L: usize>(by: &[f64; L], a: &[f64; L], b: &[f64; L]) -> [f64; L] {
+    let mut row = [0.0; L];
+    for l in 0..L {
+        row[l] = by[l] * (b[l] - a[l]);
+    }
+    row
+}
+
 impl<const L: usize> System for Chain<L> {
     type V = Rows<L>;
     type Y = Rows<L>;
@@ -28,21 +39,13 @@ impl<const L: usize> System for Chain<L> {
         let (y, k, f) = (lanes(y), lanes(&self.stiffness), lanes_mut(&mut self.force));
         let n = y.len();
         let (Some(first), Some(last)) = (y.first(), y.last()) else { return };
-        for l in 0..L {
-            f[0][l] = k[0][l] * first[l];
-        }
+        f[0] = pull(&k[0], &[0.0; L], first);
         for ((f, k), pair) in f[1..n].iter_mut().zip(&k[1..n]).zip(y.windows(2)) {
-            for l in 0..L {
-                f[l] = k[l] * (pair[1][l] - pair[0][l]);
-            }
+            *f = pull(k, &pair[0], &pair[1]);
         }
-        for l in 0..L {
-            f[n][l] = k[n][l] * -last[l];
-        }
+        f[n] = pull(&k[n], last, &[0.0; L]);
         for ((out, pair), by_mass) in lanes_mut(out).iter_mut().zip(f.windows(2)).zip(lanes(&self.by_mass)) {
-            for l in 0..L {
-                out[l] = (pair[1][l] - pair[0][l]) * by_mass[l];
-            }
+            *out = pull(by_mass, &pair[0], &pair[1]);
         }
     }
 
