@@ -49,7 +49,9 @@ def run(tree: Path, *arguments: str) -> str:
 
 def test_the_suite_tests_it(tree: Path) -> None:
     """Bits, order, stage times by its record, matrix form, world, charts: all by iterating over the catalogue."""
-    printed = run(tree, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests", "--ignore=tests/test_adding.py", "-k", "midpoint")
+    printed = run(
+        tree, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests", "--ignore=tests/test_adding.py", "-k", "midpoint"
+    )
     passed = re.search(r"(\d+) passed", printed)
     assert passed is not None
     assert int(passed[1]) > 100

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
 import operator
 import os
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
+from .reference.types import Array as Array
+from .reference.types import Whole
 
-Array = NDArray[np.float64]
 Shape = tuple[int, ...]
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
@@ -25,6 +24,8 @@ def known(argument: str, name: object, names: Iterable[str]) -> str:
     names = tuple(names)
     if isinstance(name, str) and name in names:
         return name
+    import difflib  # a mistake may take its time; the import of stepwell may not
+
     near = difflib.get_close_matches(str(name).lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else "."
     raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.")
@@ -39,7 +40,9 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if array.dtype.kind not in "iuf":
         raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
     array = np.asarray(array, dtype=np.float64)
-    if finite and (wrong := ~np.isfinite(array)).any():
+    # One look at all; where it is wrong is asked only if it is.
+    if finite and not np.isfinite(array).all():
+        wrong = ~np.isfinite(array)
         raise NotFiniteError(f"{argument}: expected finite numbers{_in(unit)}, got {array[wrong][0]}{_where(wrong)}")
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
@@ -79,6 +82,8 @@ def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = 
 
 def batch_shape(shapes: dict[str, Shape]) -> Shape:
     """Return the shape to which all batches broadcast, the arguments by name."""
+    if not any(shapes.values()):
+        return ()
     try:
         shape = np.broadcast_shapes(*shapes.values())
     except ValueError:
@@ -90,10 +95,10 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     return shape
 
 
-def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape) -> NDArray[np.int64]:
+def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape) -> Whole | None:
     """Return the first bad step of each member, −1 for none; only members that have one may hold what is not finite."""
     if first_bad_step is None:
-        return np.full(batch, -1, dtype=np.int64)
+        return None
     steps = np.asarray(first_bad_step)
     if steps.dtype.kind not in "iu" or steps.shape != batch:
         raise ShapeError(f"first_bad_step: expected whole numbers of shape {batch}, got {steps.dtype} of shape {steps.shape}")
@@ -136,11 +141,11 @@ def _in(unit: str) -> str:
     return f" in {unit}" if unit else ""
 
 
-def _kind(value: Any, array: NDArray[Any]) -> str:
+def _kind(value: Any, array: np.ndarray[Any, Any]) -> str:
     return repr(value) if array.ndim == 0 else f"an array of dtype {array.dtype}"
 
 
-def _where(wrong: NDArray[np.bool_]) -> str:
+def _where(wrong: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
     return f" at index {tuple(int(i) for i in np.argwhere(wrong)[0])}" if wrong.ndim else ""
 
 

@@ -7,29 +7,24 @@ above this file speaks of states, everything below of slots.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from fractions import Fraction
-from math import lcm
-from typing import Any
+from math import lcm, prod
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import _core
 from ._checks import Array, Shape
 from .methods import Method
 from .reference import run as reference
-from .reference.types import Blocks, Signal
+from .reference.types import Blocks, Signal, Whole
 from .systems import Sampled, System
 from .systems.base import Parameters, row, rows
 from .systems.inputs import Input, table
 
-Steps = NDArray[np.int64]
-Looped = tuple[Array, Array, list[Blocks], Steps]
+Looped = tuple[Array, Array, list[Blocks], Whole]
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay."""
 
     system: System
@@ -57,22 +52,21 @@ class Plan:
         return len(self.system.v_shape), len(self.system.y_shape)
 
 
-@dataclass
-class Outcome:
+class Outcome(NamedTuple):
     """Kept states, last slots, and the first step of each member that was not finite."""
 
     v: Array
     y: Array
     slot: Array
-    first_bad: Steps
+    first_bad: Whole
 
 
-def advance(plan: Plan, v: Array, y: Array, before: Steps | None = None, *, carried: bool = False) -> Outcome:
+def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
     """Make the run. ``v`` holds what the method carries if ``carried``; both have the shape of a block and a batch.
 
     ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
     """
-    before = np.full(plan.batch, -1, dtype=np.int64) if before is None else before
+    before = np.full(plan.batch, -1, dtype=np.int64) if before is None else before.copy()
     if plan.form == "matrix":
         return _matrix(plan, v, y, before, carried)
     if plan.backend == "numpy":
@@ -80,7 +74,7 @@ def advance(plan: Plan, v: Array, y: Array, before: Steps | None = None, *, carr
     return _rust(plan, _model(plan), v, y, before, carried)
 
 
-def _numpy(plan: Plan, v: Array, y: Array, before: Steps, carried: bool) -> Outcome:
+def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
 
     def step(t: float, v: Array, y: Array) -> Blocks:
@@ -91,7 +85,7 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Steps, carried: bool) -> Outc
     return _finished(plan, slot, kept, first_bad)
 
 
-def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Steps, block_axes: tuple[int, int]) -> Looped:
+def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, block_axes: tuple[int, int]) -> Looped:
     done, every = 0, max(1, plan.steps // 100)
 
     def told(t: float, v: Array, y: Array) -> Blocks:
@@ -138,14 +132,14 @@ def model(kernel: str, p: Parameters, method: Method, matrix: tuple[list[float],
 
 
 def _rust(
-    plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Steps, carried: bool, carries: bool | None = None
+    plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
     slot, y = (np.array(a, dtype=np.float64, order="C") for a in (v, y))
     # The last state alone needs no second copy, unless the slot holds something else.
-    keep = len(plan.saves) if plan.every is not None or carries else 0
+    keep = 0 if plan.every is None and not carries else len(plan.saves)
     saved_v, saved_y = (np.empty((keep, *a.shape)) for a in (slot, y))
-    first_bad = before.copy()
+    first_bad = before
     _core.run(
         model,
         t0=plan.t0,
@@ -176,12 +170,12 @@ def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
 
     Both are found by stepping: P from unit vectors of the slots, Q from zero with a unit pulse of one input at one node.
     """
-    n_v, n_y = (int(np.prod(shape)) for shape in (plan.system.v_shape, plan.system.y_shape))
+    n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
-    one = replace(plan, t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
+    one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
 
     def step(system: System, batch: Shape, v: Array, y: Array) -> Array:
-        out = advance(replace(one, system=system, batch=batch), v, y, carried=True)
+        out = advance(one._replace(system=system, batch=batch), v, y, carried=True)
         last_y = out.y[-1]
         return np.concatenate([out.slot.reshape(n_v, *batch), last_y.reshape(n_y, *batch)])
 
@@ -191,6 +185,8 @@ def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
         unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch),
     )
     p = step(plan.system.without_inputs(), (n, *plan.batch), v, y)
+
+    from fractions import Fraction  # only this form needs it
 
     inputs = plan.system.inputs()
     grid = lcm(*(Fraction(c).limit_denominator(1000).denominator for c in plan.method.nodes))
@@ -204,10 +200,10 @@ def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
     return p, np.stack(q) if q else np.zeros((0, n, *plan.batch)), list(inputs.values())
 
 
-def _matrix(plan: Plan, v: Array, y: Array, before: Steps, carried: bool) -> Outcome:
+def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     p, q, signals = transition(plan)
     slot = v if carried else _start(plan, v, y)
-    n_v, n_y = v.size // max(1, int(np.prod(plan.batch))), y.size // max(1, int(np.prod(plan.batch)))
+    n_v, n_y = v.size // max(1, prod(plan.batch)), y.size // max(1, prod(plan.batch))
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
 

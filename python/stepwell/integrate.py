@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import warnings
 from contextlib import nullcontext
-from dataclasses import replace
+from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import _checks, engine
 from ._checks import Array
 from .errors import ArgumentError, DivergenceWarning, DTypeError, UnsupportedError
 from .methods import Method
 from .methods import method as find_method
-from .result import Run, Status
+from .reference.types import Whole
+from .result import Run
 from .systems import System
 
 BACKENDS = ("rust", "numpy")
@@ -103,20 +103,20 @@ def integrate(
     batch = _checks.batch_shape(
         {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     )
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form)
-    rows = int(np.prod(system.v_shape)) + int(np.prod(system.y_shape))
+    rows = prod(system.v_shape) + prod(system.y_shape)
     kept = 1 if every is None else steps // every + 2
     _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     before = _checks.diverged_before(first_bad_step, v, y, batch)
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
-        out = engine.advance(replace(plan, progress=told), v, y, before, carried=carry is not None)
+        plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told)
+        out = engine.advance(plan, v, y, before, carried=carry is not None)
     run = Run(
         t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
         v=out.v,
         y=out.y,
-        status=np.where(out.first_bad >= 0, Status.DIVERGED, Status.OK).astype(np.int8),
+        status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
         first_bad_step=out.first_bad,
         carry=None if how.carry is None else out.slot,
         system=system,
@@ -147,6 +147,8 @@ def fits_together(system: System, method: Method) -> None:
 def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Array:
     """A state over the whole batch."""
     axes = array.shape[len(block) :]
+    if axes == batch:
+        return array
     return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
 
 
@@ -158,9 +160,11 @@ def _bar(title: str) -> Any:
     return bar(title)
 
 
-def _warn(run: Run, before: NDArray[np.int64]) -> None:
+def _warn(run: Run, before: Whole | None) -> None:
     """Warn of the members that diverged in this run."""
-    bad = (run.first_bad_step >= 0) & (before < 0)
+    if not run.status.any():
+        return
+    bad = run.first_bad_step >= 0 if before is None else (run.first_bad_step >= 0) & (before < 0)
     if not bad.any():
         return
     step = int(run.first_bad_step[bad].min())

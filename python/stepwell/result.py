@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._checks import Array
 from .methods import Method
+from .reference.types import Whole
 from .systems import System
 
 
@@ -21,7 +20,6 @@ class Status(IntEnum):
     DIVERGED = 1
 
 
-@dataclass(frozen=True)
 class Run:
     """A run, with what was asked for kept along the first axis.
 
@@ -41,19 +39,36 @@ class Run:
         start: how the method was started, or None.
     """
 
-    t: Array
-    v: Array
-    y: Array
-    status: NDArray[np.int8]
-    first_bad_step: NDArray[np.int64]
-    carry: Array | None
-    system: System
-    method: Method
-    dt: float
-    t0: float
-    start_step: int
-    steps: int
-    start: str | None
+    def __init__(
+        self,
+        *,
+        t: Array,
+        v: Array,
+        y: Array,
+        status: np.ndarray[Any, np.dtype[np.int8]],
+        first_bad_step: Whole,
+        carry: Array | None,
+        system: System,
+        method: Method,
+        dt: float,
+        t0: float,
+        start_step: int,
+        steps: int,
+        start: str | None,
+    ) -> None:
+        self.t = t
+        self.v = v
+        self.y = y
+        self.status = status
+        self.first_bad_step = first_bad_step
+        self.carry = carry
+        self.system = system
+        self.method = method
+        self.dt = dt
+        self.t0 = t0
+        self.start_step = start_step
+        self.steps = steps
+        self.start = start
 
     @property
     def energy(self) -> Array:

@@ -3,20 +3,18 @@
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .types import Array, Blocks, Signal
+from .types import Array, Blocks, Signal, Whole
 
 Step = Callable[[float, Array, Array], Blocks]
 Saves = Iterable[int]
-Steps = NDArray[np.int64]
 
 
 def run(
     step: Step,
     v: Array,
     y: Array,
-    first_bad: Steps,
+    first_bad: Whole,
     block_axes: tuple[int, int],
     *,
     h: float,
@@ -24,7 +22,7 @@ def run(
     first: int,
     steps: int,
     saves: Saves,
-) -> tuple[Array, Array, list[Blocks], Steps]:
+) -> tuple[Array, Array, list[Blocks], Whole]:
     """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves`` and who diverged when.
 
     ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is

@@ -1,11 +1,17 @@
 """The words of the reference: an array, both blocks, and a system scaled to the step."""
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Whole = NDArray[np.int64]
+else:  # numpy.typing takes as long to import as all of stepwell's own files
+    Array = Whole = np.ndarray
+
 Blocks = tuple[Array, Array]
 
 

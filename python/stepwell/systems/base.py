@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from math import prod
 from typing import ClassVar
 
 import numpy as np
@@ -12,17 +13,23 @@ from .._checks import Array, Shape
 from ..reference.types import Scaled, Signal
 
 
-@dataclass
 class Parameters:
     """A system as the core takes it: options, size, rows of parameters, tables of samples (values, interval, start).
 
     Arrays have two axes: what is counted, and the members, or 1 for all members.
     """
 
-    options: list[str] = field(default_factory=list)
-    size: int = 0
-    rows: list[Array] = field(default_factory=list)
-    tables: list[tuple[Array, float, float]] = field(default_factory=list)
+    def __init__(
+        self,
+        options: Iterable[str] = (),
+        size: int = 0,
+        rows: Iterable[Array] = (),
+        tables: Iterable[tuple[Array, float, float]] = (),
+    ) -> None:
+        self.options = list(options)
+        self.size = size
+        self.rows = list(rows)
+        self.tables = list(tables)
 
 
 class System(ABC):
@@ -88,5 +95,7 @@ def rows(values: Array, batch: Shape) -> Array:
     count, own = len(values), values.shape[1:]
     if not own:
         return np.ascontiguousarray(values.reshape(count, 1))
+    if own == batch:
+        return np.ascontiguousarray(values).reshape(count, prod(batch))
     aligned = values.reshape(count, *(1,) * (len(batch) - len(own)), *own)
-    return np.ascontiguousarray(np.broadcast_to(aligned, (count, *batch))).reshape(count, int(np.prod(batch)))
+    return np.ascontiguousarray(np.broadcast_to(aligned, (count, *batch))).reshape(count, prod(batch))
