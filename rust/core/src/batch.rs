@@ -82,7 +82,7 @@ struct Part<'a> {
 
 /// Cuts every row of `width` numbers at the same places: one list of row slices per share.
 fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a mut [T]>> {
-    let rows = if width == 0 { 0 } else { data.len() / width };
+    let rows = data.len().checked_div(width).unwrap_or(0);
     let mut parts: Vec<_> = shares.iter().map(|_| Vec::with_capacity(rows)).collect();
     for mut row in data.chunks_exact_mut(width.max(1)) {
         for (part, share) in parts.iter_mut().zip(shares) {

@@ -5,6 +5,8 @@
 //! of 1; beyond, its error stays below the one that the rounding of the argument itself makes. Arguments past 2⁵⁰ are garbage
 //! in, garbage out, huge numbers included; callers refuse them.
 
+#![allow(clippy::excessive_precision, reason = "the coefficients as fdlibm prints them")]
+
 /// 2/π
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
 /// 1.5·2⁵²: adding it rounds to an integer, which then stands in the low bits.

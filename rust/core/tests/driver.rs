@@ -25,8 +25,10 @@ fn plan<'a>(model: Model<'a>, h: f64, steps: i64, members: usize, threads: usize
     Plan { model, clock: clock(h), first: 0, steps, every: None, members, threads, carried: false, carries: false }
 }
 
+type Last = (Vec<f64>, Vec<f64>, Vec<i64>);
+
 /// The last v and y from v = 0 and y = 1, and who diverged when.
-fn last(plan: &Plan) -> Result<(Vec<f64>, Vec<f64>, Vec<i64>), Error> {
+fn last(plan: &Plan) -> Result<Last, Error> {
     let (mut v, mut y, mut bad) = (vec![0.0; plan.members], vec![1.0; plan.members], vec![-1; plan.members]);
     let arrays = Arrays { v: &mut v, y: &mut y, saved_v: &mut [], saved_y: &mut [], first_bad: &mut bad };
     run(plan, arrays, &mut |_| true)?;

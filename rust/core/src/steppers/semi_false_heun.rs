@@ -16,7 +16,7 @@ impl Stepper for SemiFalseHeun {
         evaluations: 2,
         family: "two-block Heun",
         // √(2√5 − 2); the document's "always stable" is an erratum.
-        limit: 1.572_302_755_514_846_9,
+        limit: 1.572_302_755_514_846_6,
         nodes: &[0.0, 1.0],
         needs: Needs::Rates,
         carry: None,

@@ -1,0 +1,46 @@
+"""``python -m benches.compare``: every language on the same work, in one run."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from pathlib import Path
+
+from . import extras, machine, peers, report, runner, workloads
+
+EPILOG = """To compare at another CPU level: STEPWELL_ISA=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
+NUMBA_CPU_NAME=haswell NUMBA_CPU_FEATURES=+avx2,+fma (numba)."""
+
+
+def main() -> None:
+    """Time, show, write."""
+    parser = argparse.ArgumentParser(prog="python -m benches.compare", description=__doc__, epilog=EPILOG)
+    parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
+    parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
+    parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
+    given = parser.parse_args()
+    repeats = 3 if given.quick else given.repeats
+    warnings.simplefilter("error")
+
+    load = machine.load()
+    reading = report.READING.format(repeats=repeats, sample=1e3 * runner.SAMPLE / (10 if given.quick else 1))
+    parts = ["## How to read", reading]
+    contestants = peers.catalogue()
+    for work in workloads.catalogue():
+        if given.quick:
+            work = work.cut(members=2000, steps=2000 if work.members == 1 else 200)
+        rows = runner.measure(contestants, work, repeats, given.quick)
+        made = report.table(work, rows)
+        report.show(*made)
+        parts += [report.markdown(*made), report.threads(rows)]
+    made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats)]
+    report.show(*made)
+    parts += [report.markdown(*made)]
+    described = [*machine.describe(), ("load of the machine", f"{load} before, {machine.load()} after")]
+    title = ["# Every language on the same work", "Written by `python -m benches.compare`; do not edit."]
+    parts = [*title, "\n".join(f"- {what}: {value}" for what, value in described), *parts]
+    given.output.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
+    print(f"Written to {given.output}.")
+
+
+main()

@@ -1,0 +1,67 @@
+"""The peers, one file each. A file defines ``CONTESTANTS``, a list of them; that puts it into the report."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ..workloads import Array, Workload
+
+Call = Callable[[], tuple[Array, Array]]
+
+
+class MissingPeerError(Exception):
+    """The peer is not on this machine; the message says what is not."""
+
+
+class WrongResultError(Exception):
+    """The peer's result is further from the exact solution than its method explains."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A workload made ready: ``call`` does all of it, from the workload's arrays to v and y at the end."""
+
+    call: Call
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A peer in one configuration.
+
+    ``kernels`` maps each kind of workload that it can do to what makes one ready, given whether the run is a quick one.
+    A ``slow`` one does less: fewer "members" or fewer "steps", whichever leaves its speed as it is.
+    """
+
+    name: str
+    kernels: Mapping[str, Callable[[Workload, bool], Ready]]
+    slow: str | None = None
+
+
+def catalogue() -> list[Contestant]:
+    """Every contestant of every file."""
+    modules = (importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__))
+    return [contestant for module in modules for contestant in module.CONTESTANTS]
+
+
+def fastest(makers: list[Callable[[Workload], Ready]], work: Workload) -> Ready:
+    """The fastest of several configurations, tried on a part of the work; a wrong result does not count."""
+    part = work.cut(members=2048)
+    best, make = float("inf"), None
+    for maker in makers:
+        call = maker(part).call
+        if not part.error(*call()) <= part.bound():
+            continue
+        for _ in range(5):
+            start = time.perf_counter()
+            call()
+            took = time.perf_counter() - start
+            if took < best:
+                best, make = took, maker
+    if make is None:
+        raise WrongResultError(f"none of {len(makers)} configurations gives the right result")
+    return make(work)

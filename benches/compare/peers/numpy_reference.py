@@ -1,0 +1,7 @@
+"""The NumPy reference that ships with stepwell: whole-array operations, step by step."""
+
+from __future__ import annotations
+
+from . import Contestant, stepwell_peer
+
+CONTESTANTS = [Contestant("NumPy reference", stepwell_peer.kernels(backend="numpy"), slow="steps")]

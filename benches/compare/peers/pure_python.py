@@ -1,0 +1,52 @@
+"""Pure Python: one member after the other, numbers in local variables."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import Contestant, Ready, Workload
+
+
+def free_false_euler(work: Workload, quick: bool) -> Ready:
+    """v −= hω·y; y += hω·v."""
+    rows = [row.tolist() for row in work.data.values()]
+
+    def call():
+        out = []
+        for v, y, omega in zip(*rows, strict=True):
+            w = work.dt * omega
+            for _ in range(work.steps):
+                v -= w * y
+                y += w * v
+            out.append((v, y))
+        return tuple(np.array(out).T)
+
+    return Ready(call)
+
+
+def forced_standard_heun(work: Workload, quick: bool) -> Ready:
+    """A predictor, then the mean of the increments at both ends."""
+    rows = [row.tolist() for row in work.data.values()]
+
+    def call():
+        out, h, sin = [], work.dt, math.sin
+        for v, y, omega, damping, amplitude, frequency, phase in zip(*rows, strict=True):
+            w, drag, force = h * omega, 2.0 * damping * h * omega, h / omega * amplitude
+            for k in range(work.steps):
+                t = k * h
+                dv1 = force * sin(frequency * t + phase) - w * y - drag * v
+                dy1 = w * v
+                v1, y1 = v + dv1, y + dy1
+                dv2 = force * sin(frequency * (t + h) + phase) - w * y1 - drag * v1
+                v += 0.5 * (dv1 + dv2)
+                y += 0.5 * (dy1 + w * v1)
+            out.append((v, y))
+        return tuple(np.array(out).T)
+
+    return Ready(call)
+
+
+KERNELS = {"free_false_euler": free_false_euler, "forced_standard_heun": forced_standard_heun}
+CONTESTANTS = [Contestant("pure Python", KERNELS, slow="members")]

@@ -1,0 +1,75 @@
+"""The report: rows to tables, on the screen and as Markdown."""
+
+from __future__ import annotations
+
+from .runner import Row
+from .workloads import Workload
+
+Table = tuple[str, list[str], list[list[str]]]
+
+HEAD = ["contestant", "G steps/s", "min … max", "error", "÷ numba", "÷ C", "÷ C, exact", "remarks"]
+
+READING = """\
+G steps/s are 10⁹ member-steps a second: members × steps ÷ time of one call that goes from the user's arrays to the
+final state. Shown is the median of {repeats} repeats, then the slowest and the fastest. The contestants take turns
+in every repeat, and each sample lasts at least {sample:.0f} ms.
+
+*Error* is the largest distance of a member's (v, y) from the exact solution at the end, at amplitudes of about 1.
+Who exceeds what the method explains is not timed. All contestants use the same method, so equal errors mean equal
+work and the speeds may be compared; who did a smaller share has the error of that share.
+
+*C* may contract to FMA, and *numba* may also reorder. *C, exact* computes as stepwell does, whose results are the
+same to the last bit on every machine. All of them are the best of several block shapes, found before the timing;
+one thread each. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file
+mean anything: another machine, or another hour on a shared one, gives other speeds.
+"""
+
+
+def number(x: float) -> str:
+    """Three digits."""
+    return f"{x:.3g}" if x < 999.5 else f"{x:.0f}"
+
+
+def table(work: Workload, rows: list[Row]) -> Table:
+    """One workload's table, fastest first."""
+    speed = {row.name: row.rates[1] for row in rows if row.seconds}
+    lines = []
+    for row in sorted(rows, key=lambda row: -speed.get(row.name, 0.0)):
+        if row.missing:
+            lines.append([row.name, *["—"] * (len(HEAD) - 2), row.missing])
+            continue
+        slowest, middle, fastest = row.rates
+        ratios = [f"{middle / speed[peer]:.2f}" if peer in speed else "—" for peer in ("numba", "C", "C, exact")]
+        lines.append([row.name, number(middle), f"{number(slowest)} … {number(fastest)}", f"{row.error:.1e}", *ratios, row.note])
+    title = f"{work.name}: {work.about}, {work.members:,} member(s), {work.steps:,} steps of {work.dt:g}"
+    return title, HEAD, lines
+
+
+def threads(rows: list[Row]) -> str:
+    """How much all threads bring."""
+    timed = [row for row in rows if row.name.startswith("stepwell") and row.seconds]
+    return "".join(f"{row.name}: {row.rates[1] / timed[0].rates[1]:.2f} times the speed of one." for row in timed[1:])
+
+
+def show(title: str, head: list[str], lines: list[list[str]]) -> None:
+    """On the screen; as Markdown if there is no rich."""
+    try:
+        from rich.console import Console
+        from rich.table import Table as RichTable
+    except ImportError:
+        print(markdown(title, head, lines))
+        return
+    shown = RichTable(title=title, title_justify="left")
+    for i, name in enumerate(head):
+        last = i == len(head) - 1
+        shown.add_column(name, justify="left" if last or i == 0 else "right", no_wrap=not last)
+    for line in lines:
+        shown.add_row(*line)
+    console = Console()
+    (console if console.is_terminal else Console(width=150)).print(shown)
+
+
+def markdown(title: str, head: list[str], lines: list[list[str]]) -> str:
+    """As Markdown."""
+    rows = [head, ["---"] * len(head), *lines]
+    return "\n".join([f"## {title}", "", *(f"| {' | '.join(row)} |" for row in rows), ""])

@@ -1,0 +1,98 @@
+"""The measurement: all is checked first, then timed in turns, so that what disturbs the machine disturbs all alike."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from statistics import median
+
+from .peers import Contestant, MissingPeerError, Ready, WrongResultError
+from .workloads import Workload
+
+#: Seconds that a sample lasts at least, by as many calls as that takes, and that one call of a slow peer may last.
+SAMPLE, PATIENCE = 0.02, 0.5
+
+
+@dataclass
+class Row:
+    """What came out for one contestant; ``missing`` says why nothing did."""
+
+    name: str
+    note: str = ""
+    missing: str = ""
+    error: float = float("nan")
+    member_steps: int = 0
+    calls: int = 1
+    seconds: list[float] = field(default_factory=list)  # per call
+
+    @property
+    def rates(self) -> tuple[float, float, float]:
+        """Lowest, median and highest speed, in 10⁹ member-steps a second."""
+        work = self.member_steps / 1e9
+        return work / max(self.seconds), work / median(self.seconds), work / min(self.seconds)
+
+
+def sample(call: Callable[[], object], calls: int) -> float:
+    """Seconds per call."""
+    gc.disable()
+    try:
+        start = time.perf_counter()
+        for _ in range(calls):
+            call()
+        return (time.perf_counter() - start) / calls
+    finally:
+        gc.enable()
+
+
+def share(contestant: Contestant, work: Workload, quick: bool) -> Workload:
+    """The part of the work that a slow contestant does in good time, judged by a little of it."""
+    if contestant.slow is None:
+        return work
+    members = 1 if contestant.slow == "members" else work.members
+    trial = work.cut(members=members, steps=100)
+    seconds = sample(contestant.kernels[work.kind](trial, quick).call, 1) / (trial.members * trial.steps)
+    patience = PATIENCE / 10 if quick else PATIENCE
+    affordable = max(100, int(patience / seconds))  # member-steps
+    if contestant.slow == "members":
+        work = work.cut(members=max(1, affordable // work.steps))
+    return work.cut(steps=max(1, affordable // work.members))
+
+
+def prepare(contestant: Contestant, work: Workload, quick: bool) -> tuple[Row, Ready | None]:
+    """One contestant made ready and checked against the exact solution; only then may it be timed."""
+    row = Row(contestant.name)
+    try:
+        part = share(contestant, work, quick)
+        ready = contestant.kernels[work.kind](part, quick)
+        row.error = part.error(*ready.call())
+        if not row.error <= part.bound():
+            raise WrongResultError(f"error {row.error:.1e}, but the method's is at most {part.bound():.1e}")
+    except MissingPeerError as why:
+        row.missing = str(why)
+    except WrongResultError as why:
+        row.missing = f"not timed: {why}"
+    if row.missing:
+        return row, None
+    row.member_steps = part.members * part.steps
+    less = "" if part.members == work.members else f"{part.members:,} member(s)"
+    less += "" if part.steps == work.steps else f"{', ' * bool(less)}{part.steps:,} steps"
+    row.note = "; ".join(filter(None, [ready.note, less and f"did {less} only"]))
+    return row, ready
+
+
+def measure(contestants: list[Contestant], work: Workload, repeats: int, quick: bool) -> list[Row]:
+    """All contestants on one workload, round by round."""
+    able = [c for c in contestants if work.kind in c.kernels]
+    rows, timed = [], []
+    for contestant in able:
+        row, ready = prepare(contestant, work, quick)
+        rows.append(row)
+        if ready is not None:
+            row.calls = max(1, round((SAMPLE / 10 if quick else SAMPLE) / sample(ready.call, 1)))
+            timed.append((row, ready))
+    for _ in range(repeats):
+        for row, ready in timed:
+            row.seconds.append(sample(ready.call, row.calls))
+    return rows

@@ -1,0 +1,83 @@
+"""The comparison with other languages: it runs, and no speed stands without its error."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import stepwell as sw
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benches.compare import machine, peers, runner, workloads  # noqa: E402
+from benches.compare.peers import c_peer, numba_peer, stepwell_peer  # noqa: E402
+
+WORKS = [work.cut(members=200, steps=2000 if work.members == 1 else 200) for work in workloads.catalogue()]
+
+
+@pytest.mark.parametrize("work", WORKS, ids=lambda w: f"{w.name}-{w.members}")
+@pytest.mark.parametrize("contestant", peers.catalogue(), ids=lambda c: c.name)
+def test_every_contestant_is_as_right_as_its_method(contestant: peers.Contestant, work: workloads.Workload) -> None:
+    try:
+        v, y = contestant.kernels[work.kind](work, True).call()
+    except peers.MissingPeerError as why:
+        pytest.skip(str(why))
+    assert work.error(v, y) <= work.bound()
+    # Same method, same work: what is left is rounding, a few thousand operations of 1e-16 each, and another sine.
+    ours_v, ours_y = stepwell_peer.kernels()[work.kind](work, True).call()
+    assert max(abs(v - ours_v).max(), abs(y - ours_y).max()) < 1e-11
+
+
+@pytest.mark.parametrize("work", WORKS, ids=lambda w: f"{w.name}-{w.members}")
+def test_who_is_wrong_is_not_timed(work: workloads.Workload) -> None:
+    system = stepwell_peer.forced if "forced" in work.kind else stepwell_peer.free
+
+    def another_method(work: workloads.Workload, quick: bool) -> peers.Ready:
+        start = {"v": work.data["v"], "y": work.data["y"]}
+        run = sw.integrate(system(work.data), "standard_euler", dt=work.dt, steps=work.steps, **start)
+        return peers.Ready(lambda: (run.v[-1], run.y[-1]))
+
+    row, ready = runner.prepare(peers.Contestant("wrong", {work.kind: another_method}), work, quick=True)
+    assert ready is None
+    assert row.missing.startswith("not timed: error")
+
+
+def test_a_missing_peer_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setitem(sys.modules, "numba", None)
+    c_peer.library.cache_clear()
+    numba_peer.compiled.cache_clear()
+    for module, why in ((c_peer, "no C compiler"), (numba_peer, "numba is not installed")):
+        row, ready = runner.prepare(module.CONTESTANTS[0], WORKS[0], quick=True)
+        assert (row.missing, ready) == (why, None)
+    assert ("C", "no C compiler") in machine.describe()
+
+
+def cells(line: str) -> list[str]:
+    return [cell.strip() for cell in line.strip().strip("|").split("|")]
+
+
+def test_the_quick_run_writes_a_report(tmp_path: Path) -> None:
+    out = tmp_path / "report.md"
+    command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "-o", out]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    report = out.read_text(encoding="utf-8")
+    lines = [cells(line) for line in report.splitlines() if line.startswith("|")]
+    tables = [i for i, line in enumerate(lines) if line[0] == "contestant"]
+    assert len(tables) == len(workloads.catalogue())
+    for row in lines[: tables[-1] + 2 + len(peers.catalogue())]:
+        if row[0] == "contestant":
+            assert row[1:4] == ["G steps/s", "min … max", "error"]
+        elif not row[0].startswith("---") and row[1] != "—":
+            assert float(row[1]) > 0
+            assert re.fullmatch(r"\d\.\de-\d\d", row[3]), row
+    rows = {row[0] for row in lines}
+    assert {c.name for c in peers.catalogue()} <= rows
+    assert {"wheel", "`import stepwell` after NumPy"} <= rows
+    assert sw.isa() in report
