@@ -40,8 +40,8 @@ class Kind:
 #
 # Why two ratios: alone, a member is stepped in a narrow group of 8 lanes. If only the wide group falls, the first ratio comes
 # down to 1 … 6; if both fall, to no less than 8, but then the second comes down to about 1. With a lane loop that cannot be
-# vectorised (`black_box(l)` in tile.rs), all 72 kernels of tiles fail at AVX-512 and 50 of them at AVX2; at the baseline
-# none do, because there is nothing below it to compare with.
+# vectorised (`black_box(l)` in tile.rs), 71 of the 72 kernels of tiles fail at AVX-512 and 47 of them at AVX2; at the
+# baseline none do, because there is nothing below it to compare with.
 KINDS = [
     Kind(
         {"free": sw.Oscillator(1.3), "physical": sw.Oscillator(1.3, form="physical"), "damped": sw.Oscillator(1.3, 0.1)},

@@ -86,3 +86,14 @@ def test_the_arrays_cannot_be_swapped() -> None:
     w = sw.World(sw.Oscillator(1.0), "false_euler", v=np.zeros(3), y=np.ones(3), dt=0.1)
     with pytest.raises(AttributeError):
         w.v = np.zeros(3)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (2, 3), (30, 20)])
+def test_any_shape_of_batch(shape: tuple[int, ...]) -> None:
+    """From a lone number to more than are copied."""
+    v, y = np.zeros(shape), np.ones(shape)
+    w = sw.World(sw.Oscillator(1.3), "verlet", v=v, y=y, dt=0.1)
+    w.step(3)
+    expected = sw.integrate(sw.Oscillator(1.3), "verlet", v=0.0, y=np.ones(shape), dt=0.1, steps=3)
+    np.testing.assert_array_equal(y, expected.y[-1])
+    np.testing.assert_array_equal(v, expected.v[-1])

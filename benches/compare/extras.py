@@ -26,11 +26,11 @@ def import_time(repeats: int) -> str:
 
 def world_step(repeats: int) -> str:
     """``World.step(1)`` of one oscillator by False Euler, less the arithmetic of a step."""
-    v, y, h = np.zeros(()), np.ones(()), 0.01
+    v, y, h = np.zeros(1), np.ones(1), 0.01
     world = sw.World(sw.Oscillator(), "false_euler", v=v, y=y, dt=h)
     for _ in range(1000):
         world.step(1)
-    error = float(np.hypot(v + np.sin(1000 * h), y - np.cos(1000 * h)))
+    error = float(np.hypot(v + np.sin(1000 * h), y - np.cos(1000 * h))[0])
 
     def per_call(steps: int, calls: int = 10_000) -> float:
         step, start = world.step, time.perf_counter()

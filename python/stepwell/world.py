@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,6 @@ class World:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         first = _checks.count("start_step", start_step, 0)
         system.check_time(abs(t0) + first * self.dt)
-        plan = engine.Plan(system, self.method, batch, self.dt)
         model = engine.model(system.kernel, system.parameters(batch), self.method)
         self._core = _core.World(
             model,
@@ -75,9 +75,9 @@ class World:
             dt=self.dt,
             start=self.method.start_choice(start),
             first=first,
-            members=int(np.prod(plan.batch)),
-            v=v,
-            y=y,
+            members=prod(batch),
+            v=self._v.reshape(-1),  # views: the core knows rows, not axes
+            y=self._y.reshape(-1),
         )
         #: ``step(n=1)`` makes n steps in place.
         self.step: Any = self._core.step
