@@ -220,7 +220,7 @@ def test_progress_goes_up(backend: str) -> None:
     steps = 10**6 if backend == "rust" else 1000
     plan = engine.Plan(FREE, method("rk4"), (500,), 0.1, steps=steps, threads=1, backend=backend, progress=shares.append)
     engine.advance(plan, np.zeros(500), np.ones(500))
-    assert len(shares) > 10
+    assert len(shares) > 2  # fifty a second, however long the run takes
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.5 < shares[-1] <= 1
 

@@ -270,9 +270,10 @@ def test_the_core_refuses_too() -> None:
         model = _core.ModelSpec(system, list(options), size, [row], [], method)
         given = {
             "v": np.zeros((1, 4)),
-            "y": np.zeros((1, 4)),
-            "saved_v": np.zeros((0, 1, 4)),
-            "saved_y": np.zeros((0, 1, 4)),
+            "y": np.zeros((1, 1)),
+            "saved_v": np.zeros((1, 1, 4)),
+            "saved_y": np.zeros((1, 1, 4)),
+            "carry": np.zeros(0),
         }
         clock = {
             "t0": 0.0,
@@ -296,8 +297,10 @@ def test_the_core_refuses_too() -> None:
             "verlet needs forces that do not depend on the velocity",
         ),
         ({"system": "chain", "options": [], "size": 0}, "has no kernel for the options"),
-        ({"v": np.zeros((2, 4))}, "v: expected 4, got 8"),
-        ({"saved_y": np.zeros((3, 1, 4))}, "saved_v: expected 4, got 0"),
+        ({"v": np.zeros((2, 4))}, "v: expected 1, got 2"),
+        ({"v": np.zeros((1, 3))}, "a row of v: expected 4, got 3"),
+        ({"carry": np.zeros(3)}, "carry: expected 4, got 3"),
+        ({"saved_y": np.zeros((3, 1, 4))}, "saved_y: expected 4, got 12"),
         ({"row": np.ones((1, 3))}, "a parameter: expected 4, got 3"),
     ):
         with pytest.raises(ValueError, match=re.escape(text)):

@@ -62,6 +62,7 @@ def run(
     y: NDArray[np.float64],
     saved_v: NDArray[np.float64],
     saved_y: NDArray[np.float64],
+    carry: NDArray[np.float64],
     first_bad: NDArray[np.int64],
     progress: Callable[[float], object] | None,
 ) -> None: ...

@@ -135,11 +135,9 @@ def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
-    slot, y = (np.array(a, dtype=np.float64, order="C") for a in (v, y))
-    # The last state alone needs no second copy, unless the slot holds something else.
-    keep = 0 if plan.every is None and not carries else len(plan.saves)
-    saved_v, saved_y = (np.empty((keep, *a.shape)) for a in (slot, y))
-    first_bad = before
+    kept = 1 if plan.every is None else len(plan.saves)
+    saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
+    carry = np.empty(v.shape if carries else 0)
     _core.run(
         model,
         t0=plan.t0,
@@ -150,16 +148,20 @@ def _rust(
         every=plan.every,
         threads=plan.threads,
         carried=carried,
-        v=slot,
-        y=y,
+        v=_flat(plan, v),
+        y=_flat(plan, y),
         saved_v=saved_v,
         saved_y=saved_y,
-        first_bad=first_bad.reshape(-1),
+        carry=carry,
+        first_bad=before.reshape(-1),
         progress=plan.progress,
     )
-    if not keep:
-        saved_v, saved_y = slot[np.newaxis], y[np.newaxis]
-    return Outcome(saved_v, saved_y, slot, first_bad)
+    return Outcome(saved_v, saved_y, carry if carries else saved_v[-1], before)
+
+
+def _flat(plan: Plan, array: Array) -> Array:
+    """A block as rows for the core."""
+    return rows(array.reshape((prod(array.shape[: array.ndim - len(plan.batch)]), *plan.batch)), plan.batch)
 
 
 # ---- the transition-matrix form

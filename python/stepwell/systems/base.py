@@ -93,7 +93,9 @@ def row(values: Array, batch: Shape) -> Array:
 def rows(values: Array, batch: Shape) -> Array:
     """Parameters, counted along the first axis, as rows for the core."""
     count, own = len(values), values.shape[1:]
-    if not own:
+    if not any(values.strides[1:]):  # one number for all members, broadcast or not
+        for _ in own:
+            values = values[..., 0]
         return np.ascontiguousarray(values.reshape(count, 1))
     if own == batch:
         return np.ascontiguousarray(values).reshape(count, prod(batch))

@@ -11,7 +11,7 @@ use std::{
 
 use crate::{
     error::Error,
-    group::{Clock, Group, Width},
+    group::{Clock, Group, Row, Width},
     table::Model,
 };
 
@@ -28,6 +28,10 @@ pub struct Plan<'a> {
     pub steps: i64,
     /// Keep every so many steps, the first state and the last; or the last alone.
     pub every: Option<i64>,
+    /// The v slot at the first step, by rows.
+    pub v: Vec<Row<'a>>,
+    /// The coordinates at the first step, by rows.
+    pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
     /// How many threads; zero for as many as pay.
@@ -38,18 +42,16 @@ pub struct Plan<'a> {
     pub carries: bool,
 }
 
-/// The arrays of a run, each of rows of one number per member.
+/// What a run fills: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
-    /// The v slot: first the start, then what is carried at the end.
-    pub v: &'a mut [f64],
-    /// The coordinates: first the start, then the end.
-    pub y: &'a mut [f64],
-    /// What is kept of v, one block per kept step; may be empty if the last alone is asked for and the method carries v.
+    /// What is kept of v, one block per kept step.
     pub saved_v: &'a mut [f64],
     /// What is kept of y.
     pub saved_y: &'a mut [f64],
-    /// Per member, the number of the first step that is not finite, or −1.
+    /// The v slot at the end; empty if nobody asks.
+    pub carry: &'a mut [f64],
+    /// Per member, the number of the first step that is not finite, or −1; members that have one are not looked at.
     pub first_bad: &'a mut [i64],
 }
 
@@ -73,10 +75,9 @@ const WORTH_A_THREAD: f64 = 3e6;
 /// One thread's share of the members, as slices of every row.
 struct Part<'a> {
     first: usize,
-    v: Vec<&'a mut [f64]>,
-    y: Vec<&'a mut [f64]>,
     saved_v: Vec<&'a mut [f64]>,
     saved_y: Vec<&'a mut [f64]>,
+    carry: Vec<&'a mut [f64]>,
     first_bad: &'a mut [i64],
 }
 
@@ -105,16 +106,19 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let wide = plan.model.group(&plan.clock, Width::Wide)?;
     let (p, q) = (wide.slots().0.len() / wide.lanes(), wide.slots().1.len() / wide.lanes());
     let kept = saves(plan.steps, plan.every).count();
-    expect("v", p * b, arrays.v.len())?;
-    expect("y", q * b, arrays.y.len())?;
-    if !arrays.saved_v.is_empty() || !arrays.saved_y.is_empty() {
-        expect("saved_v", kept * p * b, arrays.saved_v.len())?;
-        expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    expect("v", p, plan.v.len())?;
+    expect("y", q, plan.y.len())?;
+    expect("saved_v", kept * p * b, arrays.saved_v.len())?;
+    expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    if !arrays.carry.is_empty() {
+        expect("carry", p * b, arrays.carry.len())?;
     }
     expect("first_bad", b, arrays.first_bad.len())?;
-    for row in &plan.model.spec().rows {
-        if row.0.len() != 1 {
-            expect("a parameter", b, row.0.len())?;
+    for (what, rows) in [("a parameter", &plan.model.spec().rows), ("a row of v", &plan.v), ("a row of y", &plan.y)] {
+        for row in rows {
+            if row.0.len() != 1 {
+                expect(what, b, row.0.len())?;
+            }
         }
     }
 
@@ -137,16 +141,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
 
     let mut first = 0;
     let mut parts = Vec::with_capacity(shares.len());
-    let pieces = cut(arrays.v, b, &shares)
+    let pieces = cut(arrays.saved_v, b, &shares)
         .into_iter()
-        .zip(cut(arrays.y, b, &shares))
-        .zip(cut(arrays.saved_v, b, &shares))
         .zip(cut(arrays.saved_y, b, &shares))
+        .zip(cut(arrays.carry, b, &shares))
         .zip(cut(arrays.first_bad, b, &shares));
-    for ((((v, y), saved_v), saved_y), mut first_bad) in pieces {
+    for (((saved_v, saved_y), carry), mut first_bad) in pieces {
         if let Some(first_bad) = first_bad.pop() {
             let count = first_bad.len();
-            parts.push(Part { first, v, y, saved_v, saved_y, first_bad });
+            parts.push(Part { first, saved_v, saved_y, carry, first_bad });
             first += count;
         }
     }
@@ -190,9 +193,11 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
             Ok(())
         };
         let mut result = mine();
+        let mut nap = Duration::from_micros(10); // short at first: a short run should not wait for its end
         for helper in helpers {
             while !helper.is_finished() {
-                thread::sleep(Duration::from_millis(1));
+                thread::sleep(nap);
+                nap = (nap * 2).min(Duration::from_millis(2));
                 go_on(0);
             }
             let theirs = helper.join().unwrap_or(Err(Error::Interrupted));
@@ -248,17 +253,10 @@ struct Job<'a, 'b> {
     good: &'a mut (Vec<f64>, Vec<f64>),
 }
 
-/// Copies the rows of a group into row slices, or the other way.
+/// Copies the rows of a group into row slices.
 fn put(rows: &mut [&mut [f64]], from: usize, count: usize, slot: &[f64], lanes: usize) {
     for (row, slot) in rows.iter_mut().zip(slot.chunks_exact(lanes)) {
         row[from..from + count].copy_from_slice(&slot[..count]);
-    }
-}
-
-fn get(rows: &[&mut [f64]], from: usize, count: usize, slot: &mut [f64], lanes: usize) {
-    for (row, slot) in rows.iter().zip(slot.chunks_exact_mut(lanes)) {
-        slot[..count].copy_from_slice(&row[from..from + count]);
-        slot[count..].fill(row[from + count - 1]); // idle lanes repeat the last member
     }
 }
 
@@ -268,8 +266,11 @@ impl Job<'_, '_> {
         let (plan, lanes) = (self.plan, self.group.lanes());
         self.group.prepare(plan.model.spec(), self.part.first + self.from, self.count);
         let (v, y) = self.group.slots_mut();
-        get(&self.part.v, self.from, self.count, v, lanes);
-        get(&self.part.y, self.from, self.count, y, lanes);
+        for (rows, slot) in [(&plan.v, &mut *v), (&plan.y, &mut *y)] {
+            for (row, slot) in rows.iter().zip(slot.chunks_exact_mut(lanes)) {
+                row.fill(self.part.first + self.from, self.count, slot);
+            }
+        }
         let at_once = (PATIENCE / (v.len() + y.len()).max(1) as i64).clamp(1, LOOK);
         if !plan.carried {
             self.group.start(plan.first);
@@ -299,18 +300,13 @@ impl Job<'_, '_> {
                 return false;
             }
         }
-        let (v, y) = self.group.slots();
-        put(&mut self.part.v, self.from, self.count, v, lanes);
-        put(&mut self.part.y, self.from, self.count, y, lanes);
+        put(&mut self.part.carry, self.from, self.count, self.group.slots().0, lanes);
         true
     }
 
     fn save(&mut self, i: usize, k: i64) {
-        if self.part.saved_v.is_empty() && self.part.saved_y.is_empty() {
-            return;
-        }
         let lanes = self.group.lanes();
-        let (p, q) = (self.part.v.len(), self.part.y.len());
+        let (p, q) = (self.plan.v.len(), self.plan.y.len());
         let carried = self.plan.carries.then(|| self.group.slots().0.to_vec());
         if carried.is_some() {
             self.group.finish(k);

@@ -3,7 +3,7 @@
 mod model;
 mod world;
 
-use numpy::{PyReadwriteArray1, PyReadwriteArrayDyn};
+use numpy::{PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArrayDyn};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     batch::{self, Arrays, Plan},
@@ -14,7 +14,7 @@ use stepwell_core::{
     table,
 };
 
-use model::{ModelSpec, core_error};
+use model::{ModelSpec, by_row, core_error};
 
 /// Everything that a method says of itself.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
@@ -68,9 +68,9 @@ fn saves(steps: i64, every: Option<i64>) -> Vec<i64> {
     batch::saves(steps, every).collect()
 }
 
-/// Makes a run, in place on `v` and `y`, and fills what is kept.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
 #[pyfunction]
-#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, first_bad, progress))]
+#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, carry, first_bad, progress))]
 #[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
 fn run(
     py: Python<'_>,
@@ -83,19 +83,19 @@ fn run(
     every: Option<i64>,
     threads: usize,
     carried: bool,
-    mut v: PyReadwriteArrayDyn<'_, f64>,
-    mut y: PyReadwriteArrayDyn<'_, f64>,
+    v: PyReadonlyArray2<'_, f64>,
+    y: PyReadonlyArray2<'_, f64>,
     mut saved_v: PyReadwriteArrayDyn<'_, f64>,
     mut saved_y: PyReadwriteArrayDyn<'_, f64>,
+    mut carry: PyReadwriteArrayDyn<'_, f64>,
     mut first_bad: PyReadwriteArray1<'_, i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<()> {
     let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)? };
     let arrays = Arrays {
-        v: v.as_slice_mut()?,
-        y: y.as_slice_mut()?,
         saved_v: saved_v.as_slice_mut()?,
         saved_y: saved_y.as_slice_mut()?,
+        carry: carry.as_slice_mut()?,
         first_bad: first_bad.as_slice_mut()?,
     };
     let rows = model.rows(py)?;
@@ -107,6 +107,8 @@ fn run(
         first,
         steps,
         every,
+        v: by_row(&v)?,
+        y: by_row(&y)?,
         members,
         threads,
         carried,

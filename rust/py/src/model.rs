@@ -40,7 +40,7 @@ pub type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
 pub type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
 
 /// The rows of an array, each of one number or one for each member.
-fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
+pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
     let width = array.as_array().ncols().max(1);
     Ok(array.as_slice()?.chunks_exact(width).map(Row).collect())
 }

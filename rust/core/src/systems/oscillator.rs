@@ -258,7 +258,7 @@ fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Re
     // Lanes: what was fastest when tried. The free oscillator's v and y fill the registers of AVX-512 and Φ comes from memory.
     kinds.sort(); // a sum of two does not care for their order, and this saves kernels
     Ok(match (kinds.as_slice(), spec.has("damped")) {
-        ([], false) => of_force::<F, Free, St, 112, 16>(inputs, clock, width),
+        ([], false) => of_force::<F, Free, St, 112, 24>(inputs, clock, width),
         ([], true) => of_force::<F, Damped, St, 64, 32>(inputs, clock, width),
         ([Kind::Held], _) => of_force::<F, Driven<FromTable>, St, 64, 32>(inputs, clock, width),
         ([Kind::Sine], _) => of_force::<F, Driven<FromSine>, St, 16, 32>(inputs, clock, width),
