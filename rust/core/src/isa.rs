@@ -151,3 +151,26 @@ mod x86 {
 pub use x86::{Avx2, Avx512};
 #[cfg(not(target_arch = "x86_64"))]
 pub use {Baseline as Avx2, Baseline as Avx512};
+
+/// Makes something with the proof of a level: one expression for AVX-512 and one below it, or one for all.
+macro_rules! with_isa {
+    ($level:expr, |$isa:ident| $make:expr) => {
+        $crate::isa::with_isa!($level, |$isa| $make, $make)
+    };
+    ($level:expr, |$isa:ident| $wide:expr, $below:expr) => {{
+        use $crate::isa::{Avx2, Avx512, Baseline, Isa, Level};
+        if $level == Level::Avx512
+            && let Some($isa) = Avx512::detect()
+        {
+            $wide
+        } else if $level == Level::Avx2
+            && let Some($isa) = Avx2::detect()
+        {
+            $below
+        } else {
+            let $isa = Baseline;
+            $below
+        }
+    }};
+}
+pub(crate) use with_isa;

@@ -9,7 +9,7 @@
 
 use crate::{
     group::{Clock, Group, Spec, Width},
-    isa::{Avx2, Avx512, Baseline, Isa, Level, Task},
+    isa::{Isa, Task, with_isa},
     rows::{LANES, Rows, lanes, lanes_mut, zeros},
     signal::{Signal, Sine},
     tile::Samples,
@@ -145,17 +145,7 @@ fn boxed<I: Isa, const L: usize>(isa: I, spec: &Spec, nodes: &[f64], clock: &Clo
 }
 
 fn at_level<const L: usize>(spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: usize) -> Box<dyn Group> {
-    if clock.level == Level::Avx512
-        && let Some(isa) = Avx512::detect()
-    {
-        return boxed::<_, L>(isa, spec, nodes, clock, v_rows);
-    }
-    if clock.level == Level::Avx2
-        && let Some(isa) = Avx2::detect()
-    {
-        return boxed::<_, L>(isa, spec, nodes, clock, v_rows);
-    }
-    boxed::<_, L>(Baseline, spec, nodes, clock, v_rows)
+    with_isa!(clock.level, |isa| boxed::<_, L>(isa, spec, nodes, clock, v_rows))
 }
 
 /// A group of linear maps of `spec.size` numbers, the first `v_rows` of them in the v slot.

@@ -11,7 +11,7 @@ use nalgebra::{Const, Dyn, OMatrix};
 use crate::{
     block::{Block, Work},
     group::{Clock, Group, Spec, Width},
-    isa::{Avx2, Avx512, Baseline, Isa, Level, Task},
+    isa::{Isa, Task, with_isa},
     stepper::Stepper,
     system::System,
 };
@@ -139,17 +139,7 @@ fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, size: usize
 where
     Work<S>: Send + Sync,
 {
-    if clock.level == Level::Avx512
-        && let Some(isa) = Avx512::detect()
-    {
-        return RowGroup::<S, St, _, L>::boxed(isa, clock, size);
-    }
-    if clock.level == Level::Avx2
-        && let Some(isa) = Avx2::detect()
-    {
-        return RowGroup::<S, St, _, L>::boxed(isa, clock, size);
-    }
-    RowGroup::<S, St, _, L>::boxed(Baseline, clock, size)
+    with_isa!(clock.level, |isa| RowGroup::<S, St, _, L>::boxed(isa, clock, size))
 }
 
 /// A group of a system of any size: `Many` lanes for several members, `One` for a single one.

@@ -11,7 +11,7 @@ use nalgebra::SVector;
 use crate::{
     block::Work,
     group::{Clock, Group, NARROW, Row, Spec, Table, Width},
-    isa::{Avx2, Avx512, Baseline, Isa, Level, Task},
+    isa::{Isa, Task, with_isa},
     stepper::Stepper,
     system::System,
 };
@@ -254,24 +254,15 @@ where
     S: Small<P, Q, C>,
     St: Stepper,
 {
-    if clock.level == Level::Avx512
-        && let Some(isa) = Avx512::detect()
-    {
-        return match width {
+    with_isa!(
+        clock.level,
+        |isa| match width {
             Width::Wide => Tile::<S, St, _, P, Q, C, WIDE>::boxed(family, isa, clock),
             Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
-        };
-    }
-    if clock.level == Level::Avx2
-        && let Some(isa) = Avx2::detect()
-    {
-        return match width {
+        },
+        match width {
             Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, isa, clock),
             Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
-        };
-    }
-    match width {
-        Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, Baseline, clock),
-        Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, Baseline, clock),
-    }
+        }
+    )
 }
