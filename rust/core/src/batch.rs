@@ -3,9 +3,12 @@
 use std::{
     sync::{
         Mutex,
-        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+        atomic::{
+            AtomicBool, AtomicU64, AtomicUsize,
+            Ordering::{Acquire, Relaxed, Release},
+        },
     },
-    thread,
+    thread::{self, Thread},
     time::{Duration, Instant},
 };
 
@@ -159,10 +162,13 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let stop = AtomicBool::new(false);
     let total = (b as f64 * plan.steps as f64).max(1.0);
     let take = || queue.lock().map_or(None, |mut q| q.next());
+    let busy = AtomicUsize::new(threads - 1);
+    let caller = thread::current();
     thread::scope(|scope| {
         let helpers: Vec<_> = (1..threads)
             .map(|_| {
                 scope.spawn(|| {
+                    let _leave = Leave(&busy, &caller);
                     let mut worker = Worker::new(plan, None)?;
                     while let Some(part) = take() {
                         worker.part(part, &mut |n| {
@@ -193,18 +199,25 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
             Ok(())
         };
         let mut result = mine();
-        let mut nap = Duration::from_micros(10); // short at first: a short run should not wait for its end
+        while busy.load(Acquire) > 0 {
+            thread::park_timeout(POLL);
+            go_on(0);
+        }
         for helper in helpers {
-            while !helper.is_finished() {
-                thread::sleep(nap);
-                nap = (nap * 2).min(Duration::from_millis(2));
-                go_on(0);
-            }
-            let theirs = helper.join().unwrap_or(Err(Error::Interrupted));
-            result = result.and(theirs);
+            result = result.and(helper.join().unwrap_or(Err(Error::Interrupted)));
         }
         result
     })
+}
+
+/// Tells the caller that a thread has nothing left to do, also if it panicked.
+struct Leave<'a>(&'a AtomicUsize, &'a Thread);
+
+impl Drop for Leave<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Release);
+        self.1.unpark();
+    }
 }
 
 /// One thread's groups, and where it stands.
