@@ -33,9 +33,9 @@ class World:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system.
 
-    ``step(n)`` steps in place, allocates nothing and releases nothing: it is meant for the few microseconds of a frame. A
-    method that carries something else than v (Verlet) keeps it inside; if you change ``v`` or ``y`` between steps, it starts
-    anew from what you wrote. Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
+    ``step(n)`` steps in place and allocates nothing: it is meant for the few microseconds of a frame, and keeps the GIL for
+    them. A method that carries something else than v (Verlet) keeps it inside; if you change ``v`` or ``y`` between steps, it
+    starts anew from what you wrote. Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
     """
 
     __slots__ = ("_core", "_v", "_y", "dt", "method", "step", "system")
