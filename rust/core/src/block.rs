@@ -9,7 +9,7 @@ use nalgebra::{DefaultAllocator, Dim, OMatrix, allocator::Allocator};
 
 use crate::system::System;
 
-/// A block of numbers that a step can copy, add and scale.
+/// A block of numbers that a step can add and scale.
 pub trait Block {
     /// A block of the same shape, all zero.
     fn like(&self) -> Self;
@@ -19,14 +19,6 @@ pub trait Block {
     fn numbers(&self) -> &[f64];
     /// The numbers, to write.
     fn numbers_mut(&mut self) -> &mut [f64];
-
-    /// `self = a`
-    #[inline(always)]
-    fn set(&mut self, a: &impl Block) {
-        for (s, a) in self.numbers_mut().iter_mut().zip(a.numbers()) {
-            *s = *a;
-        }
-    }
 
     /// `self = self + d`
     #[inline(always)]
