@@ -6,7 +6,7 @@ above this file speaks of states, everything below of slots.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import lcm, prod
 from typing import Any, NamedTuple
 
@@ -16,10 +16,10 @@ from . import _core
 from ._checks import Array, Shape
 from .methods import Method
 from .reference import run as reference
-from .reference.types import Blocks, Signal, Whole
+from .reference.types import Blocks, Whole
 from .systems import Sampled, System
 from .systems.base import Parameters, row, rows
-from .systems.inputs import Input, table
+from .systems.inputs import table
 
 Looped = tuple[Array, Array, list[Blocks], Whole]
 
@@ -167,50 +167,54 @@ def _flat(plan: Plan, array: Array) -> Array:
 # ---- the transition-matrix form
 
 
-def transition(plan: Plan) -> tuple[Array, Array, list[Signal]]:
-    """P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), and the inputs.
-
-    Both are found by stepping: P from unit vectors of the slots, Q from zero with a unit pulse of one input at one node.
-    """
+def transition(plan: Plan) -> Array:
+    """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first)."""
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
-    one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
-
-    def step(system: System, batch: Shape, v: Array, y: Array) -> Array:
-        out = advance(one._replace(system=system, batch=batch), v, y, carried=True)
-        last_y = out.y[-1]
-        return np.concatenate([out.slot.reshape(n_v, *batch), last_y.reshape(n_y, *batch)])
-
     unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(plan.batch)), (n, n, *plan.batch))
     v, y = (
         unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch),
         unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch),
     )
-    p = step(plan.system.without_inputs(), (n, *plan.batch), v, y)
+    return _one_step(plan._replace(system=plan.system.without_inputs(), batch=(n, *plan.batch)), v, y)
 
+
+def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
+    """Q of shape (nodes, inputs, n, *batch), from one step from rest with a unit pulse of one input at one node."""
     from fractions import Fraction  # only this form needs it
 
-    inputs = plan.system.inputs()
     grid = lcm(*(Fraction(c).limit_denominator(1000).denominator for c in plan.method.nodes))
-    zero_v, zero_y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
-    q = []
-    for node in plan.method.nodes:
-        for name in inputs:
-            pulse = np.zeros(grid + 1)
-            pulse[round(node * grid)] = 1.0
-            q.append(step(plan.system.with_pulse(name, pulse, plan.dt / grid), plan.batch, zero_v, zero_y))
-    return p, np.stack(q) if q else np.zeros((0, n, *plan.batch)), list(inputs.values())
+    v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    inputs = list(inputs)
+    q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
+    for i, node in enumerate(plan.method.nodes):
+        pulse = np.zeros(grid + 1)
+        pulse[round(node * grid)] = 1.0
+        for j, name in enumerate(inputs):
+            q[i, j] = _one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)), v, y)
+    return q
+
+
+def _one_step(plan: Plan, v: Array, y: Array) -> Array:
+    """The slots after one step at t = 0, as rows: those of v, then those of y."""
+    one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
+    out = advance(one, v, y, carried=True)
+    n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
+    return np.concatenate([out.slot.reshape(n_v, *plan.batch), out.y[-1].reshape(n_y, *plan.batch)])
 
 
 def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
-    p, q, signals = transition(plan)
+    given = plan.system.given_inputs()
+    p, q = transition(plan), pulses(plan, given)
+    q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
     slot = v if carried else _start(plan, v, y)
     n_v, n_y = v.size // max(1, prod(plan.batch)), y.size // max(1, prod(plan.batch))
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
 
     if plan.backend == "numpy":
-        linear = reference.linear_step(p, q, signals, plan.method.nodes, plan.dt)
+        linear = reference.linear_step(p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt)
 
         def step(t: float, v: Array, y: Array) -> Blocks:
             s = linear(t, np.concatenate([v, y]))
@@ -220,19 +224,15 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
     else:
         maps = [rows(a.reshape((a.shape[0] * a.shape[1], *plan.batch)), plan.batch) for a in (p, q)]
         parameters = Parameters(size=n_v + n_y, rows=maps)
-        for given in _given_inputs(plan.system):
-            if isinstance(given, Sampled):
+        for each in given.values():
+            if isinstance(each, Sampled):
                 parameters.options.append("held")
-                parameters.tables.append(table(given, plan.batch))
+                parameters.tables.append(table(each, plan.batch))
             else:
                 parameters.options.append("sine")
-                parameters.rows += [row(a, plan.batch) for a in (given.amplitude, given.omega, given.phase)]
+                parameters.rows += [row(a, plan.batch) for a in (each.amplitude, each.omega, each.phase)]
         spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
         out = _rust(plan, spec, flat_v, flat_y, before, carried=True, carries=False)
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
     shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
     return _finished(plan, flat_v.reshape(blocks[0]), shaped, first_bad)
-
-
-def _given_inputs(system: System) -> list[Input]:
-    return [given for given in (getattr(system, "x", None), getattr(system, "a", None)) if given is not None]

@@ -5,12 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from math import prod
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from .._checks import Array, Shape
-from ..reference.types import Scaled, Signal
+from ..reference.types import Scaled
+
+if TYPE_CHECKING:
+    from .inputs import Input
 
 
 class Parameters:
@@ -43,6 +46,7 @@ class System(ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
+        input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
     """
 
@@ -53,6 +57,7 @@ class System(ABC):
     v_shape: Shape = ()
     y_shape: Shape = ()
     velocity_term: str | None = None
+    input_names: tuple[str, ...] = ()
     batch: Shape = ()
 
     @abstractmethod
@@ -70,10 +75,10 @@ class System(ABC):
     def check_time(self, last: float) -> None:  # noqa: B027 (most systems do not care for the time)
         """Raise if the system's inputs make no sense up to a time."""
 
-    # What the transition-matrix form asks of a linear system.
+    # What the transition-matrix form and the analysis ask of a linear system.
 
-    def inputs(self) -> dict[str, Signal]:
-        """Its inputs by name, as reference signals."""
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs that it was given, by name."""
         return {}
 
     def without_inputs(self) -> System:

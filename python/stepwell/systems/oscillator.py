@@ -9,7 +9,6 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..reference.systems import oscillator as reference
-from ..reference.types import Signal
 from .base import Parameters, System, row
 from .inputs import Input, Sampled, Sinusoid, as_input, table
 
@@ -33,6 +32,7 @@ class Oscillator(System):
 
     kernel = "oscillator"
     linear = True
+    input_names = ("x", "a")
 
     def __init__(self, omega: Any = 1.0, damping: Any = None, *, x: Any = None, a: Any = None, form: str = "canonical") -> None:
         self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
@@ -44,7 +44,7 @@ class Oscillator(System):
         self.batch = _checks.batch_shape(
             {"omega": self.omega.shape}
             | ({} if self.damping is None else {"damping": self.damping.shape})
-            | {name: given.batch for name, given in self._inputs().items()}
+            | {name: given.batch for name, given in self.given_inputs().items()}
         )
 
     def __repr__(self) -> str:
@@ -52,7 +52,8 @@ class Oscillator(System):
         parts = [f"{k}={_short(v)}" for k, v in given.items() if v is not None]
         return f"Oscillator({', '.join([*parts, f'form={self.form!r}'])})"
 
-    def _inputs(self) -> dict[str, Input]:
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs that it was given, by name."""
         return {name: given for name, given in (("x", self.x), ("a", self.a)) if given is not None}
 
     def scaled(self, h: float, batch: Shape) -> reference.Oscillator:
@@ -87,13 +88,9 @@ class Oscillator(System):
 
     def check_time(self, last: float) -> None:
         """Raise if a sinusoid's angle leaves the range of the sine by a time."""
-        for given in self._inputs().values():
+        for given in self.given_inputs().values():
             if isinstance(given, Sinusoid):
                 given.check(last)
-
-    def inputs(self) -> dict[str, Signal]:
-        """Its inputs by name, as reference signals."""
-        return {name: given.signal() for name, given in self._inputs().items()}
 
     def without_inputs(self) -> Oscillator:
         """The same oscillator, left to itself."""
