@@ -1,7 +1,8 @@
 """Simple integration algorithms at the machine's speed.
 
 ``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
-there is to know of a method, ``scenes`` and ``charts`` show what each method costs, how wrong it is and where it blows up.
+there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system; ``scenes`` and
+``charts`` show what each method costs, how wrong it is and where it blows up.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from .systems import Chain, NBody, Oscillator, Sampled, Sinusoid, System
 from .world import World
 
 if TYPE_CHECKING:
-    from . import charts, scenes
+    from . import charts, scenes, stability
+    from .stability import analyse, criteria, stability_limit
 
 __version__: str = _core.__version__
 
@@ -34,7 +36,9 @@ __all__ = [
     "StepwellError",
     "System",
     "World",
+    "analyse",
     "charts",
+    "criteria",
     "errors",
     "integrate",
     "isa",
@@ -42,6 +46,8 @@ __all__ = [
     "method",
     "methods",
     "scenes",
+    "stability",
+    "stability_limit",
 ]
 
 
@@ -55,10 +61,22 @@ def isa_levels() -> list[str]:
     return _core.isa_levels()
 
 
-def __getattr__(name: str) -> Any:
-    # Scenes and charts are imported when they are first used, so that importing stepwell stays quick.
-    if name in ("charts", "scenes"):
-        import importlib
+#: What is imported when it is first used, so that importing stepwell stays quick, and where it is.
+_LATER = {
+    "charts": "charts",
+    "scenes": "scenes",
+    "stability": "stability",
+    "analyse": "stability.analyse",
+    "criteria": "stability.criteria",
+    "stability_limit": "stability.stability_limit",
+}
 
-        return importlib.import_module(f"stepwell.{name}")
-    raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+    import importlib
+
+    module, _, attribute = _LATER[name].partition(".")
+    found = importlib.import_module(f"stepwell.{module}")
+    return getattr(found, attribute) if attribute else found

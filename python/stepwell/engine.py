@@ -176,7 +176,7 @@ def transition(plan: Plan) -> Array:
         unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch),
         unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch),
     )
-    return _one_step(plan._replace(system=plan.system.without_inputs(), batch=(n, *plan.batch)), v, y)
+    return one_step(plan._replace(system=plan.system.without_inputs(), batch=(n, *plan.batch)), v, y)
 
 
 def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
@@ -184,7 +184,6 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     from fractions import Fraction  # only this form needs it
 
     grid = lcm(*(Fraction(c).limit_denominator(1000).denominator for c in plan.method.nodes))
-    v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
     inputs = list(inputs)
     q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
@@ -192,12 +191,14 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
         pulse = np.zeros(grid + 1)
         pulse[round(node * grid)] = 1.0
         for j, name in enumerate(inputs):
-            q[i, j] = _one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)), v, y)
+            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)))
     return q
 
 
-def _one_step(plan: Plan, v: Array, y: Array) -> Array:
-    """The slots after one step at t = 0, as rows: those of v, then those of y."""
+def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Array:
+    """The slots after one step at t = 0, from rest if not from ``v`` and ``y``, as rows: those of v, then those of y."""
+    if v is None or y is None:
+        v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
     one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
     out = advance(one, v, y, carried=True)
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))

@@ -1,0 +1,29 @@
+"""Stability in the z-plane (§4): what one step does to a state, told by the eigenvalues of its transition matrix.
+
+``maps`` finds the matrices, ``eigen`` their eigenvalues and modes, ``analysis`` puts them into the document's words, ``limit``
+finds the step at which a mode begins to grow, ``expansion`` makes series in Φ, ``counted`` counts operations, ``criterion``
+answers the document's four criteria for every method.
+"""
+
+from .analysis import KINDS, Analysis, analyse
+from .counted import Operations, operations
+from .criterion import Criteria, Criterion, criteria
+from .expansion import Series, series
+from .limit import Mode, StabilityLimit, StabilityLimits, stability_limit
+
+__all__ = [
+    "KINDS",
+    "Analysis",
+    "Criteria",
+    "Criterion",
+    "Mode",
+    "Operations",
+    "Series",
+    "StabilityLimit",
+    "StabilityLimits",
+    "analyse",
+    "criteria",
+    "operations",
+    "series",
+    "stability_limit",
+]

@@ -1,0 +1,252 @@
+"""``analyse``: a step of any system by any method, in the words of the document's §4."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from ..errors import ArgumentError, DTypeError, ShapeError
+from ..integrate import fits_together
+from ..methods import Method
+from ..methods import method as find_method
+from ..result import Run
+from ..systems import System
+from . import eigen, maps
+from .eigen import Complex
+
+#: What a sequence of samples does (§4), by the eigenvalue that decides. A single negative eigenvalue, which the document does not
+#: name, changes its sign at every step: an oscillation of two samples per period.
+KINDS = (
+    "monotonic stable",
+    "constant",
+    "monotonic unstable",
+    "damped oscillation",
+    "harmonic",
+    "unstable oscillation",
+    "monotonic unstable (double eigenvalue +1)",
+    "unstable oscillation (double eigenvalue -1)",
+    "unstable oscillation (double pair)",
+    "not finite",
+)
+
+
+class Analysis:
+    """What one step does to a state. ``members`` is the shape to which dt, the parameters and the states broadcast.
+
+    Attributes:
+        system: what is stepped.
+        method: how.
+        dt: the step, in units of time, of shape ``members``.
+        P: transition matrix, shape (n, n, *members): rows and columns are the slots.
+        Q: input matrix of a linear system, shape (n, inputs, *members): what a step makes, from rest, of an input of 1
+            that is held over the step.
+        slots: names of the n numbers that a step maps; ``y_prev`` in the place of ``v`` for Verlet.
+        inputs: names of the inputs.
+        polynomial: coefficients of det(Iz − P), highest power first, shape (n + 1, *members).
+        p: half the trace of P, for two states; the polynomial is z² − 2pz + q. None for other numbers of states.
+        q: the determinant of P, for two states, and r₁² of a conjugate pair; else None.
+        eigenvalues: of P, shape (n, *members): the largest first, of equal ones the fastest first.
+        rates: for each eigenvalue of P the eigenvalue λ of the rates whose mode it continues; e^(λ·dt) would be exact.
+        radius: r₁, the largest magnitude of an eigenvalue.
+        angle: Ψ in 0 … π, the angle per step of that eigenvalue, by atan2.
+        true_angle: Φ, the angle per step of the same mode of the exact solution: ω₀·dt for the undamped oscillator.
+        omega: Ω₀ = Ψ/dt, the frequency of the numerical solution, in radians per unit of time.
+        frequency_ratio: Ψ/Φ; NaN where the exact solution does not oscillate.
+        samples_per_period: 2π/Ψ; infinite where nothing oscillates.
+        kind: one of ``KINDS``, the document's words for what the samples do.
+        stable: whether the samples stay bounded.
+    """
+
+    def __init__(self, system: System, method: Method, dt: Array, P: Array, Q: Array, A: Array, finish: Array) -> None:
+        self.system = system
+        self.method = method
+        n, members = len(P), P.shape[2:]
+        self.dt = _plain(np.broadcast_to(dt, members))
+        self.P = P
+        self.Q = Q
+        self.slots = _names(method.carry or "v", system.v_shape) + _names("y", system.y_shape)
+        self.inputs = system.input_names
+        A = np.broadcast_to(A.reshape(n, n, *(1,) * (len(members) - A.ndim + 2), *A.shape[2:]), P.shape)
+        if n <= 2:
+            z, exact = eigen.eigenvalues(P), eigen.eigenvalues(A)
+            single_vector = (z[0] == z[-1]) & ((P[0, -1] != 0) | (P[-1, 0] != 0)) & (n == 2)
+            single_vector = np.broadcast_to(single_vector, z.shape)
+        else:
+            z, vectors = eigen.eigen(P)
+            exact, exact_vectors = eigen.eigen(A)
+            states = np.einsum("ij...,jk...->ik...", finish, vectors)
+            exact = eigen.matched(z, states / np.sqrt((np.abs(states) ** 2).sum(axis=0)), exact, exact_vectors)
+            z, single_vector = eigen.settled(z, vectors)
+        by_size = eigen.order(z, single_vector)
+        z, exact, single_vector = (np.take_along_axis(a, by_size, axis=0) for a in (z, exact, single_vector))
+        self.polynomial = _polynomial(P, z)
+        self.p: Any = _plain(0.5 * (P[0, 0] + P[1, 1])) if n == 2 else None
+        self.q: Any = _plain(P[0, 0] * P[1, 1] - P[0, 1] * P[1, 0]) if n == 2 else None
+        self.eigenvalues = z
+        self.rates = exact
+        self.radius = _plain(np.abs(z[0]))
+        self.angle = _plain(np.abs(np.angle(z[0])))
+        self.true_angle = _plain(np.abs(exact[0].imag) * self.dt)
+        kind = _kind(z[0], single_vector[0], eigen.tolerance(P))
+        self.kind: Any = np.array(KINDS)[kind] if members else KINDS[int(kind)]
+        self.stable = _plain(np.isin(kind, (0, 1, 3, 4)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.omega = self.angle / self.dt
+            self.frequency_ratio = _plain(np.where(self.true_angle > 0, self.angle / np.asarray(self.true_angle), np.nan))
+            self.samples_per_period = _plain(np.asarray(2.0 * np.pi / np.asarray(self.angle)))
+
+    @property
+    def radii(self) -> Array:
+        """The magnitude of each eigenvalue, shape (n, *members)."""
+        return np.abs(self.eigenvalues)
+
+    @property
+    def angles(self) -> Array:
+        """The angle of each eigenvalue in 0 … π, shape (n, *members)."""
+        return np.abs(np.angle(self.eigenvalues))
+
+    @property
+    def frequency_ratios(self) -> Array:
+        """Ψ/Φ of each mode, shape (n, *members); NaN where the exact solution does not oscillate."""
+        true = np.abs(self.rates.imag) * self.dt
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(true > 0, self.angles / true, np.nan)
+
+    @property
+    def monodromy(self) -> Array:
+        """The product of P along the first axis of the members, the last step leftmost, shape (n, n, *other members).
+
+        Along a run of which every step was kept it is the derivative of its end with respect to its start. Its
+        eigenvalues decide on the stability of a periodic orbit; those of the single steps do not.
+        """
+        if self.P.ndim < 3:
+            raise ArgumentError("monodromy: expected an analysis along a run, got that of a single step")
+        product = self.P[:, :, 0]
+        for k in range(1, self.P.shape[2]):
+            product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
+        return product
+
+    def __repr__(self) -> str:
+        head = f"<analysis of {self.system!r} by {self.method.name}: "
+        if self.P.ndim > 2:
+            stable = np.asarray(self.stable)
+            return f"{head}{np.count_nonzero(stable)} of {stable.size} stable>"
+        angle = f"Ψ = {self.angle:.6g}, Ψ/Φ = {self.frequency_ratio:.6g}"
+        return f"{head}dt = {self.dt:g}, r₁ = {self.radius:.9g}, {angle}, {self.kind}>"
+
+
+def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0) -> Analysis:
+    """The transition matrix of a step, its eigenvalues, and what they say (§4).
+
+    P of a linear system comes from stepping unit vectors; of any other from the exact derivative of a step at a state,
+    which is then what the method does to a small disturbance of it. Verlet is analysed through its two positions.
+
+    Args:
+        system: what is stepped; its parameters may be arrays.
+        method: its name, or what ``stepwell.method`` returns.
+        dt: the step, in units of time, above zero; an array broadcasts with the parameters. Left out for a run, it is the run's.
+        at: the state at which a system that is not linear is looked at: a pair ``(v, y)`` of shapes (*block, *batch), or a
+            ``Run``, whose kept states then are the first axis of the members.
+        t: the time at which it is looked at; a run has its own.
+
+    Returns:
+        An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system.
+    """
+    if not isinstance(system, System):
+        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
+    how = find_method(method)
+    fits_together(system, how)
+    if dt is None and isinstance(at, Run):
+        dt = at.dt
+    if dt is None:
+        raise ArgumentError("dt: expected the step, in units of time, got None")
+    step = _checks.numbers("dt", dt, positive=True, unit="units of time")
+    members = _checks.batch_shape({"dt": step.shape, "system": system.batch})
+    n = sum(maps.size(system))
+    if at is None:
+        if not system.linear:
+            raise ArgumentError(
+                f"at: {system!r} is not linear, so its transition matrix depends on the state; give at=(v, y), or a run"
+            )
+        return Analysis(
+            system,
+            how,
+            step,
+            np.broadcast_to(maps.transition(system, how, step), (n, n, *members)),
+            maps.response(system, how, step, members),
+            maps.rates(system),
+            maps.finish(system, how, step, members),
+        )
+    if isinstance(at, Run):
+        return _along(system, how, step, at)
+    v, y = state("at", system, at)
+    P = maps.jacobian(system, how, step, _checks.number("t", t), v, y)
+    none = np.zeros((n, 0, *P.shape[2:]))
+    Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])
+    return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:]))
+
+
+def state(argument: str, system: System, at: Any) -> tuple[Array, Array]:
+    """A state from what users give."""
+    if not isinstance(at, (tuple, list)) or len(at) != 2:
+        raise DTypeError(f"{argument}: expected a pair (v, y) or a run, got {type(at).__name__}")
+    v = _checks.block(f"{argument}[0], v", at[0], system.v_shape, system.axes)
+    y = _checks.block(f"{argument}[1], y", at[1], system.y_shape, system.axes)
+    return v, y
+
+
+def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
+    """The kept states of a run, one after the other."""
+    expected = (*system.v_shape, *run.status.shape)
+    if run.v.shape[1:] != expected:
+        raise ShapeError(f"at: expected a run of {system!r}, states of v of shape {expected}, got {run.v.shape[1:]}")
+    matrices, exact = [], []
+    for t, v, y in zip(run.t.tolist(), run.v, run.y, strict=True):
+        matrices.append(maps.jacobian(system, method, dt, t, v, y))
+        exact.append(maps.rates(system, t, v, y))
+    P, A = np.stack(matrices, axis=2), np.stack(exact, axis=2)
+    finish = maps.finish(system, method, dt, P.shape[3:])[:, :, np.newaxis]
+    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, np.broadcast_to(finish, P.shape))
+
+
+def _polynomial(P: Array, z: Complex) -> Array:
+    """Coefficients of det(Iz − P), highest power first: exact from the elements for two states, else from the eigenvalues."""
+    n = len(P)
+    coefficients = np.zeros((n + 1, *P.shape[2:]), dtype=np.complex128)
+    coefficients[0] = 1.0
+    if n == 2:
+        coefficients[1] = -(P[0, 0] + P[1, 1])
+        coefficients[2] = P[0, 0] * P[1, 1] - P[0, 1] * P[1, 0]
+    else:
+        for k in range(n):
+            coefficients[1 : k + 2] -= z[k] * coefficients[: k + 1].copy()
+    return np.ascontiguousarray(coefficients.real)
+
+
+def _kind(z: Complex, single_vector: Any, tolerance: Array) -> Any:
+    """Which of ``KINDS`` the eigenvalue makes."""
+    with np.errstate(invalid="ignore"):
+        beyond = np.abs(z) - 1.0
+        size = np.where(np.abs(beyond) <= tolerance, 1, np.where(beyond > 0.0, 2, 0))
+        oscillates = (z.imag != 0.0) | (z.real < 0.0)
+    double = single_vector & (size == 1)
+    kind = np.where(oscillates, 3 + size, size)
+    kind = np.where(double & (z.imag != 0.0), 8, np.where(double & (z.real < 0.0), 7, np.where(double, 6, kind)))
+    return np.where(np.isfinite(z), kind, 9)
+
+
+def _names(block: str, shape: Shape) -> list[str]:
+    """The names of a block's numbers."""
+    return [block + (str(list(map(int, index))) if index else "") for index in np.ndindex(shape)]
+
+
+def _plain(array: Any) -> Any:
+    """A number for one member, an array for several."""
+    return np.asarray(array)[()]

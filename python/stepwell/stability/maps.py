@@ -1,0 +1,138 @@
+"""One step as a linear map: the transition matrix of a step, the matrix of the rates, and the map from slots to states.
+
+A matrix is of shape (n, n, *members): rows and columns are the numbers of a member's v block, then those of its y block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import engine
+from .._checks import Array, Shape
+from ..methods import Method
+from ..reference.types import Blocks
+from ..systems import System
+
+#: The imaginary part that stands for an infinitesimal. Its square is below the smallest number, so derivatives by the complex
+#: step, f'(x) = Im f(x + iε)/ε, have no truncation error.
+TINY = 1e-200
+
+
+def size(system: System) -> tuple[int, int]:
+    """How many numbers stand in each block."""
+    return prod(system.v_shape), prod(system.y_shape)
+
+
+def transition(system: System, method: Method, dt: Array) -> Array:
+    """P of a linear system, of shape (n, n, *members): what a step makes of the unit vectors of the slots.
+
+    A single step length goes through the core. Different ones go through the reference at once, which equals the core to the
+    last bit.
+    """
+    free = system.without_inputs()
+    if dt.ndim == 0:
+        return engine.transition(engine.Plan(free, method, free.batch, float(dt)))
+    members = np.broadcast_shapes(dt.shape, free.batch)
+    return _rows(free, *_step(free, method, dt, (sum(size(free)), *members), *_unit(free, members)))
+
+
+def response(system: System, method: Method, dt: Array, members: Shape) -> Array:
+    """Q of a linear system, of shape (n, inputs, *members): what a step makes, from rest, of an input held at 1."""
+    n = sum(size(system))
+    q = np.zeros((n, len(system.input_names), *members))
+    for j, name in enumerate(system.input_names):
+        held = system.with_pulse(name, np.ones(1), 1.0)
+        if dt.ndim == 0:
+            q[:, j] = engine.one_step(engine.Plan(held, method, held.batch, float(dt)))
+        else:
+            v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))
+            q[:, j] = _rows(system, *_step(held, method, dt, (1, *members), v, y))[:, 0]
+    return q
+
+
+def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
+    """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots."""
+    members = _members(system, dt, v, y)
+    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y) if method.carry else v
+    s: Any = _scaled(system, dt, (sum(size(system)), *members))
+    h: Any = float(dt) if dt.ndim == 0 else dt
+    return _derivative(system, members, slot, y, lambda v, y: method.steps.step(s, t, h, v, y))
+
+
+def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | None = None) -> Array:
+    """The matrix of the rates: A of a linear system, and otherwise their derivative at a state."""
+
+    def both(v: Array, y: Array) -> Blocks:
+        s = _scaled(system, np.asarray(1.0), (sum(size(system)), *members))
+        return s.dv(t, v, y), s.dy(t, v, y)
+
+    if v is None or y is None:
+        system = system.without_inputs()
+        members = system.batch
+        return _rows(system, *both(*_unit(system, members)))
+    members = _members(system, np.asarray(1.0), v, y)
+    return _derivative(system, members, v, y, both)
+
+
+def finish(system: System, method: Method, dt: Array, members: Shape) -> Array:
+    """The linear map from slots to states: the identity for a method that carries v.
+
+    What it adds for the present forces (½h·a for Verlet) is that of a linear system; others are given its part that does not
+    depend on them, which is what tells modes apart.
+    """
+    n = sum(size(system))
+    if not method.carry:
+        return np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
+    free = system.without_inputs() if system.linear else system
+    slot, y = _unit(free, members)
+    choice = 0 if system.linear else len(method.starts) - 1
+    v = method.steps.finish(_scaled(free, dt, (n, *members)), choice, 0.0, slot, y)
+    return _rows(system, v, y)
+
+
+def _unit(system: System, members: Shape) -> tuple[Array, Array]:
+    """Both blocks of every unit vector, one vector for each number, along the axis after the blocks'."""
+    n_v, n_y = size(system)
+    n = n_v + n_y
+    unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
+    return unit[:n_v].reshape(*system.v_shape, n, *members), unit[n_v:].reshape(*system.y_shape, n, *members)
+
+
+def _rows(system: System, v: Array, y: Array) -> Array:
+    """Both blocks as rows of a matrix whose columns are the axis after the blocks'."""
+    n_v, n_y = size(system)
+    rest = v.shape[len(system.v_shape) :] if n_v else y.shape[len(system.y_shape) :]
+    return np.concatenate([np.broadcast_to(v, (*system.v_shape, *rest)).reshape(n_v, *rest), y.reshape(n_y, *rest)])
+
+
+def _scaled(system: System, dt: Array, batch: Shape) -> Any:
+    return system.scaled(float(dt) if dt.ndim == 0 else dt, batch)  # type: ignore[arg-type]
+
+
+def _step(system: System, method: Method, dt: Array, batch: Shape, v: Array, y: Array) -> Blocks:
+    """A step of a linear system. Time stands still: what is given for an input is held."""
+    with np.errstate(all="ignore"):
+        return method.steps.step(_scaled(system, dt, batch), 0.0, 0.0, v, y)
+
+
+def _members(system: System, dt: Array, v: Array, y: Array) -> Shape:
+    return np.broadcast_shapes(dt.shape, system.batch, v.shape[len(system.v_shape) :], y.shape[len(system.y_shape) :])
+
+
+def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[[Any, Any], Blocks]) -> Array:
+    """The derivative of a function of both blocks by the complex step, in the direction of each number of a state."""
+    n = sum(size(system))
+
+    def seeded(block: Array, shape: Shape, unit: Array) -> Any:
+        own = block.shape[len(shape) :]
+        aligned = block.reshape(*shape, 1, *(1,) * (len(members) - len(own)), *own)
+        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * TINY * unit
+
+    unit_v, unit_y = _unit(system, members)
+    with np.errstate(all="ignore"):
+        found = _rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
+    return np.asarray(found.imag / TINY)

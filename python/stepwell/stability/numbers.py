@@ -1,0 +1,118 @@
+"""Numbers that are not numbers: run a reference step on them and it says what it does.
+
+``Counting`` counts the operations, ``Polynomial`` carries an unknown exactly. Both live in NumPy arrays of objects, whose
+operations are those of their elements, so the reference needs no change for them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+
+class Counting:
+    """A number that counts what is done to it, in ``tally``, which its results share. It has no value."""
+
+    __slots__ = ("tally",)
+
+    def __init__(self, tally: Counter[str]) -> None:
+        self.tally = tally
+
+    def _count(self, operation: str, other: object = 0.0) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # each of its elements then comes here by itself
+        self.tally[operation] += 1
+        return self
+
+    def __add__(self, other: object) -> Any:
+        return self._count("additions", other)
+
+    def __mul__(self, other: object) -> Any:
+        return self._count("multiplications", other)
+
+    def __truediv__(self, other: object) -> Any:
+        return self._count("divisions", other)
+
+    def __neg__(self) -> Any:
+        return self._count("negations")
+
+    def sqrt(self) -> Any:
+        """NumPy calls this for the square root of an object."""
+        return self._count("square_roots")
+
+    __radd__ = __sub__ = __rsub__ = __add__
+    __rmul__ = __mul__
+    __rtruediv__ = __truediv__
+
+
+def exact(value: float | Fraction) -> Fraction:
+    """The fraction that a float stands for: a simple one that rounds to it if there is one (1/6), else the float's own value."""
+    if isinstance(value, Fraction):
+        return value
+    simple = Fraction(value).limit_denominator(100_000)
+    return simple if float(simple) == value else Fraction(value)
+
+
+class Polynomial:
+    """A polynomial with exact coefficients, from the constant on."""
+
+    __slots__ = ("coefficients",)
+
+    def __init__(self, *coefficients: float | Fraction) -> None:
+        kept = [exact(c) for c in coefficients]
+        while kept and not kept[-1]:
+            kept.pop()
+        self.coefficients = tuple(kept)
+
+    def __getitem__(self, power: int) -> Fraction:
+        return self.coefficients[power] if power < len(self.coefficients) else Fraction(0)
+
+    def __add__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        other = _polynomial(other)
+        return Polynomial(*(self[k] + other[k] for k in range(max(len(self.coefficients), len(other.coefficients)))))
+
+    def __mul__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        other = _polynomial(other)
+        product = [Fraction(0)] * max(0, len(self.coefficients) + len(other.coefficients) - 1)
+        for i, a in enumerate(self.coefficients):
+            for j, b in enumerate(other.coefficients):
+                product[i + j] += a * b
+        return Polynomial(*product)
+
+    def __truediv__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        return self * (1 / exact(other))
+
+    def __neg__(self) -> Polynomial:
+        return Polynomial(*(-c for c in self.coefficients))
+
+    def __sub__(self, other: Any) -> Any:
+        return self + (-other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __call__(self, x: Any) -> Any:
+        """Its value, by Horner's rule; exact for a ``Fraction``."""
+        value = x * 0
+        for c in reversed(self.coefficients):
+            value = value * x + (c if isinstance(x, Fraction) else float(c))
+        return value
+
+    def __repr__(self) -> str:
+        return f"Polynomial{tuple(map(str, self.coefficients))}"
+
+
+def _polynomial(value: Any) -> Polynomial:
+    return value if isinstance(value, Polynomial) else Polynomial(value)
