@@ -14,7 +14,8 @@ import numpy as np
 
 from ..methods import Method
 from ..methods import method as find_method
-from ..systems import Oscillator
+from ..systems import Oscillator, System
+from . import maps
 from .numbers import Polynomial
 
 #: Terms that series in Φ² are computed with; the last is lost where one is divided by Φ².
@@ -55,15 +56,21 @@ def series(method: str | Method) -> Series:
     return _series(find_method(method))
 
 
+def polynomials(system: System, method: Method) -> Any:
+    """P of a linear system as exact polynomials in the step, shape (n, n, *members) of ``Polynomial``."""
+    system = system.without_inputs()
+    dt: Any = Polynomial(0, 1)
+    v, y = maps.unit(system, system.batch)
+    exactly: Any = np.frompyfunc(Polynomial, 1, 1)
+    n = sum(maps.size(system))
+    s: Any = system.scaled(dt, (n, *system.batch))
+    blocks = method.steps.step(s, 0.0, 0.0, exactly(v), exactly(y))
+    return maps.rows(system, *(np.asarray(block, dtype=object) for block in blocks))
+
+
 @cache
 def _series(method: Method) -> Series:
-    phi = Polynomial(0, 1)
-    s: Any = Oscillator().scaled(phi, ())  # type: ignore[arg-type]
-    columns: list[list[Any]] = []
-    for unit in ((1, 0), (0, 1)):
-        v, y = (np.array(Polynomial(u), dtype=object) for u in unit)
-        columns.append([np.asarray(block).item() for block in method.steps.step(s, 0.0, 0.0, v, y)])
-    (a, c), (b, d) = columns
+    (a, b), (c, d) = polynomials(Oscillator(), method)
     p, q = (a + d) / 2, a * d - b * c
     return Series(p, q, _ratio(p, q))
 

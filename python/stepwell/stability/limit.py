@@ -22,9 +22,12 @@ from ..systems import System
 from . import eigen, maps
 from .analysis import state
 from .eigen import Complex
+from .expansion import polynomials
 
-#: The ladder of steps, as multiples of the fastest rate: far below any limit, and beyond that of a method of a hundred stages.
-LADDER = np.geomspace(1e-2, 1e2, 466)
+#: The ladder of steps, as multiples of the fastest rate: from where the limits of light damping are (2D by Standard Euler) to
+#: beyond the limit of a method of a hundred stages. It is fine from FINE on, where methods have limits of their own.
+FINE, RUNG = 1e-2, 1.02
+LADDER = np.concatenate([np.geomspace(1e-6, FINE, 97)[:-1], FINE * RUNG ** np.arange(466)])
 
 #: Rungs that are looked at at once.
 RUNGS = 64
@@ -36,6 +39,10 @@ ZERO = 1e-6
 #: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there and shows first with a small exponent
 #: (Standard Heun: 4); a mode that begins to grow at a limit shows within a rung with a large one.
 EXPONENT = 20.0
+
+#: An eigenvalue whose magnitude changes by less than this for a relative change of the step is solved for exactly: rounding of
+#: some eps would move its crossing by more than a hundred eps.
+FLAT = 0.03
 
 #: The mode that leaves is looked at this much past its limit; one that is never stable, at this multiple of the fastest rate.
 PAST, NEVER = 1e-4, 0.1
@@ -97,7 +104,8 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     Stable means that what should not grow does not: every eigenvalue of the transition matrix stays in or on the unit circle for
     all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
     linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
-    neither is a system that grows by itself.
+    neither is a system that grows by itself. Limits are exact to some 1e-15; damping of less than a millionth of critical
+    damping counts as none.
 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: they add to the samples what stays bounded.
@@ -148,11 +156,12 @@ class _Search:
 
     def matrix(self, dt: Array) -> Array:
         """P for steps of shape (…, *members)."""
+        steps = dt[np.newaxis]  # an array of steps goes through the reference, which serves all at once
         if self.v is None or self.y is None:
-            P = maps.transition(self.system, self.method, dt)
+            P = maps.transition(self.system, self.method, steps)
         else:
-            P = maps.jacobian(self.system, self.method, dt, self.t, self.v, self.y)
-        return np.broadcast_to(P, (*P.shape[:2], *dt.shape))
+            P = maps.jacobian(self.system, self.method, steps, self.t, self.v, self.y)
+        return P[:, :, 0]
 
     def eigenvalues(self, P: Array) -> Complex:
         """The eigenvalues that count, the others NaN."""
@@ -191,10 +200,12 @@ class _Search:
         found = first < len(LADDER)
         high = LADDER[np.minimum(first, len(LADDER) - 1)] / fastest
         low = LADDER[np.maximum(np.minimum(first, len(LADDER) - 1) - 1, 0)] / fastest
-        next_up = self.growth(high * (LADDER[1] / LADDER[0]))[0]
+        next_up = self.growth(high * RUNG)[0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = np.log(next_up / after) / np.log(LADDER[1] / LADDER[0])
-        never = self.grows_by_itself | (found & ((first == 0) | ((before == 0.0) & (exponent < EXPONENT))))
+            exponent = np.log(next_up / after) / np.log(RUNG)
+        # On the coarse rungs only what is damped before can begin to grow.
+        from_the_start = (exponent < EXPONENT) | (LADDER[np.minimum(first, len(LADDER) - 1)] <= FINE)
+        never = self.grows_by_itself | (found & ((first == 0) | ((before == 0.0) & from_the_start)))
         seek = found & ~never
         if seek.any():
             low, high = self.bisected(np.where(seek, low, 0.5 * high), high)
@@ -229,6 +240,7 @@ class _Search:
 
         a, b = high * (1.0 - 1e-5), high * (1.0 + 1e-5)
         below, above = beyond(a), beyond(b)
+        slope = (above - below) / (b - a) * high
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = -below / above
         # At an angle: about as far inside below as outside above. After a collision: on the circle below, or far from it.
@@ -243,7 +255,27 @@ class _Search:
             b, above = np.where(inside, b, c), np.where(inside, above, value)
             if not at_an_angle.any():
                 break
-        return np.where(at_an_angle, c, high)
+        flat = seek & (np.abs(slope) < FLAT)
+        return self.exactly(np.where(at_an_angle, c, high), flat)
+
+    def exactly(self, limits: Array, flat: Any) -> Array:
+        """The limits of two states that leave the circle at so flat an angle that rounding moves them.
+
+        Of z² − 2pz + q, whose p and q are exact polynomials in dt, a pair is on the circle where q = 1, and a single eigenvalue
+        where 1 + q ∓ 2p = 0. Newton's steps from the crossing found go to the nearest of these.
+        """
+        if len(self.rates) != 2 or self.v is not None or not flat.any():
+            return limits
+        (a, b), (c, d) = polynomials(self.system, self.method)
+        twice_p, q = (np.asarray(f, dtype=object) for f in (a + d, a * d - b * c))
+        found = np.array(limits)
+        for index in np.argwhere(flat).tolist():
+            at = tuple(index)
+            roots = [q[at] - 1, 1 + q[at] - twice_p[at], 1 + q[at] + twice_p[at]]
+            steps = [f.root_near(float(limits[at])) for f in roots if f.coefficients]
+            nearest = min(steps, key=lambda x: abs(x - limits[at]))
+            found[at] = nearest if abs(nearest / limits[at] - 1.0) < RUNG - 1.0 else limits[at]
+        return found
 
     def modes(self, limits: Array) -> Any:
         """The mode that begins to grow at each limit, of the shape of the members: a ``Mode``, or None."""

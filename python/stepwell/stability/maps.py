@@ -37,7 +37,7 @@ def transition(system: System, method: Method, dt: Array) -> Array:
     if dt.ndim == 0:
         return engine.transition(engine.Plan(free, method, free.batch, float(dt)))
     members = np.broadcast_shapes(dt.shape, free.batch)
-    return _rows(free, *_step(free, method, dt, (sum(size(free)), *members), *_unit(free, members)))
+    return rows(free, *_step(free, method, dt, (sum(size(free)), *members), *unit(free, members)))
 
 
 def response(system: System, method: Method, dt: Array, members: Shape) -> Array:
@@ -50,7 +50,7 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
             q[:, j] = engine.one_step(engine.Plan(held, method, held.batch, float(dt)))
         else:
             v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))
-            q[:, j] = _rows(system, *_step(held, method, dt, (1, *members), v, y))[:, 0]
+            q[:, j] = rows(system, *_step(held, method, dt, (1, *members), v, y))[:, 0]
     return q
 
 
@@ -73,7 +73,7 @@ def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | Non
     if v is None or y is None:
         system = system.without_inputs()
         members = system.batch
-        return _rows(system, *both(*_unit(system, members)))
+        return rows(system, *both(*unit(system, members)))
     members = _members(system, np.asarray(1.0), v, y)
     return _derivative(system, members, v, y, both)
 
@@ -88,21 +88,21 @@ def finish(system: System, method: Method, dt: Array, members: Shape) -> Array:
     if not method.carry:
         return np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
     free = system.without_inputs() if system.linear else system
-    slot, y = _unit(free, members)
+    slot, y = unit(free, members)
     choice = 0 if system.linear else len(method.starts) - 1
     v = method.steps.finish(_scaled(free, dt, (n, *members)), choice, 0.0, slot, y)
-    return _rows(system, v, y)
+    return rows(system, v, y)
 
 
-def _unit(system: System, members: Shape) -> tuple[Array, Array]:
+def unit(system: System, members: Shape) -> tuple[Array, Array]:
     """Both blocks of every unit vector, one vector for each number, along the axis after the blocks'."""
     n_v, n_y = size(system)
     n = n_v + n_y
-    unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
-    return unit[:n_v].reshape(*system.v_shape, n, *members), unit[n_v:].reshape(*system.y_shape, n, *members)
+    one = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
+    return one[:n_v].reshape(*system.v_shape, n, *members), one[n_v:].reshape(*system.y_shape, n, *members)
 
 
-def _rows(system: System, v: Array, y: Array) -> Array:
+def rows(system: System, v: Array, y: Array) -> Array:
     """Both blocks as rows of a matrix whose columns are the axis after the blocks'."""
     n_v, n_y = size(system)
     rest = v.shape[len(system.v_shape) :] if n_v else y.shape[len(system.y_shape) :]
@@ -127,12 +127,12 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
     """The derivative of a function of both blocks by the complex step, in the direction of each number of a state."""
     n = sum(size(system))
 
-    def seeded(block: Array, shape: Shape, unit: Array) -> Any:
+    def seeded(block: Array, shape: Shape, direction: Array) -> Any:
         own = block.shape[len(shape) :]
         aligned = block.reshape(*shape, 1, *(1,) * (len(members) - len(own)), *own)
-        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * TINY * unit
+        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * TINY * direction
 
-    unit_v, unit_y = _unit(system, members)
+    unit_v, unit_y = unit(system, members)
     with np.errstate(all="ignore"):
-        found = _rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
+        found = rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
     return np.asarray(found.imag / TINY)

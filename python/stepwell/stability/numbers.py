@@ -6,6 +6,7 @@ operations are those of their elements, so the reference needs no change for the
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from fractions import Fraction
 from typing import Any
@@ -109,6 +110,16 @@ class Polynomial:
         for c in reversed(self.coefficients):
             value = value * x + (c if isinstance(x, Fraction) else float(c))
         return value
+
+    def root_near(self, x: float) -> float:
+        """The root to which Newton's steps from ``x`` lead, with values that are exact; infinite if they lead nowhere."""
+        slope = Polynomial(*(k * c for k, c in enumerate(self.coefficients) if k))
+        for _ in range(4):
+            at = Fraction(x)
+            if not slope(at):
+                return math.inf
+            x = float(at - self(at) / slope(at))
+        return x
 
     def __repr__(self) -> str:
         return f"Polynomial{tuple(map(str, self.coefficients))}"
