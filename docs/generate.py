@@ -72,7 +72,58 @@ def asks() -> str:
     )
 
 
-TABLES = {"methods": methods, "names": names, "asks": asks}
+def criteria() -> str:
+    """The undamped oscillator by each method: limits and series."""
+    head = "method", "stable for Φ below", "steps a period, more than", "r₁² − 1", "Ψ/Φ − 1"
+    return table(
+        head,
+        (
+            (
+                c.method.title,
+                f"{c.limit:.10g}" if c.limit else "never stable",
+                f"{c.samples_per_period:.4g}" if c.limit else "—",
+                c.r1_squared,
+                c.deviation,
+            )
+            for c in sw.criteria()
+        ),
+    )
+
+
+def deviations() -> str:
+    """The undamped oscillator by each method, at some angles per step."""
+    found = sw.criteria()
+    head = ["method"]
+    for at in found[0].at:
+        head += [f"r₁² at Φ = {at.phi:g}", f"Ψ/Φ − 1 at {at.phi:g}"]
+    rows = []
+    for c in found:
+        row = [c.method.title]
+        for at in c.at:
+            row += [f"{at.r1_squared:.6f}", f"{100 * at.deviation:+.3g} %"]
+        rows.append(row)
+    return table(head, rows)
+
+
+def operations() -> str:
+    """What a step of the undamped oscillator takes."""
+    head = "method", "additions", "products", "quotients", "roots", "rate evaluations"
+    rows = []
+    for c in sw.criteria():
+        o = c.operations
+        counts = (o.additions, o.multiplications, o.divisions, o.square_roots, o.rate_evaluations)
+        rows.append([c.method.title, *map(str, counts)])
+    return table(head, rows)
+
+
+TABLES = {
+    "methods": methods,
+    "names": names,
+    "asks": asks,
+    "criteria": criteria,
+    "deviations": deviations,
+    "operations": operations,
+}
 
 
 def current(text: str) -> str:

@@ -262,9 +262,11 @@ def test_along_a_run(method: str) -> None:
                 flat = np.concatenate([scene.v.ravel(), scene.y.ravel()])
                 flat[j] += sign * d
                 v, y = flat[:6].reshape(3, 2), flat[6:].reshape(3, 2)
-                moved = sw.integrate(scene.system, method, v=v, y=y, dt=0.05, steps=21)
+                moved = sw.integrate(scene.system, method, v=v, y=y, dt=0.05, steps=20)
                 ends.append(np.concatenate([moved.v[-1].ravel(), moved.y[-1].ravel()]))
             np.testing.assert_allclose(product[:, j], (ends[0] - ends[1]) / (2 * d), rtol=0, atol=1e-7)
+    with pytest.raises(ArgumentError, match="every=1"):
+        _ = sw.analyse(scene.system, method, at=scene.run(method, 0.05, steps=20, every=2)).monodromy
     # Volumes are kept by the methods that exchange blocks (their P is a product of shears).
     if method != "rk4":
         assert np.linalg.det(product) == pytest.approx(1.0, abs=1e-9)

@@ -60,7 +60,10 @@ class Analysis:
         stable: whether the samples stay bounded.
     """
 
-    def __init__(self, system: System, method: Method, dt: Array, P: Array, Q: Array, A: Array, finish: Array) -> None:
+    def __init__(
+        self, system: System, method: Method, dt: Array, P: Array, Q: Array, A: Array, finish: Array, run: Run | None = None
+    ) -> None:
+        self._run = run
         self.system = system
         self.method = method
         n, members = len(P), P.shape[2:]
@@ -117,15 +120,17 @@ class Analysis:
 
     @property
     def monodromy(self) -> Array:
-        """The product of P along the first axis of the members, the last step leftmost, shape (n, n, *other members).
+        """The derivative of a run's end with respect to its start, in slots, shape (n, n, *batch): the product of its steps' P.
 
-        Along a run of which every step was kept it is the derivative of its end with respect to its start. Its
-        eigenvalues decide on the stability of a periodic orbit; those of the single steps do not.
+        For a run of which every step was kept. Its eigenvalues decide on the stability of a periodic orbit; those of
+        single steps do not.
         """
-        if self.P.ndim < 3:
-            raise ArgumentError("monodromy: expected an analysis along a run, got that of a single step")
+        if self._run is None:
+            raise ArgumentError("monodromy: expected an analysis along a run (at=run), got that of single steps")
+        if len(self._run.t) != self._run.steps + 1:
+            raise ArgumentError(f"monodromy: expected a run of which every step was kept (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
-        for k in range(1, self.P.shape[2]):
+        for k in range(1, self._run.steps):  # the last kept state makes no step in the run
             product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
@@ -213,7 +218,7 @@ def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
         exact.append(maps.rates(system, t, v, y))
     P, A = np.stack(matrices, axis=2), np.stack(exact, axis=2)
     finish = maps.finish(system, method, dt, P.shape[3:])[:, :, np.newaxis]
-    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, np.broadcast_to(finish, P.shape))
+    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, np.broadcast_to(finish, P.shape), run)
 
 
 def _polynomial(P: Array, z: Complex) -> Array:
