@@ -25,6 +25,23 @@ def _held(rng: np.random.Generator, b: int) -> sw.Sampled:
     return sw.Sampled(rng.normal(size=(13, b)), interval=0.07, start=-0.1)
 
 
+def _gentle(rng: np.random.Generator, n: int, b: int | None = None) -> Any:
+    """Rates that mostly decay, so that no trajectory of the tests grows by much."""
+    batch = () if b is None else (b,)
+    return rng.normal(0.0, 0.5, (n, n, *batch)) - 1.2 * np.eye(n).reshape(n, n, *(1 for _ in batch))
+
+
+def _masses(rng: np.random.Generator, b: int) -> sw.LinearSystem:
+    """Three masses and springs with the velocities among the coordinates, driven, so that Verlet can step it."""
+    half = rng.normal(0.0, 0.5, (3, 3))
+    A, B = np.zeros((6, 6, b)), np.zeros((6, 1))
+    v, y = [1, 2, 5], [0, 3, 4]
+    A[np.ix_(v, y)] = -(half @ half.T + np.eye(3))[..., None]
+    A[y, v] = rng.uniform(0.5, 2.0, b)
+    B[v, 0] = rng.normal(size=3)
+    return sw.LinearSystem(A, B, x=_sine(rng, b), velocities=v)
+
+
 #: One maker for each kernel variant of each system.
 SYSTEMS: dict[str, Make] = {
     "free": lambda r, b: sw.Oscillator(_omega(r, b)),
@@ -46,6 +63,17 @@ SYSTEMS: dict[str, Make] = {
     "chain of one": lambda r, b: sw.Chain(1, stiffness=r.uniform(0.5, 2.0, (2, b))),
     "chain of five": lambda r, b: sw.Chain(5, stiffness=r.uniform(0.0, 2.0, (6, b)), mass=r.uniform(0.5, 2.0, 5)),
     "chain of nineteen": lambda r, b: sw.Chain(19, mass=r.uniform(0.5, 2.0, (1, b))),
+    "linear, two states": lambda r, b: sw.LinearSystem(_gentle(r, 2)),
+    "linear, five states, two inputs": lambda r, b: sw.LinearSystem(
+        _gentle(r, 5, b), r.normal(size=(5, 3)), x=[_sine(r, b), None, _held(r, b)], velocities=[3, 0]
+    ),
+    "linear, one state, no velocity": lambda r, b: sw.LinearSystem(
+        _gentle(r, 1, b), r.normal(size=(1, 1, b)), x=r.normal(size=b)
+    ),
+    "linear, no velocities": lambda r, b: sw.LinearSystem(_gentle(r, 3), np.ones((3, 1)), x=_held(r, b), velocities=0),
+    "linear, velocities only": lambda r, b: sw.LinearSystem(_gentle(r, 4, b), velocities=4),
+    "linear, masses": _masses,
+    "linear, seventeen states": lambda r, b: sw.LinearSystem(0.5 * _gentle(r, 17), r.normal(size=17), x=_sine(r, b)),
 }
 
 

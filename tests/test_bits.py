@@ -173,6 +173,9 @@ def _member(system: sw.System, i: int) -> sw.System:
         return sw.Oscillator(one(system.omega), one(system.damping), x=one(system.x), a=one(system.a), form=system.form)
     if isinstance(system, sw.NBody):
         return sw.NBody(G=one(system.G))
+    if isinstance(system, sw.LinearSystem):
+        A, B = (a if a is None or a.ndim == 2 else a[..., i] for a in (system.A, system.B))
+        return sw.LinearSystem(A, B, x=None if B is None else [one(x) for x in system.x], velocities=system.velocities)
     assert isinstance(system, sw.Chain)
     k, m = (a[..., i] if a.ndim > 1 and a.shape[-1] > 1 else a for a in (system.stiffness, system.mass))
     return sw.Chain(system.n, stiffness=k, mass=m)

@@ -23,6 +23,10 @@ def world(system: sw.System = FREE, method: str = "false_euler", **options: Any)
     return sw.World(system, method, **({"v": np.zeros(3), "y": np.ones(3), "dt": 0.1} | options))
 
 
+def linear(B: Any = None, C: Any = None, D: Any = None, **options: Any) -> sw.LinearSystem:
+    return sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]], B, C, D, **options)
+
+
 def readonly() -> Any:
     array = np.zeros(3)
     array.flags.writeable = False
@@ -147,6 +151,89 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         E.ShapeError,
         "stiffness: expected 3 springs (or 1) along the first axis, got shape (5,)",
     ),
+    # matrices
+    (lambda: sw.LinearSystem(1.0), E.ShapeError, "A: expected shape (n, n, batch…) with at least one state, got ()"),
+    (
+        lambda: sw.LinearSystem(np.ones((2, 3))),
+        E.ShapeError,
+        "A: expected shape (n, n, batch…) with at least one state, got (2, 3)",
+    ),
+    (
+        lambda: sw.LinearSystem(np.ones((0, 0))),
+        E.ShapeError,
+        "A: expected shape (n, n, batch…) with at least one state, got (0, 0)",
+    ),
+    (lambda: sw.LinearSystem([[np.nan]]), E.NotFiniteError, "A: expected finite numbers, got nan at index (0, 0)"),
+    (lambda: sw.LinearSystem("A"), E.DTypeError, "A: expected real numbers, got 'A'"),
+    (lambda: linear(np.ones((3, 1))), E.ShapeError, "B: expected shape (n = 2, m, batch…), got (3, 1)"),
+    (lambda: linear(np.ones(3)), E.ShapeError, "B: expected shape (n = 2, m, batch…), got (3,)"),
+    (lambda: linear(1.0), E.ShapeError, "B: expected shape (n = 2, m, batch…), got ()"),
+    (lambda: linear(np.ones((2, 0))), E.ShapeError, "B: expected shape (n = 2, m, batch…), got (2, 0)"),
+    (
+        lambda: sw.LinearSystem(np.ones((2, 2, 2)), [1.0, 2.0]),  # a column, or one number for each member?
+        E.ShapeError,
+        "B: expected shape (n = 2, m, batch…), got (2,)",
+    ),
+    (lambda: linear(C=np.ones((1, 3))), E.ShapeError, "C: expected shape (r, n = 2, batch…), got (1, 3)"),
+    (lambda: linear(C=np.ones((0, 2))), E.ShapeError, "C: expected shape (r, n = 2, batch…), got (0, 2)"),
+    (
+        lambda: linear(np.ones((2, 3)), np.ones((4, 2)), np.ones((3, 4))),
+        E.ShapeError,
+        "D: expected shape (r = 4, m = 3, batch…), got (3, 4)",
+    ),
+    (
+        lambda: linear(np.ones((2, 1)), D=1.0),
+        E.ArgumentError,
+        "D: expected C too, without which there are no outputs to add inputs to",
+    ),
+    (lambda: linear(C=np.ones((1, 2)), D=1.0), E.ArgumentError, "D: expected B too, without which there are no inputs"),
+    (lambda: linear(x=1.0), E.ArgumentError, "x: expected B too, without which there are no inputs"),
+    (
+        lambda: linear(np.eye(2), x=1.0),
+        E.ShapeError,
+        "x: expected a sequence of 2 inputs, one for each column of B, got one float",
+    ),
+    (
+        lambda: linear(np.eye(2), x=sw.Sinusoid(1.0, 1.0)),
+        E.ShapeError,
+        "x: expected a sequence of 2 inputs, one for each column of B, got one Sinusoid",
+    ),
+    (
+        lambda: linear(np.eye(2), x=[1.0, 2.0, 3.0]),
+        E.ShapeError,
+        "x: expected a sequence of 2 inputs, one for each column of B, got 3",
+    ),
+    (lambda: linear(np.eye(2), x=[1.0, "wave"]), E.DTypeError, "x[1]: expected real numbers, got 'wave'"),
+    (lambda: linear([1.0, 2.0], x="wave"), E.DTypeError, "x: expected real numbers, got 'wave'"),
+    (lambda: linear(velocities=3), E.ArgumentError, "velocities: expected 0 or more, up to 2, got 3"),
+    (lambda: linear(velocities=-1), E.ArgumentError, "velocities: expected 0 or more, got -1"),
+    (lambda: linear(velocities=1.5), E.DTypeError, "velocities: expected a whole number, got 1.5 (float)"),
+    (lambda: linear(velocities="v"), E.DTypeError, "velocities: expected a whole number, got 'v' (str)"),
+    (lambda: linear(velocities=[0, 2]), E.ArgumentError, "velocities[1]: expected 0 or more, up to 1, got 2"),
+    (lambda: linear(velocities=[-1]), E.ArgumentError, "velocities[0]: expected 0 or more, got -1"),
+    (lambda: linear(velocities=[1, 0, 1]), E.ArgumentError, "velocities: expected distinct states, got 1 twice"),
+    (
+        lambda: sw.LinearSystem(np.ones((2, 2, 3)), np.ones((2, 1, 4)), x=np.ones(5)),
+        E.ShapeError,
+        "these batch shapes do not broadcast to one: A (3,), B (4,), x (5,)",
+    ),
+    (
+        lambda: run(linear(velocities=2), v=np.ones(3)),
+        E.ShapeError,
+        "v: expected shape (2, batch…) = (states, batch…), got (3,)",
+    ),
+    (lambda: linear().split(np.ones(3)), E.ShapeError, "state: expected shape (2, batch…) = (states, batch…), got (3,)"),
+    (lambda: linear().state(np.ones(2), 1.0), E.ShapeError, "v: expected shape (1, batch…) = (states, batch…), got (2,)"),
+    (
+        lambda: run(linear([0.0, 1.0]), "verlet"),
+        E.UnsupportedError,
+        "verlet needs a second-order system, ÿ = a(t, y); LinearSystem(2 states, 1 of them velocities, 1 inputs, 0 outputs) is",
+    ),
+    (
+        lambda: run(sw.LinearSystem([[-1.0, -1.0], [1.0, 0.0]]), "verlet"),
+        E.UnsupportedError,
+        "has velocities in the rows of v; use false_euler, or leave velocities in the rows of v out",
+    ),
     # shapes
     (
         lambda: run(v=np.zeros(3), y=np.zeros(4)),
@@ -264,10 +351,10 @@ def test_the_core_refuses_too() -> None:
     from stepwell import _core
 
     def core(
-        system: str = "oscillator", options: Any = ("canonical",), method: str = "rk4", size: int = 0, **arrays: Any
+        system: str = "oscillator", options: Any = ("canonical",), method: str = "rk4", sizes: Any = (), **arrays: Any
     ) -> None:
         row = arrays.pop("row", np.ones((1, 1)))
-        model = _core.ModelSpec(system, list(options), size, [row], [], method)
+        model = _core.ModelSpec(system, list(options), list(sizes), [row], [], method)
         given = {
             "v": np.zeros((1, 4)),
             "y": np.zeros((1, 1)),
@@ -296,7 +383,16 @@ def test_the_core_refuses_too() -> None:
             {"options": ["canonical", "damped"], "method": "verlet"},
             "verlet needs forces that do not depend on the velocity",
         ),
-        ({"system": "chain", "options": [], "size": 0}, "has no kernel for the options"),
+        ({"system": "chain", "options": [], "sizes": [0]}, "has no kernel for the options"),
+        ({"system": "chain", "options": []}, "has no kernel for the options"),
+        ({"system": "linear", "options": [], "sizes": [0, 0]}, "has no kernel for the options"),
+        ({"system": "linear", "options": ["noise"], "sizes": [0, 1]}, "has no kernel for the options"),
+        ({"system": "linear", "options": ["held"], "sizes": [0, 1]}, "has no kernel for the options"),
+        ({"system": "linear", "options": [], "sizes": [1, 1]}, "parameters: expected 4, got 1"),
+        (
+            {"system": "linear", "options": [], "sizes": [0, 1], "method": "verlet"},
+            "verlet needs forces that do not depend on the velocity, but linear has rates of another kind",
+        ),
         ({"v": np.zeros((2, 4))}, "v: expected 1, got 2"),
         ({"v": np.zeros((1, 3))}, "a row of v: expected 4, got 3"),
         ({"carry": np.zeros(3)}, "carry: expected 4, got 3"),

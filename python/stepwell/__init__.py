@@ -14,7 +14,7 @@ from .errors import DivergenceWarning, StepwellError
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, NBody, Oscillator, Sampled, Sinusoid, System
+from .systems import Chain, LinearSystem, NBody, Oscillator, Sampled, Sinusoid, System
 from .world import World
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ __version__: str = _core.__version__
 __all__ = [
     "Chain",
     "DivergenceWarning",
+    "LinearSystem",
     "Method",
     "NBody",
     "Oscillator",

@@ -15,7 +15,7 @@ class ModelSpec:
         cls,
         system: str,
         options: list[str],
-        size: int,
+        sizes: list[int],
         rows: list[NDArray[np.float64]],
         tables: list[tuple[float, float, NDArray[np.float64]]],
         method: str,

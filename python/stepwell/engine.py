@@ -17,9 +17,9 @@ from ._checks import Array, Shape
 from .methods import Method
 from .reference import run as reference
 from .reference.types import Blocks, Whole
-from .systems import Sampled, System
-from .systems.base import Parameters, row, rows
-from .systems.inputs import table
+from .systems import System
+from .systems.base import Parameters, rows
+from .systems.inputs import add_inputs
 
 Looped = tuple[Array, Array, list[Blocks], Whole]
 
@@ -128,7 +128,7 @@ def _model(plan: Plan) -> _core.ModelSpec:
 def model(kernel: str, p: Parameters, method: Method, matrix: tuple[list[float], int] | None = None) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     tables = [(start, interval, values) for values, interval, start in p.tables]
-    return _core.ModelSpec(kernel, p.options, p.size, p.rows, tables, method.name, matrix)
+    return _core.ModelSpec(kernel, p.options, p.sizes, p.rows, tables, method.name, matrix)
 
 
 def _rust(
@@ -224,14 +224,8 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
         flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, before, (1, 1))
     else:
         maps = [rows(a.reshape((a.shape[0] * a.shape[1], *plan.batch)), plan.batch) for a in (p, q)]
-        parameters = Parameters(size=n_v + n_y, rows=maps)
-        for each in given.values():
-            if isinstance(each, Sampled):
-                parameters.options.append("held")
-                parameters.tables.append(table(each, plan.batch))
-            else:
-                parameters.options.append("sine")
-                parameters.rows += [row(a, plan.batch) for a in (each.amplitude, each.omega, each.phase)]
+        parameters = Parameters(sizes=[n_v + n_y], rows=maps)
+        add_inputs(parameters, given.values(), plan.batch)
         spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
         out = _rust(plan, spec, flat_v, flat_y, before, carried=True, carries=False)
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad

@@ -78,6 +78,17 @@ class Run:
             return self.system.energy(v, y)
 
     @property
+    def z(self) -> Array:
+        """Auxiliary outputs of every kept state, shape (saved, outputs, *batch), computed now; see the system's ``auxiliary``.
+
+        Raises:
+            UnsupportedError: if the system has none.
+        """
+        states = zip(self.t.tolist(), self.v, self.y, strict=True)
+        with np.errstate(all="ignore"):
+            return np.stack([self.system.auxiliary(t, v, y) for t, v, y in states])
+
+    @property
     def resume(self) -> dict[str, Any]:
         """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
 

@@ -21,7 +21,7 @@ pub struct Variant {
     /// The system's name.
     pub system: &'static str,
     options: Vec<&'static str>,
-    size: usize,
+    sizes: Vec<usize>,
     parameters: Vec<f64>,
     /// How many sampled inputs.
     tables: usize,
@@ -58,12 +58,39 @@ fn matrix(size: usize, options: &[&'static str], nodes: &[f64]) -> Variant {
     Variant {
         system: "matrix",
         options: options.to_vec(),
-        size,
+        sizes: vec![size],
         parameters: map.chain(pulses).chain([0.5, 1.1, 0.3].repeat(sines)).collect(),
         tables: options.len() - sines,
         v: vec![0.5; size / 2],
         y: vec![1.0; size - size / 2],
         nodes: nodes.to_vec(),
+    }
+}
+
+/// A chain of `n` masses as a linear system, with one input on each.
+fn linear(n: usize, options: &[&'static str]) -> Variant {
+    let inputs = options.iter().filter(|o| **o != "acceleration");
+    let (m, sines) = (inputs.clone().count(), inputs.filter(|o| **o == "sine").count());
+    let a = |i: usize, j: usize| match (i < n, j < n) {
+        (true, false) => match (j - n).abs_diff(i) {
+            0 => -2.0,
+            1 => 1.0,
+            _ => 0.0,
+        },
+        (false, true) if i - n == j => 1.0,
+        _ => 0.0,
+    };
+    let entries = (0..4 * n * n).map(|place| a(place / (2 * n), place % (2 * n)));
+    let forces = (0..2 * n * m).map(|place| if place / m < n { 0.1 } else { 0.0 });
+    Variant {
+        system: "linear",
+        options: options.to_vec(),
+        sizes: vec![n, n],
+        parameters: entries.chain(forces).chain([0.5, 1.1, 0.3].repeat(sines)).collect(),
+        tables: m - sines,
+        v: vec![0.0; n],
+        y: (0..n).map(|i| 1.0 / (i + 1) as f64).collect(),
+        ..Variant::default()
     }
 }
 
@@ -94,12 +121,17 @@ pub fn variants() -> Vec<Variant> {
     });
     all.extend([4, 32].map(|n| Variant {
         system: "chain",
-        size: n,
+        sizes: vec![n],
         parameters: vec![1.0; 2 * n + 1],
         v: vec![0.0; n],
         y: (0..n).map(|i| 1.0 / (i + 1) as f64).collect(),
         ..Variant::default()
     }));
+    all.push(linear(1, &["acceleration"]));
+    all.push(linear(1, &["sine"]));
+    all.push(linear(2, &["held", "sine"]));
+    all.push(linear(8, &[]));
+    all.push(linear(32, &["acceleration"]));
     all.push(matrix(2, &[], &[0.0]));
     all.push(matrix(2, &["sine"], &[0.0, 1.0]));
     all.push(matrix(2, &["held"], &[0.0, 1.0]));
@@ -120,22 +152,22 @@ pub fn kernels() -> Vec<Kernel> {
 impl Kernel {
     /// System, options and method.
     pub fn name(&self) -> String {
-        let Variant { system, options, size, .. } = &self.variant;
-        let size = (*size > 0).then(|| size.to_string());
-        let parts = [*system].into_iter().chain(options.iter().copied()).chain(size.as_deref());
+        let Variant { system, options, sizes, .. } = &self.variant;
+        let sizes = sizes.iter().map(usize::to_string).collect::<Vec<_>>();
+        let parts = [*system].into_iter().chain(options.iter().copied()).chain(sizes.iter().map(String::as_str));
         let name = parts.collect::<Vec<_>>().join(" ");
         if self.method.is_empty() { name } else { format!("{name}/{}", self.method) }
     }
 
     /// A group that is ready to step, or none if the method cannot do the system.
     pub fn group(&self, level: Level, width: Width) -> Result<Option<Box<dyn Group>>, Error> {
-        let Variant { system, options, size, parameters, tables, v, nodes, .. } = &self.variant;
+        let Variant { system, options, sizes, parameters, tables, v, nodes, .. } = &self.variant;
         let samples: Vec<f64> = (0..16).map(|i| f64::from(i % 5) - 2.0).collect();
         let table = Table { samples: samples.chunks(1).map(Row).collect(), start: 0.0, interval: 20.0 * H };
         let spec = Spec {
             system,
             options: options.clone(),
-            size: *size,
+            sizes: sizes.clone(),
             rows: parameters.chunks(1).map(Row).collect(),
             tables: vec![table; *tables],
         };

@@ -3,7 +3,8 @@
 from .base import System
 from .chain import Chain
 from .inputs import Sampled, Sinusoid
+from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
 
-__all__ = ["Chain", "NBody", "Oscillator", "Sampled", "Sinusoid", "System"]
+__all__ = ["Chain", "LinearSystem", "NBody", "Oscillator", "Sampled", "Sinusoid", "System"]

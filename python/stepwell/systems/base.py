@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from .._checks import Array, Shape
+from ..errors import UnsupportedError
 from ..reference.types import Scaled
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Parameters:
-    """A system as the core takes it: options, size, rows of parameters, tables of samples (values, interval, start).
+    """A system as the core takes it: options, sizes, rows of parameters, tables of samples (values, interval, start).
 
     Arrays have two axes: what is counted, and the members, or 1 for all members.
     """
@@ -25,12 +26,12 @@ class Parameters:
     def __init__(
         self,
         options: Iterable[str] = (),
-        size: int = 0,
+        sizes: Iterable[int] = (),
         rows: Iterable[Array] = (),
         tables: Iterable[tuple[Array, float, float]] = (),
     ) -> None:
         self.options = list(options)
-        self.size = size
+        self.sizes = list(sizes)
         self.rows = list(rows)
         self.tables = list(tables)
 
@@ -52,8 +53,8 @@ class System(ABC):
 
     kernel: ClassVar[str]
     axes: ClassVar[str] = ""
-    second_order: ClassVar[bool] = True
     linear: ClassVar[bool] = False
+    second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
     velocity_term: str | None = None
@@ -68,12 +69,26 @@ class System(ABC):
     def parameters(self, batch: Shape) -> Parameters:
         """This system as the core takes it."""
 
-    @abstractmethod
     def energy(self, v: Array, y: Array) -> Array:
-        """The energy of states with the blocks' axes first and axes of the batch last."""
+        """The energy of states with the blocks' axes first and axes of the batch last.
 
-    def check_time(self, last: float) -> None:  # noqa: B027 (most systems do not care for the time)
+        Raises:
+            UnsupportedError: if the system has none of its own.
+        """
+        raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
+
+    def auxiliary(self, t: float, v: Array, y: Array) -> Array:
+        """The auxiliary outputs z (§3) of states at time t, shape (outputs, *batch).
+
+        Raises:
+            UnsupportedError: if the system has none.
+        """
+        raise UnsupportedError(f"z: {self!r} has no auxiliary outputs")
+
+    def check_time(self, last: float) -> None:
         """Raise if the system's inputs make no sense up to a time."""
+        for given in self.given_inputs().values():
+            given.check(last)
 
     # What the transition-matrix form and the analysis ask of a linear system.
 

@@ -58,7 +58,7 @@ class Chain(System):
 
     def parameters(self, batch: Shape) -> Parameters:
         """Size and rows for the core, as ``chain.rs`` documents them."""
-        return Parameters(size=self.n, rows=[rows(array, batch) for array in (self.stiffness, self.mass)])
+        return Parameters(sizes=[self.n], rows=[rows(array, batch) for array in (self.stiffness, self.mass)])
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""

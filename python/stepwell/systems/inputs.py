@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import Held, Sine
-from .base import rows
+from .base import Parameters, row, rows
 
 #: Beyond this angle a floating-point number cannot tell one part of a period from another.
 LAST_ANGLE = 2.0**50
@@ -72,6 +73,9 @@ class Sampled:
     def __repr__(self) -> str:
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
 
+    def check(self, last: float) -> None:
+        """Samples make sense at any time."""
+
     def signal(self) -> Held:
         """The reference signal."""
         return Held(self.values, self.interval, self.start)
@@ -90,3 +94,14 @@ def as_input(argument: str, value: Any) -> Input | None:
 def table(sampled: Sampled, batch: Shape) -> tuple[Array, float, float]:
     """The samples as the core takes them: a row per sample, of one number or one for each member."""
     return rows(sampled.values, batch), sampled.interval, sampled.start
+
+
+def add_inputs(parameters: Parameters, inputs: Iterable[Input], batch: Shape) -> None:
+    """Add options, rows and tables of inputs as the core's ``Input::all`` takes them (``signal.rs``)."""
+    for each in inputs:
+        if isinstance(each, Sampled):
+            parameters.options.append("held")
+            parameters.tables.append(table(each, batch))
+        else:
+            parameters.options.append("sine")
+            parameters.rows += [row(array, batch) for array in (each.amplitude, each.omega, each.phase)]

@@ -86,12 +86,6 @@ class Oscillator(System):
             return 0.5 * (v * v + y * y)
         return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
 
-    def check_time(self, last: float) -> None:
-        """Raise if a sinusoid's angle leaves the range of the sine by a time."""
-        for given in self.given_inputs().values():
-            if isinstance(given, Sinusoid):
-                given.check(last)
-
     def without_inputs(self) -> Oscillator:
         """The same oscillator, left to itself."""
         return Oscillator(self.omega, self.damping, form=self.form)

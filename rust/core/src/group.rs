@@ -45,8 +45,8 @@ pub struct Spec<'a> {
     pub system: &'a str,
     /// Which of its variants; each system documents its own.
     pub options: Vec<&'a str>,
-    /// Its size, if that is chosen at run time.
-    pub size: usize,
+    /// Its sizes, if they are chosen at run time; each system documents its own.
+    pub sizes: Vec<usize>,
     /// Its parameters, in the order that the system documents.
     pub rows: Vec<Row<'a>>,
     /// Its sampled inputs, in the order in which the options name them.
@@ -57,6 +57,11 @@ impl Spec<'_> {
     /// The value of parameter `i` for a member; a parameter that is not there is zero.
     pub fn at(&self, i: usize, member: usize) -> f64 {
         self.rows.get(i).map_or(0.0, |row| row.at(member))
+    }
+
+    /// Size `i`; one that is not there is zero.
+    pub fn size(&self, i: usize) -> usize {
+        self.sizes.get(i).copied().unwrap_or(0)
     }
 
     /// Whether an option is given.

@@ -16,6 +16,7 @@ pub mod error;
 pub mod group;
 pub mod isa;
 pub mod matrix;
+pub mod panels;
 pub mod rows;
 pub mod signal;
 pub mod stepper;

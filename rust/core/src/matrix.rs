@@ -4,25 +4,19 @@
 //! calls this finds P and Q by stepping unit vectors, so no method is written a second time. Sums run in the order of the
 //! columns, first over s, then over the nodes and, for each, over the inputs.
 //!
-//! Options: `sine` or `held` for each input. Parameters: P by rows, then Q by nodes, inputs and rows, then
+//! Sizes: n. Options: `sine` or `held` for each input. Parameters: P by rows, then Q by nodes, inputs and rows, then
 //! amplitude, frequency and phase of each sinusoid. Tables: the held inputs. Nodes: fractions of the step.
 
 use crate::{
     group::{Clock, Group, Spec, Width},
     isa::{Isa, Task, with_isa},
+    panels::Panels,
     rows::{LANES, Rows, lanes, lanes_mut, zeros},
-    signal::{Signal, Sine},
-    tile::Samples,
+    signal::Input,
 };
 
-enum Input<const L: usize> {
-    Sine([Sine; L]),
-    Held(Samples<L>),
-}
-
 struct Map<const L: usize> {
-    p: Rows<L>,
-    q: Rows<L>,
+    pq: Panels<L>,
     inputs: Vec<Input<L>>,
     u: Rows<L>,
     next: Rows<L>,
@@ -49,41 +43,13 @@ struct Steps<'a, const L: usize> {
 impl<const L: usize> Task for Steps<'_, L> {
     #[inline(always)]
     fn run(self) {
-        let Map { p, q, inputs, u, next } = self.map;
-        let size = self.state.ncols();
+        let Map { pq, inputs, u, next } = self.map;
         for k in self.k..self.k + self.n {
             let t = self.clock.at(k);
-            for (j, u) in lanes_mut(u).iter_mut().enumerate() {
-                let at = t + self.nodes[j / inputs.len()] * self.clock.h;
-                match &inputs[j % inputs.len()] {
-                    Input::Sine(sines) => {
-                        for l in 0..L {
-                            u[l] = sines[l].at(at);
-                        }
-                    }
-                    Input::Held(samples) => u.copy_from_slice(samples.view().at(at)),
-                }
+            for (node, u) in self.nodes.iter().zip(lanes_mut(u).chunks_exact_mut(inputs.len().max(1))) {
+                Input::fill_all(inputs, t + node * self.clock.h, u);
             }
-            let s = lanes(self.state);
-            for (i, next) in lanes_mut(next).iter_mut().enumerate() {
-                let p = &lanes(p)[i * size..][..size];
-                let mut sum = [0.0; L];
-                for l in 0..L {
-                    sum[l] = p[0][l] * s[0][l];
-                }
-                for (p, s) in p.iter().zip(s).skip(1) {
-                    for l in 0..L {
-                        sum[l] += p[l] * s[l];
-                    }
-                }
-                for (j, u) in lanes(u).iter().enumerate() {
-                    let q = &lanes(q)[j * size + i];
-                    for l in 0..L {
-                        sum[l] += q[l] * u[l];
-                    }
-                }
-                *next = sum;
-            }
+            pq.times([lanes(self.state), lanes(u), &[]], lanes_mut(next));
             std::mem::swap(self.state, next);
         }
     }
@@ -96,27 +62,12 @@ impl<I: Isa, const L: usize> Group for Matrix<I, L> {
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         let member = |l: usize| first + l.min(count - 1);
-        let mut next = 0;
-        for rows in [&mut self.map.p, &mut self.map.q] {
-            for row in lanes_mut(rows) {
-                *row = std::array::from_fn(|l| spec.at(next, member(l)));
-                next += 1;
-            }
-        }
-        let mut tables = spec.tables.iter();
-        let mut inputs = Vec::new();
-        for kind in &spec.options {
-            if *kind == "held"
-                && let Some(table) = tables.next()
-            {
-                inputs.push(Input::Held(Samples::new(table, |_| 1.0, member)));
-            } else {
-                let p = |i: usize, l: usize| spec.at(next + i, member(l));
-                inputs.push(Input::Sine(std::array::from_fn(|l| Sine { amplitude: p(0, l), omega: p(1, l), phase: p(2, l) })));
-                next += 3;
-            }
-        }
-        self.map.inputs = inputs;
+        let (n, columns) = (self.map.next.ncols(), self.map.u.ncols());
+        self.map.pq = Panels::new(n, n + columns, |i, j| {
+            let place = if j < n { i * n + j } else { j * n + i }; // P by rows, then Q by columns
+            std::array::from_fn(|l| spec.at(place, member(l)))
+        });
+        self.map.inputs = Input::all(spec, n * (n + columns), member);
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -138,9 +89,9 @@ impl<I: Isa, const L: usize> Group for Matrix<I, L> {
 }
 
 fn boxed<I: Isa, const L: usize>(isa: I, spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: usize) -> Box<dyn Group> {
-    let n = spec.size;
+    let n = spec.size(0);
     let columns = spec.options.len() * nodes.len();
-    let map = Map { p: zeros(n * n), q: zeros(n * columns), inputs: Vec::new(), u: zeros(columns), next: zeros(n) };
+    let map = Map { pq: Panels::new(0, 0, |_, _| [0.0; L]), inputs: Vec::new(), u: zeros(columns), next: zeros(n) };
     Box::new(Matrix::<I, L> { clock: *clock, isa, nodes: nodes.to_vec(), v_rows, state: zeros(n), map })
 }
 
@@ -148,7 +99,7 @@ fn at_level<const L: usize>(spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: u
     with_isa!(clock.level, |isa| boxed::<_, L>(isa, spec, nodes, clock, v_rows))
 }
 
-/// A group of linear maps of `spec.size` numbers, the first `v_rows` of them in the v slot.
+/// A group of linear maps of so many numbers as the spec's size says, the first `v_rows` of them in the v slot.
 pub fn group(spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: usize, width: Width) -> Box<dyn Group> {
     match width {
         Width::Wide => at_level::<LANES>(spec, nodes, clock, v_rows),

@@ -44,8 +44,8 @@ pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + Sync 
     /// The system of the members that `member` names for each lane, scaled to the step.
     fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self;
 
-    /// How many velocities and coordinates a member of this size has.
-    fn shape(size: usize) -> (usize, usize);
+    /// How many velocities and coordinates a member has.
+    fn shape(spec: &Spec) -> (usize, usize);
 }
 
 struct RowGroup<S: Large<L>, St, I, const L: usize> {
@@ -79,8 +79,8 @@ impl<S: System, St: Stepper> Task for Steps<'_, S, St> {
 }
 
 impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> RowGroup<S, St, I, L> {
-    fn boxed(isa: I, clock: &Clock, size: usize) -> Box<dyn Group> {
-        let (p, q) = S::shape(size);
+    fn boxed(isa: I, clock: &Clock, spec: &Spec) -> Box<dyn Group> {
+        let (p, q) = S::shape(spec);
         let (v, y) = (zeros(p), zeros(q));
         let work = Work::new(St::RECORD.evaluations, &v, &y);
         Box::new(Self { clock: *clock, isa, system: None, v, y, work, stepper: PhantomData::<fn() -> St> })
@@ -135,15 +135,15 @@ where
     }
 }
 
-fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, size: usize) -> Box<dyn Group>
+fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, spec: &Spec) -> Box<dyn Group>
 where
     Work<S>: Send + Sync,
 {
-    with_isa!(clock.level, |isa| RowGroup::<S, St, _, L>::boxed(isa, clock, size))
+    with_isa!(clock.level, |isa| RowGroup::<S, St, _, L>::boxed(isa, clock, spec))
 }
 
 /// A group of a system of any size: `Many` lanes for several members, `One` for a single one.
-pub fn group<Many, One, St>(clock: &Clock, size: usize, width: Width) -> Box<dyn Group>
+pub fn group<Many, One, St>(spec: &Spec, clock: &Clock, width: Width) -> Box<dyn Group>
 where
     Many: Large<LANES>,
     One: Large<1>,
@@ -152,7 +152,7 @@ where
     Work<One>: Send + Sync,
 {
     match width {
-        Width::Wide => at_level::<Many, St, LANES>(clock, size),
-        Width::Narrow => at_level::<One, St, 1>(clock, size),
+        Width::Wide => at_level::<Many, St, LANES>(clock, spec),
+        Width::Narrow => at_level::<One, St, 1>(clock, spec),
     }
 }

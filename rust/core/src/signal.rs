@@ -1,6 +1,10 @@
 //! Inputs: what drives a system from outside, as a function of time.
 
-use crate::{tile::View, trig};
+use crate::{
+    group::Spec,
+    tile::{Samples, View},
+    trig,
+};
 
 /// An input of one member.
 pub trait Signal {
@@ -50,5 +54,56 @@ impl<A: Signal, B: Signal> Signal for Both<A, B> {
     #[inline(always)]
     fn at(&self, t: f64) -> f64 {
         self.0.at(t) + self.1.at(t)
+    }
+}
+
+/// An input of the members of a group of any size, chosen at run time.
+pub enum Input<const L: usize> {
+    /// A sinusoid.
+    Sine([Sine; L]),
+    /// Samples.
+    Held(Samples<L>),
+}
+
+impl<const L: usize> Input<L> {
+    /// The inputs that the options name, `sine` or `held` each and in order; what else is among the options is left out.
+    /// Their parameters are amplitude, frequency and phase of each sinusoid, from number `first` on.
+    pub fn all(spec: &Spec, first: usize, member: impl Fn(usize) -> usize) -> Vec<Self> {
+        let (mut next, mut tables) = (first, spec.tables.iter());
+        let mut inputs = Vec::new();
+        for option in &spec.options {
+            match *option {
+                "sine" => {
+                    let p = |i: usize, l: usize| spec.at(next + i, member(l));
+                    let sine = |l| Sine { amplitude: p(0, l), omega: p(1, l), phase: p(2, l) };
+                    inputs.push(Input::Sine(std::array::from_fn(sine)));
+                    next += 3;
+                }
+                "held" => inputs.extend(tables.next().map(|table| Input::Held(Samples::new(table, |_| 1.0, &member)))),
+                _ => {}
+            }
+        }
+        inputs
+    }
+
+    /// Its values at time `t`.
+    #[inline(always)]
+    fn fill(&self, t: f64, row: &mut [f64; L]) {
+        match self {
+            Input::Sine(sines) => {
+                for l in 0..L {
+                    row[l] = sines[l].at(t);
+                }
+            }
+            Input::Held(samples) => *row = *samples.view().at(t),
+        }
+    }
+
+    /// The values of inputs at time `t`, a row for each.
+    #[inline(always)]
+    pub fn fill_all(inputs: &[Self], t: f64, rows: &mut [[f64; L]]) {
+        for (input, row) in inputs.iter().zip(rows) {
+            input.fill(t, row);
+        }
     }
 }

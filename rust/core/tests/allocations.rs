@@ -20,8 +20,10 @@ fn a_step_allocates_nothing() {
     let chain: Vec<Row> = (0..9).map(|_| Row(&one)).collect();
     for record in RECORDS {
         let free = Spec { system: "oscillator", options: vec!["canonical"], rows: vec![Row(&omega)], ..Spec::default() };
-        let chain = Spec { system: "chain", size: 4, rows: chain.clone(), ..Spec::default() };
-        for (spec, size) in [(free, 1), (chain, 4)] {
+        let chain = Spec { system: "chain", sizes: vec![4], rows: chain.clone(), ..Spec::default() };
+        let mut linear = Spec { system: "linear", options: vec!["acceleration", "sine"], sizes: vec![3, 3], ..Spec::default() };
+        linear.rows = (0..6 * 7 + 3).map(|_| Row(&one)).collect();
+        for (spec, size) in [(free, 1), (chain, 4), (linear, 3)] {
             let model = Model::Direct { spec, method: record.name };
             let clock = Clock { t0: 0.0, h: 0.1, start: 0, level: Level::choose().unwrap() };
             let mut world = World::new(&model, clock, 100, record.carry.is_some(), 0).unwrap();

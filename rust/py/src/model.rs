@@ -27,7 +27,7 @@ pub fn core_error(error: Error) -> PyErr {
 pub struct ModelSpec {
     system: String,
     options: Vec<String>,
-    size: usize,
+    sizes: Vec<usize>,
     rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     method: String,
@@ -49,17 +49,17 @@ pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>
 impl ModelSpec {
     /// `matrix` is the nodes and the number of rows in the v slot, if the transition-matrix form is asked for.
     #[new]
-    #[pyo3(signature = (system, options, size, rows, tables, method, matrix=None))]
+    #[pyo3(signature = (system, options, sizes, rows, tables, method, matrix=None))]
     fn new(
         system: String,
         options: Vec<String>,
-        size: usize,
+        sizes: Vec<usize>,
         rows: Vec<Py<PyArray2<f64>>>,
         tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
         method: String,
         matrix: Option<(Vec<f64>, usize)>,
     ) -> Self {
-        ModelSpec { system, options, size, rows, tables, method, matrix }
+        ModelSpec { system, options, sizes, rows, tables, method, matrix }
     }
 }
 
@@ -84,7 +84,7 @@ impl ModelSpec {
         let spec = Spec {
             system: &self.system,
             options: self.options.iter().map(String::as_str).collect(),
-            size: self.size,
+            sizes: self.sizes.clone(),
             rows: rows.iter().map(by_row).collect::<PyResult<Vec<_>>>()?.concat(),
             tables: tables
                 .iter()

@@ -1,7 +1,7 @@
 //! A chain of n masses between two walls, joined by n + 1 springs. n is chosen at run time.
 //!
 //! Spring j pulls between masses j − 1 and j with f_j = k_j·(y_j − y_{j−1}); the walls stand still at 0. A spring of no
-//! stiffness at an end leaves that end free. Parameters: the n + 1 stiffnesses, then the n masses.
+//! stiffness at an end leaves that end free. Sizes: n. Parameters: the n + 1 stiffnesses, then the n masses.
 
 use crate::{
     error::Error,
@@ -65,12 +65,12 @@ impl<const L: usize> System for Chain<L> {
 }
 
 impl<const L: usize> Large<L> for Chain<L> {
-    fn shape(size: usize) -> (usize, usize) {
-        (size, size)
+    fn shape(spec: &Spec) -> (usize, usize) {
+        (spec.size(0), spec.size(0))
     }
 
     fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self {
-        let n = spec.size;
+        let n = spec.size(0);
         let mut chain = Chain { stiffness: zeros(n + 1), by_mass: zeros(n), force: zeros(n + 1), h };
         for l in 0..L {
             let member = member(l);
@@ -87,8 +87,8 @@ impl<const L: usize> Large<L> for Chain<L> {
 
 /// A group of chains.
 pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
-    match (spec.options.as_slice(), spec.size) {
-        ([], 1..) => Ok(rows::group::<Chain<{ rows::LANES }>, Chain<1>, St>(clock, spec.size, width)),
+    match (spec.options.as_slice(), spec.sizes.as_slice()) {
+        ([], &[n]) if n > 0 => Ok(rows::group::<Chain<{ rows::LANES }>, Chain<1>, St>(spec, clock, width)),
         _ => Err(spec.unknown_options()),
     }
 }
