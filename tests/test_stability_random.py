@@ -1,0 +1,179 @@
+"""Random linear systems: predictions against matrices written by hand, and against runs."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.stability import maps, operations, series
+
+METHODS = ["standard_euler", "false_euler", "damped_euler", "standard_heun", "false_heun", "semi_false_heun", "rk4"]
+
+
+def by_hand(method: str, a: Any, n_v: int) -> Any:
+    """P of a step, from h·A in the order (v, y), without this library: each stage is a matrix that acts on the start."""
+    n = len(a)
+    one = np.eye(n)
+    kick, drift = a.copy(), a.copy()
+    kick[n_v:] = 0.0  # what changes v
+    drift[:n_v] = 0.0  # what changes y
+    if method == "standard_euler":
+        return one + a
+    if method == "false_euler":
+        return (one + drift) @ (one + kick)
+    if method == "damped_euler":
+        return (one + kick) @ (one + drift)
+    if method == "standard_heun":
+        return one + a + a @ a / 2
+    if method == "rk4":
+        return one + a + a @ a / 2 + a @ a @ a / 6 + a @ a @ a @ a / 24
+    dv1 = kick
+    first = one + dv1
+    dy1 = drift @ first if method == "false_heun" else drift
+    predicted = first + dy1  # (v1, y1)
+    dv2 = kick @ predicted
+    newer = one + dv2 + dy1  # (v + dv2, y1)
+    dy2 = drift @ newer
+    return one + 0.5 * (dv1 + dv2) + 0.5 * (dy1 + dy2)
+
+
+def random_system(seed: int) -> tuple[Any, Any, list[int]]:
+    """A stable system of one to six states, its A in the order (v, y), and how it is split."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 7))
+    a = rng.normal(size=(n, n))
+    a -= np.eye(n) * (np.linalg.eigvals(a).real.max() + rng.uniform(0.05, 1.0))
+    velocities = rng.permutation(n)[: rng.integers(0, n + 1)].tolist()
+    order = velocities + [i for i in range(n) if i not in velocities]
+    return sw.LinearSystem(a, velocities=velocities), a[np.ix_(order, order)], velocities
+
+
+def radius(method: str, a: Any, n_v: int) -> Any:
+    return lambda h: float(np.abs(np.linalg.eigvals(by_hand(method, h * a, n_v))).max())
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(15))
+def test_matrix_and_limit(method: str, seed: int) -> None:
+    system, a, velocities = random_system(seed)
+    n_v = len(velocities)
+    h = 0.3 / np.abs(np.linalg.eigvals(a)).max()
+    found = sw.analyse(system, method, dt=h)
+    np.testing.assert_allclose(found.P, by_hand(method, h * a, n_v), rtol=0, atol=1e-13)
+    assert found.radius == pytest.approx(radius(method, a, n_v)(h), abs=1e-9)
+
+    limit = sw.stability_limit(system, method)
+    r = radius(method, a, n_v)
+    # Independent: the first step of a fine ladder at which something grows, then bisection on r₁ = 1.
+    fastest = np.abs(np.linalg.eigvals(a)).max()
+    ladder = np.geomspace(1e-4, 50.0, 1200) / fastest
+    grows = [r(h) > 1 + 1e-12 for h in ladder]
+    if not any(grows):
+        assert limit == math.inf
+        return
+    i = grows.index(True)
+    if i == 0:
+        assert limit == 0
+        return
+    low, high = ladder[i - 1], ladder[i]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if r(middle) > 1 else (middle, high)
+    # Both are r₁ = 1 to some 1e-15 times the condition of the eigenvalue (here up to 1e3), over a slope of order 1.
+    assert limit == pytest.approx(high, rel=1e-11)
+    assert limit.mode is not None
+    assert abs(limit.mode.eigenvalue) == pytest.approx(1.0, abs=1e-12)
+    assert np.abs(np.linalg.eigvals(a) - limit.mode.rate).min() < 1e-9 * fastest
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(8))
+def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
+    """A batch of random systems of 3 states with random steps, alone in their fate: each by its own r₁."""
+    rng = np.random.default_rng([seed, 77])
+    b, steps = 300, 3000
+    a = rng.normal(size=(3, 3, b))
+    a -= np.eye(3)[:, :, np.newaxis] * (np.linalg.eigvals(np.moveaxis(a, 2, 0)).real.max(axis=1) + 0.1)
+    a *= rng.uniform(0.1, 2.0, b)  # the scale of A is the step
+    system = sw.LinearSystem(a, velocities=int(rng.integers(0, 4)))
+    found = sw.analyse(system, method, dt=1.0)
+    start = rng.normal(size=(3, b))
+    v, y = system.split(start)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.DivergenceWarning)
+        run = sw.integrate(system, method, v=v, y=y, dt=1.0, steps=steps)
+    size = np.abs(system.state(run.v[-1], run.y[-1])).max(axis=0)
+    bounded = np.isfinite(size) & (size < 1e6)
+    # The band: with |r₁ − 1| > 0.02, r₁ᵏ is above 6e25 or below 5e-27 after 3000 steps. The share of a random start in one of
+    # three modes is above 1e-12, and what a non-normal P adds is below 1e12, but for odds of less than one in a million.
+    decided = np.abs(found.radius - 1.0) > 0.02
+    assert decided.sum() > 200
+    np.testing.assert_array_equal(bounded[decided], found.stable[decided])
+    assert 0 < found.stable.sum() < b or method == "standard_euler"
+
+
+def test_an_empty_block_makes_the_blocks_methods_one() -> None:
+    """Without velocities there is nothing to use early: False Euler is Standard Euler, and both Heuns are Heun."""
+    a = np.array([[-1.0, 2.0], [-2.0, -1.0]])
+    system = sw.LinearSystem(a, velocities=0)
+    p = {m: sw.analyse(system, m, dt=0.1).P for m in METHODS}
+    for m in ("false_euler", "damped_euler"):
+        np.testing.assert_array_equal(p[m], p["standard_euler"])
+    for m in ("false_heun", "semi_false_heun"):
+        np.testing.assert_allclose(p[m], p["standard_heun"], rtol=0, atol=1e-16)
+
+
+def test_a_system_of_one_state() -> None:
+    """ẏ = −y: Euler up to 2, RK4 up to 2.785293563405282, all by one real eigenvalue."""
+    decay = sw.LinearSystem([[-1.0]])
+    euler = sw.stability_limit(decay, "standard_euler")
+    assert euler == pytest.approx(2.0, rel=1e-14)
+    assert euler.mode.eigenvalue == pytest.approx(-1.0, abs=1e-12)
+    assert sw.stability_limit(decay, "rk4") == pytest.approx(2.785293563405282, rel=1e-14)
+    a = sw.analyse(decay, "standard_euler", dt=[0.5, 1.0, 1.5, 2.5])
+    assert a.kind.tolist() == ["monotonic stable", "monotonic stable", "damped oscillation", "unstable oscillation"]
+    assert a.polynomial.tolist() == [[1.0] * 4, [-0.5, 0.0, 0.5, 1.5]]
+    assert sw.analyse(sw.LinearSystem([[0.0]]), "rk4", dt=1.0).kind == "constant"
+    assert sw.stability_limit(sw.LinearSystem([[0.0]]), "rk4") == math.inf
+    assert sw.stability_limit(sw.LinearSystem([[0.1]]), "rk4") == 0.0
+
+
+def test_input_matrix_of_several_inputs() -> None:
+    """Q of an exact hold: what a step makes of each column of B, for inputs that were not even given."""
+    a, b = np.array([[-1.0, 2.0], [-2.0, -1.0]]), np.array([[1.0, 0.0, 2.0], [0.5, -1.0, 0.0]])
+    system = sw.LinearSystem(a, b, velocities=0)
+    h = 0.2
+    found = sw.analyse(system, "rk4", dt=h)
+    assert found.inputs == ("x[0]", "x[1]", "x[2]")
+    z = h * a
+    series_of_input = h * (np.eye(2) + z / 2 + z @ z / 6 + z @ z @ z / 24) @ b
+    np.testing.assert_allclose(found.Q, series_of_input, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(sw.analyse(system, "rk4", dt=[h, 0.3]).Q[:, :, 0], found.Q)
+
+
+def test_resonance_of_two_equal_pairs() -> None:
+    """Two equal oscillators, one driving the other: a double pair on the circle grows linearly, as the exact solution does."""
+    # v̇₁ = −y₁, v̇₂ = −y₂ + y₁
+    a = np.zeros((4, 4))
+    a[2, 0] = a[3, 1] = 1.0
+    a[0, 2] = a[1, 3] = -1.0
+    a[1, 2] = 1.0
+    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (found.kind, bool(found.stable)) == ("unstable oscillation (double pair)", False)
+    a[1, 2] = 0.0
+    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (found.kind, bool(found.stable)) == ("harmonic", True)
+
+
+def test_the_slots_are_in_the_order_of_the_blocks() -> None:
+    system = sw.LinearSystem(np.diag([-1.0, -2.0, -3.0]), velocities=[2])
+    found = sw.analyse(system, "standard_euler", dt=0.1)
+    assert found.slots == ["v[0]", "y[0]", "y[1]"]
+    np.testing.assert_allclose(np.diag(found.P), [0.7, 0.9, 0.8])
+    assert operations("standard_euler", system).multiplications == 9
+    assert maps.size(system) == (1, 2)
+    assert series("rk4").p[2] == -0.5
