@@ -110,7 +110,10 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
         made, record = SYSTEMS[system](rng, 1), sw.method(method)
         if record.needs_acceleration and (made.velocity_term or not made.second_order):
             continue
-        for form in ("direct", "matrix") if made.linear else ("direct",):
+        forms = ["direct"] + ["matrix"] * made.linear
+        if made.linear and all(isinstance(x, sw.Sinusoid) or x.constant for x in made.given_inputs().values()):
+            forms.append("power")
+        for form in forms:
             for start in record.starts or (None,):
                 yield Case(method, system, form, start)
 

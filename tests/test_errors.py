@@ -80,6 +80,17 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         E.UnsupportedError,
         "only linear systems have a transition matrix",
     ),
+    (
+        lambda: run(sw.NBody(), y=np.ones((3, 2)), form="power"),
+        E.UnsupportedError,
+        "only linear systems have a transition matrix",
+    ),
+    (
+        lambda: run(sw.Oscillator(x=0.5, a=sw.Sampled([1.0, 2.0], 0.1)), form="power"),
+        E.UnsupportedError,
+        "form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but a changes from "
+        "sample to sample; use form='matrix' or 'direct'",
+    ),
     (lambda: run(carry=1.0), E.ArgumentError, "carry: false_euler carries nothing but v between steps"),
     (
         lambda: sw.NBody(masses=[1, 2, 3]),

@@ -1,4 +1,4 @@
-"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct or in matrix form.
+"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
 
 A slot is what stands in the place of a block between steps: v for most methods, something else for those with a carry. Everything
 above this file speaks of states, everything below of slots.
@@ -17,7 +17,7 @@ from ._checks import Array, Shape
 from .methods import Method
 from .reference import run as reference
 from .reference.types import Blocks, Whole
-from .systems import System
+from .systems import Sampled, System
 from .systems.base import Parameters, rows
 from .systems.inputs import add_inputs
 
@@ -69,6 +69,8 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
     before = np.full(plan.batch, -1, dtype=np.int64) if before is None else before.copy()
     if plan.form == "matrix":
         return _matrix(plan, v, y, before, carried)
+    if plan.form == "power":
+        return _power(plan, v, y, before, carried)
     if plan.backend == "numpy":
         return _numpy(plan, v, y, before, carried)
     return _rust(plan, _model(plan), v, y, before, carried)
@@ -231,3 +233,35 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
     shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
     return _finished(plan, flat_v.reshape(blocks[0]), shaped, first_bad)
+
+
+def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
+    """By powers of the transition matrix; the backend finds P and Q, the rest is the reference's."""
+    from .reference import power  # only this form needs it
+    from .reference.signal import Held, Sine
+
+    def flat(array: Array) -> Array:
+        return np.broadcast_to(array, plan.batch).reshape(-1)
+
+    given = plan.system.given_inputs()
+    inputs: list[Held | Sine] = [
+        Held(flat(each.values[0])[np.newaxis], 1.0, 0.0)
+        if isinstance(each, Sampled)
+        else Sine(flat(each.amplitude), flat(each.omega), flat(each.phase))
+        for each in given.values()
+    ]
+    members, n_v = prod(plan.batch), prod(plan.system.v_shape)
+    slot = v if carried else _start(plan, v, y)
+    s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
+    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
+
+    drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
+    kept = []
+    with np.errstate(all="ignore"):
+        step = power.one_step(p, q, inputs, plan.method.nodes, drive)
+        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=plan.saves)
+        for i, s in enumerate(states, 1):
+            kept.append((s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)))
+            if plan.progress is not None:
+                plan.progress(i / len(plan.saves))
+    return _finished(plan, kept[-1][0], kept, before)

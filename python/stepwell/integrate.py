@@ -16,10 +16,10 @@ from .methods import Method
 from .methods import method as find_method
 from .reference.types import Whole
 from .result import Run
-from .systems import System
+from .systems import Sampled, System
 
 BACKENDS = ("rust", "numpy")
-FORMS = ("direct", "matrix")
+FORMS = ("direct", "matrix", "power")
 
 
 def integrate(
@@ -60,7 +60,8 @@ def integrate(
         start: how a method with a choice starts; see ``method(…).starts``.
         carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used.
         first_bad_step: members that diverged before, from ``run.resume``; only they may begin with NaN or infinities.
-        form: ``"direct"``, or ``"matrix"`` for the transition matrix of a linear system (Appendix B).
+        form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
+            which make any number of steps at once and need inputs that are constants or sinusoids.
         threads: how many threads share the members; None for as many as pay.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
         progress: show a progress bar (needs rich).
@@ -82,8 +83,10 @@ def integrate(
     fits_together(system, how)
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
-    if form == "matrix" and not system.linear:
+    if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    if form == "power":
+        _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
@@ -142,6 +145,16 @@ def fits_together(system: System, method: Method) -> None:
             f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
             f"use false_euler, or leave {system.velocity_term} out"
         )
+
+
+def _goes_on_by_a_rule(system: System) -> None:
+    """Raise if an input cannot be carried by a power of the transition matrix."""
+    for name, given in system.given_inputs().items():
+        if isinstance(given, Sampled) and not given.constant:
+            raise UnsupportedError(
+                f"form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but {name} "
+                f"changes from sample to sample; use form='matrix' or 'direct'"
+            )
 
 
 def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Array:

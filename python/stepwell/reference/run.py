@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from .product import times
 from .types import Array, Blocks, Signal, Whole
 
 Step = Callable[[float, Array, Array], Blocks]
@@ -48,13 +49,9 @@ def linear_step(
 ) -> Callable[[float, Array], Array]:
     """One step of s ← P·s + Σ Q·u, with s the rows of v and y; the sums run over s, then over the nodes and their inputs."""
     columns = [(node * h, signal) for node in nodes for signal in inputs]
+    pq = np.concatenate([p, np.moveaxis(q, 0, 1)], axis=1)
 
     def step(t: float, s: Array) -> Array:
-        following: Array = p[:, 0] * s[0]
-        for j in range(1, len(s)):
-            following = following + p[:, j] * s[j]
-        for j, (later, signal) in enumerate(columns):
-            following = following + q[j] * signal.at(t + later)
-        return following
+        return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)])
 
     return step

@@ -1,4 +1,4 @@
-"""Sine, the same to the last bit as the core's: see ``trig.rs`` for its error."""
+"""Sine, the same to the last bit as the core's: see ``trig.rs`` for its error. The core needs no cosine."""
 
 import numpy as np
 
@@ -26,10 +26,20 @@ C = (
 
 
 def sin(x: Array) -> Array:
-    """Sin x: reduced by π/2 in three parts, then fdlibm's polynomials."""
+    """Sin x."""
+    return _sin(x, 0)
+
+
+def cos(x: Array) -> Array:
+    """Cos x, which is the sine a quadrant further."""
+    return _sin(x, 1)
+
+
+def _sin(x: Array, quadrants: int) -> Array:
+    """Sin(x + quadrants·π/2): reduced by π/2 in three parts, then fdlibm's polynomials."""
     y = np.asarray(x * TWO_OVER_PI + MAGIC)
     n = y - MAGIC
-    quadrant = y.view(np.uint64)
+    quadrant = y.view(np.uint64) + np.uint64(quadrants)
     r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2]
     z = r * r
     s = r + (r * z) * (S[0] + z * (S[1] + z * (S[2] + z * (S[3] + z * (S[4] + z * S[5])))))

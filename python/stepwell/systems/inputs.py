@@ -73,6 +73,11 @@ class Sampled:
     def __repr__(self) -> str:
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
 
+    @property
+    def constant(self) -> bool:
+        """Whether all samples are equal."""
+        return bool((self.values == self.values[0]).all())
+
     def check(self, last: float) -> None:
         """Samples make sense at any time."""
 

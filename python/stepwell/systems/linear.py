@@ -10,6 +10,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
+from ..reference.product import times
 from ..reference.systems import linear as reference
 from .base import Parameters, System, rows
 from .inputs import Input, Sampled, add_inputs, as_input
@@ -165,7 +166,7 @@ class LinearSystem(System):
         if self.D is not None:
             parts.append(self.D[:, self._given()])
             columns += [each.signal().at(t) for each in self.given_inputs().values()]
-        z = reference.times(_side_by_side(parts, batch), columns)
+        z = times(_side_by_side(parts, batch), columns)
         return np.array(np.broadcast_to(z, (len(self.C), *batch)))
 
 

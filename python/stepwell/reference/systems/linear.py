@@ -2,15 +2,8 @@
 
 from collections.abc import Sequence
 
+from ..product import times
 from ..types import Array, Signal
-
-
-def times(matrix: Array, columns: Sequence[Array]) -> Array:
-    """The matrix times a column; the sum runs in the order of the columns."""
-    total: Array = matrix[:, 0] * columns[0]
-    for j in range(1, len(columns)):
-        total = total + matrix[:, j] * columns[j]
-    return total
 
 
 class Linear:

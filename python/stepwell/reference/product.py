@@ -1,0 +1,20 @@
+"""Products of matrices of which each member of a batch has its own, summed in the order of the columns."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .types import Array
+
+
+def times(matrix: Array, columns: "Sequence[Array] | Array") -> Array:
+    """The matrix, of shape (rows, columns, *batch), times a column of numbers."""
+    total: Array = matrix[:, 0] * columns[0]
+    for j in range(1, len(columns)):
+        total = total + matrix[:, j] * columns[j]
+    return total
+
+
+def product(a: Array, b: Array) -> Array:
+    """The matrix product of a and b."""
+    return times(a[:, :, np.newaxis], b)
