@@ -30,8 +30,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     for name, text in added:
         (tree / name).write_text(text, encoding="utf-8")
-    # The same target folder: what comes from the registry is compiled already.
-    environment = os.environ | {"CARGO_TARGET_DIR": str(ROOT / "target")}
+    # A target folder of its own: in the project's, the copy's core would take the place of the project's.
+    environment = os.environ | {"CARGO_TARGET_DIR": str(ROOT / "target" / "adding")}
     build = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", "dist"]
     subprocess.run(build, cwd=tree, env=environment, check=True)
     (wheel,) = (tree / "dist").glob("*.whl")

@@ -161,6 +161,109 @@ def test_chart_prints_a_summary(capsys, tmp_path):
     assert "forced_oscillator.png" in out
 
 
+# ---- criteria
+
+
+def test_criteria_says_what_criteria_says(capsys):
+    code, out, err = told(capsys, "criteria", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == json.loads(json.dumps(sw.criteria().rows()))
+    code, out, err = told(capsys, "criteria", "rk4", "verlet", "--phi", "0.25, 2", "--markdown")
+    assert (code, out, err) == (0, sw.criteria(["rk4", "verlet"], phi=[0.25, 2]).markdown(), "")
+
+
+def test_criteria_prints_tables_that_fit(capsys):
+    """In three, and in no cell a text that was cut."""
+    code, out, err = told(capsys, "criteria")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 120
+    assert "…" not in out
+    for title in ("Stability of the undamped oscillator", "Errors of the undamped oscillator", "Operations of a step"):
+        assert title in out
+    for method in sw.methods():
+        assert out.count(f" {method.title.split()[0]}") >= 3
+    semi = next(line for line in out.splitlines() if "Semi-False Heun" in line and "Φ" in line)
+    assert semi.split() == ["Semi-False", "Heun", "1.572303", "3.996", "−Φ⁴/4", "−Φ²/12", "+", "7Φ⁴/160"]
+    costs = [line.split() for line in out.splitlines() if "Runge-Kutta 4" in line][-1]
+    assert costs == ["Runge-Kutta", "4", "14", "18", "0", "0", "4"]
+
+
+def test_criteria_writes_a_file(capsys, tmp_path):
+    for name, wanted in (("c.md", sw.criteria(["rk4"]).markdown()), ("c.json", None)):
+        code, out, _ = told(capsys, "criteria", "rk4", "-o", str(tmp_path / name))
+        assert code == 0
+        assert f"{name}" in out.replace("\n", "")
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert text == wanted if wanted else json.loads(text)[0]["method"] == "rk4"
+
+
+# ---- stability
+
+
+def test_stability_tells_limits_and_writes_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = told(capsys, "stability")
+    assert (code, err) == (0, "")
+    euler = next(line for line in out.splitlines() if "False Euler" in line)
+    assert euler.split() == ["False", "Euler", "2", "3.142", "unstable", "oscillation", "0", "Φ²/24", "+", "3Φ⁴/640"]
+    heun = next(line for line in out.splitlines() if " False Heun" in line)
+    assert "monotonic unstable" in heun
+    code, out, err = told(capsys, "stability", "standard_heun", "rk4", "--json")
+    report = json.loads(out)
+    assert (code, err, report["files"]) == (0, "", [])
+    assert [row["method"] for row in report["summary"]] == ["standard_heun", "rk4"]
+    assert [row["limit"] for row in report["summary"]] == [0.0, sw.stability_limit(sw.Oscillator(), "rk4").dt]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_stability_writes_pictures_and_tells_what_it_refuses(capsys, tmp_path):
+    folder = tmp_path / "not yet there"
+    code, out, err = told(capsys, "stability", "verlet", "rk4", "-o", str(folder))
+    assert (code, err) == (0, "")
+    assert "no map of Verlet: verlet needs forces that do not depend on the velocity" in out.replace("\n", " ")
+    names = ["stability-curves.png", "stability-loci.png", "stability-map-rk4.png", "stability.csv"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    for name in names[:3]:
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+        assert name in out.replace("\n", " ")
+    with (folder / "stability.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["r1_squared"]) for row in rows if row["method"] == "rk4"] == (
+        sw.charts.stability(["rk4"]).loci[0].r1_squared.tolist()
+    )
+
+
+def test_stability_draws_what_was_asked_for(capsys, tmp_path):
+    words = ("stability", "verlet", "rk4", "-o", str(tmp_path), "--charts", "map, loci,map", "--phi", "2.5", "--json")
+    code, out, err = told(capsys, *words)
+    report = json.loads(out)
+    assert (code, err) == (0, "")
+    names = ["stability-map-rk4.png", "stability-loci.png", "stability.csv"]
+    assert sorted(report["files"]) == sorted(str(tmp_path / name) for name in names)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    assert list(report["refused"]) == ["verlet"]
+    with (tmp_path / "stability.csv").open(encoding="utf-8") as file:
+        assert float(list(csv.DictReader(file))[-1]["phi"]) == 2.5
+
+
+# ---- figures
+
+
+def test_figures_writes_a_picture_for_each_method(capsys, tmp_path):
+    code, out, err = told(capsys, "figures", "-o", str(tmp_path / "all"))
+    assert (code, err) == (0, "")
+    written = sorted(path.name for path in (tmp_path / "all").iterdir())
+    assert written == sorted(["overview.png", *(samples.file for samples in sw.charts.figures().samples)])
+    assert "07-false_euler.png" in written
+    for name in written:
+        assert name in out.replace("\n", " ") or len(str(tmp_path)) > 40  # a long path is broken within a cell
+    code, out, err = told(capsys, "figures", "false_heun", "-o", str(tmp_path), "--phi", "1", "--periods", "2", "--json")
+    report = json.loads(out)
+    assert (code, err, report["phi"]) == (0, "", 1.0)
+    assert report["files"] == [str(tmp_path / name) for name in ("overview.png", "10-false_heun.png")]
+    assert report["summary"][0]["r1_squared"] == pytest.approx(0.5)
+
+
 # ---- what goes wrong
 
 
@@ -176,6 +279,18 @@ def test_chart_prints_a_summary(capsys, tmp_path):
         (["run", "forced_oscillator", "--method", "verlet"], "verlet needs forces that do not depend on the velocity"),
         (["chart", "oscillator", "clovr"], "did you mean 'clover'?"),
         (["chart", "oscillator", "--methods", "rk4,"], "method: there is no ''"),
+        (["criteria", "rk5"], "did you mean 'rk4'?"),
+        (["criteria", "--phi", "0.1,x"], "--phi: expected numbers in rad, such as 0.1,0.5, got '0.1,x'"),
+        (["criteria", "--phi=-1"], "phi: expected numbers above zero in rad"),
+        (["criteria", "--json", "--markdown"], "--markdown: expected either this or --json"),
+        (["criteria", "-o", "criteria.txt"], "-o: expected a file ending in .json or .md"),
+        (["stability", "rk5", "-o", "out"], "did you mean 'rk4'?"),
+        (["stability", "--charts", "locus", "-o", "out"], "--charts: there is no 'locus'; did you mean 'loci'?"),
+        (["stability", "--charts", "loci"], "-o: expected a folder for what --charts asks for"),
+        (["stability", "--phi", "0", "-o", "out"], "--phi: expected numbers above zero in rad"),
+        (["figures", "rk5", "-o", "out"], "did you mean 'rk4'?"),
+        (["figures", "--phi", "0", "-o", "out"], "phi: expected numbers above zero in rad"),
+        (["figures", "--periods", "1e9", "-o", "out"], "expected 100000 or fewer"),
     ],
 )
 def test_an_error_is_one_line_and_ends_with_2(capsys, tmp_path, monkeypatch, words, message):
@@ -208,7 +323,8 @@ def test_without_rich_everything_but_tables_works(capsys, monkeypatch, tmp_path)
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "rich", None)
     chart = ("chart", "oscillator", "--methods", "rk4", "-o", str(tmp_path / "out"))
-    for words in (("scenes",), ("methods",), chart):
+    stability, figures = (("stability", "rk4", "-o", str(tmp_path / "out")), ("figures", "rk4", "-o", str(tmp_path / "out")))
+    for words in (("scenes",), ("methods",), chart, ("criteria",), stability, figures):
         code, out, err = told(capsys, *words)
         assert (code, out) == (2, "")
         assert err == "stepwell: a table needs rich; pip install 'stepwell[chart]', or ask for --json\n"
@@ -218,9 +334,25 @@ def test_without_rich_everything_but_tables_works(capsys, monkeypatch, tmp_path)
         ("methods", "--json"),
         ("methods", "rk4"),
         ("run", "clover", "--method", "rk4"),
+        ("criteria", "--json"),
+        ("criteria", "--markdown"),
+        ("stability", "--json"),
+        (*stability, "--charts", "loci", "--json"),
+        (*figures, "--json"),
     ):
         assert told(capsys, *words)[0] == 0
     assert told(capsys, *chart, "--json")[0] == 0
+
+
+def test_without_matplotlib_numbers_are_told_and_no_folder_is_made(capsys, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    for command in ("stability", "figures"):
+        code, out, err = told(capsys, command, "rk4", "-o", str(tmp_path / "out"))
+        assert (code, out) == (2, "")
+        assert err == "stepwell: plot: a picture needs matplotlib; pip install 'stepwell[chart]'\n"
+    assert list(tmp_path.iterdir()) == []
+    for words in (("stability",), ("criteria",)):
+        assert told(capsys, *words)[0] == 0
 
 
 def test_a_reader_who_leaves_early_is_no_error():
@@ -234,3 +366,8 @@ def test_a_reader_who_leaves_early_is_no_error():
     with process:
         assert process.stderr.read() == b""
     assert process.returncode == 0
+
+
+def test_stability_draws_powers_if_asked(tmp_path):
+    assert cli.main(["stability", "rk4", "-o", str(tmp_path), "--charts", "powers", "--json"]) == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["powers-rk4.png", "stability.csv"]

@@ -93,7 +93,7 @@ class Criteria(tuple[Criterion, ...]):
                 "order": c.method.order,
                 "limit": float(c.limit),
                 "samples_per_period": c.samples_per_period if math.isfinite(c.samples_per_period) else None,
-                "leaves_at": None if c.limit.mode is None else c.limit.mode.kind,
+                "leaves_by": None if c.limit.mode is None else c.limit.mode.kind,
                 "r1_squared_minus_1": c.r1_squared,
                 "frequency_deviation": c.deviation,
             }

@@ -1,0 +1,44 @@
+"""Draws the pictures of README.md and docs/*.md anew into docs/images. Takes a minute or two.
+
+Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and look at what it drew.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import stepwell as sw
+from PIL import Image
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+IMAGES = Path(__file__).resolve().parent / "images"
+
+#: Colours of a picture: enough for lines and letters, and a fraction of the bytes.
+COLOURS = 64
+
+#: The methods whose maps are shown.
+MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4")
+
+
+def write(name: str, figure: Figure) -> None:
+    """Write a picture with a palette."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", facecolor="white")
+    Image.open(drawn).convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS).save(IMAGES / name, optimize=True)
+    print(f"docs/images/{name}")
+
+
+if __name__ == "__main__":
+    for scene in ("oscillator", "clover"):
+        write(f"{scene}.png", sw.charts.work_precision(scene).plot())
+    stability = sw.charts.stability()
+    write("stability-loci.png", stability.plot(kind="loci"))
+    write("stability-curves.png", stability.plot(kind="curves"))
+    for method in MAPS:
+        write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot())
+    write("figures.png", sw.charts.figures().plot())
+    write("powers.png", sw.charts.powers().plot())

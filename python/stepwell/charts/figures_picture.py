@@ -1,0 +1,102 @@
+"""The pictures of the document's figures: samples joined by straight lines, and the exact cosine."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .figures import Figures, Samples
+from .style import FONT, GREY, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Samples are shown up to here; what grows more leaves the picture.
+MOST = 2.2
+
+#: Panels of the overview side by side.
+COLUMNS = 2
+
+MARKS = (
+    "Grey: exact, cos ω₀t. Black: samples, joined by straight lines.",
+    "r₁²: mean factor of the energy in a step. Ψ/Φ: frequency of the samples, divided by the true one.",
+)
+
+
+def overview(chart: Figures) -> Figure:
+    """All methods on one figure."""
+    across = min(COLUMNS, len(chart.samples))
+    down = -(-len(chart.samples) // across)
+    width, height = 16.0, 2.75 * down + 2.3
+    figure = new_figure(width, height)
+    from matplotlib import rc_context
+
+    with rc_context(FONT):
+        places = {"left": 0.055, "right": 0.988, "bottom": 1.15 / height, "top": 1.0 - 1.5 / height, "wspace": 0.05}
+        panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False, gridspec_kw=places | {"hspace": 0.42})
+        for i, axes in enumerate(panels.ravel()):
+            if i >= len(chart.samples):
+                axes.set_visible(False)
+                continue
+            samples = chart.samples[i]
+            _samples(axes, chart, samples)
+            axes.set_title(f"{samples.method.title} ({samples.method.section})", loc="left", size=13.5, weight="bold")
+            axes.set_title(_said(samples).split(" (")[0], loc="right", size=12)  # the rest has no room
+            if i % across == 0:
+                axes.set_ylabel("y")
+            if i + across >= len(chart.samples):
+                axes.set_xlabel("time in periods of the exact solution")
+                axes.tick_params(labelbottom=True)
+        figure.text(0.008, 1.0 - 0.45 / height, "The undamped oscillator by each method", size=20, weight="bold")
+        figure.text(0.008, 1.0 - 0.82 / height, _start(chart), size=13.5, color=GREY)
+        figure.text(0.008, 0.14 / height, "   ".join(MARKS), size=12, color=GREY)
+    return figure
+
+
+def one(chart: Figures, samples: Samples) -> Figure:
+    """One method on a figure of its own."""
+    figure = new_figure(11.0, 5.6)
+    from matplotlib import rc_context
+
+    with rc_context(FONT):
+        axes = figure.add_axes((0.075, 0.245, 0.91, 0.535))
+        _samples(axes, chart, samples)
+        axes.set(xlabel="time in periods of the exact solution", ylabel="y")
+        method = samples.method
+        figure.text(0.012, 0.925, f"{method.title} ({method.section}): y(t)", size=18, weight="bold")
+        figure.text(0.012, 0.865, _start(chart), size=12.5, color=GREY)
+        limit = f"Stable for Φ < {samples.limit:.6g}." if samples.limit else "Never stable."
+        figure.text(0.012, 0.805, f"{_said(samples)}. {limit}", size=12.5)
+        figure.text(0.012, 0.03, "\n".join(MARKS), size=12, color=GREY, linespacing=1.35)
+    return figure
+
+
+def _samples(axes: Axes, chart: Figures, samples: Samples) -> None:
+    turn = 2.0 * math.pi
+    t = np.linspace(0.0, float(samples.t[-1]), 1 + 60 * math.ceil(samples.t[-1] / turn))
+    axes.axhline(0.0, color="#cccccc", linewidth=0.8)
+    axes.plot(t / turn, np.cos(t), color="#8c8c8c", linewidth=2.6, zorder=2)
+    # Past the range of a picture's numbers lines are not drawn, but they must not fail either.
+    y = np.clip(np.nan_to_num(samples.y, nan=np.nan, posinf=1e9, neginf=-1e9), -1e9, 1e9)
+    many = len(y) > 60 * max(1.0, chart.periods)
+    marker = "" if many else "o"
+    axes.plot(samples.t / turn, y, color="black", linewidth=1.1, marker=marker, markersize=4.2, zorder=3)
+    end = float(samples.t[-1]) / turn
+    axes.set(xlim=(-0.01 * end, 1.01 * end), ylim=(-MOST, MOST), yticks=(-2, -1, 0, 1, 2))
+    if not np.abs(samples.y).max() <= MOST:
+        box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"}
+        largest = f"|y| up to {np.nanmax(np.abs(samples.y)):.3g}"
+        axes.text(0.985, 0.07, largest, transform=axes.transAxes, size=11.5, ha="right", bbox=box, zorder=5)
+    axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
+
+
+def _said(samples: Samples) -> str:
+    ratio = f"Ψ/Φ = {samples.ratio:.4f}" if math.isfinite(samples.ratio) else "no Ψ"
+    return f"r₁² = {samples.r1_squared:.4g}, {ratio}: {samples.kind}"
+
+
+def _start(chart: Figures) -> str:
+    return f"v₀ = 0, y₀ = 1; Φ = ω₀·dt = {chart.phi:g} rad, {2.0 * math.pi / chart.phi:.4g} steps per period"

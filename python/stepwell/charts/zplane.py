@@ -1,0 +1,234 @@
+"""Stability charts: where the eigenvalues of every method go as the step grows (§4), exactly and by the series of Appendix A."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array
+from ..errors import ArgumentError, DTypeError, ShapeError
+from ..methods import Method
+from ..methods import method as find_method
+from ..methods import methods as every_method
+from ..stability import StabilityLimit, analyse, series, stability_limit
+from ..stability.eigen import Complex
+from ..stability.expansion import text
+from ..systems import Oscillator
+from .files import write_csv, write_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: The default ladder has so many angles in each unit of Φ: round values are rungs.
+RUNGS = 200
+
+#: It goes past the largest limit by at least this factor.
+PAST = 1.1
+
+#: The pictures that there are.
+KINDS = ("loci", "curves")
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """One method on the undamped oscillator at n angles per step; arrays are of shape (n,) unless said otherwise.
+
+    Attributes:
+        method: which.
+        phi: Φ = ω₀·dt, the true angle per step, in radians.
+        eigenvalues: z₁ and z₂ of the transition matrix, shape (2, n): the larger first, of a pair the one that turns forwards.
+        r1_squared: r₁², the squared magnitude of z₁.
+        ratio: Ψ/Φ, the angle per step of z₁ divided by the true one. Where both are real, Ψ is 0 or π.
+        kind: what the samples do, in the document's words.
+        stable: whether they stay bounded.
+        r1_squared_series: r₁² by 1 and the first two terms that follow.
+        ratio_series: Ψ/Φ likewise.
+        limit: below it the method is stable; 0 for never. Its ``mode`` says how z₁ leaves the unit circle.
+        radius_terms: powers of Φ in r₁² − 1 with their coefficients.
+        ratio_terms: those in Ψ/Φ − 1.
+    """
+
+    method: Method
+    phi: Array
+    eigenvalues: Complex
+    r1_squared: Array
+    ratio: Array
+    kind: Any
+    stable: Any
+    r1_squared_series: Array
+    ratio_series: Array
+    limit: StabilityLimit
+    radius_terms: tuple[tuple[int, Fraction], ...]
+    ratio_terms: tuple[tuple[int, Fraction], ...]
+
+    @property
+    def samples_per_period(self) -> float:
+        """More steps per period than this are needed, 2π/limit; infinite for never."""
+        return 2.0 * math.pi / self.limit if self.limit else math.inf
+
+    @property
+    def leaves(self) -> str | None:
+        """What the samples do past the limit, or None if there is none."""
+        return None if self.limit.mode is None else self.limit.mode.kind
+
+    @property
+    def columns(self) -> dict[str, list[Any]]:
+        """What is written of it, by name."""
+        z1, z2 = self.eigenvalues
+        numbers = {
+            "phi": self.phi,
+            "z1_real": z1.real,
+            "z1_imag": z1.imag,
+            "z2_real": z2.real,
+            "z2_imag": z2.imag,
+            "r1_squared": self.r1_squared,
+            "r1_squared_series": self.r1_squared_series,
+            "ratio": self.ratio,
+            "ratio_series": self.ratio_series,
+            "stable": self.stable,
+            "kind": self.kind,
+        }
+        return {"method": [self.method.name] * len(self.phi)} | {k: list(np.asarray(a).tolist()) for k, a in numbers.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Stability:
+    """Methods on the undamped oscillator, over the angle per step.
+
+    Attributes:
+        phi: the angles Φ, shape (n,).
+        loci: one for each method.
+    """
+
+    phi: Array
+    loci: tuple[Locus, ...]
+
+    def plot(self, path: str | Path | None = None, kind: str = "loci") -> Figure:
+        """Draw it, and write it to ``path`` if given; the ending says in which format.
+
+        Args:
+            path: the file.
+            kind: ``"loci"``: the eigenvalues in the z-plane; ``"curves"``: r₁² and Ψ/Φ over Φ.
+
+        Raises:
+            UnknownNameError: if there is no such kind.
+            UnsupportedError: if matplotlib is missing.
+        """
+        from . import zplane_picture
+        from .style import save
+
+        draw = {"loci": zplane_picture.loci, "curves": zplane_picture.curves}[_checks.known("kind", kind, KINDS)]
+        figure = draw(self)
+        if path is not None:
+            save(figure, path)
+        return figure
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each method and each angle."""
+        columns = self._columns()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def summary(self) -> list[dict[str, Any]]:
+        """A row for each method: its limit, the steps per period that it needs, how it leaves the circle, its series."""
+        return [
+            {
+                "method": locus.method.name,
+                "title": locus.method.title,
+                "limit": float(locus.limit),
+                "samples_per_period": locus.samples_per_period,
+                "leaves_by": locus.leaves,
+                "r1_squared_minus_1": text(list(locus.radius_terms)),
+                "frequency_deviation": text(list(locus.ratio_terms)),
+            }
+            for locus in self.loci
+        ]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write ``rows()``, one line each; every number reads back as itself."""
+        write_csv(self._columns(), path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write summary and rows; what is infinite is null."""
+        write_json({"summary": self.summary(), "rows": self.rows()}, path)
+
+    def _columns(self) -> dict[str, list[Any]]:
+        every = [locus.columns for locus in self.loci]
+        return {name: [value for columns in every for value in columns[name]] for name in every[0]}
+
+
+def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None) -> Stability:
+    """The eigenvalues of methods on the undamped oscillator over the angle per step, exactly and by series (§4, Appendix A).
+
+    Args:
+        methods: names, or what ``stepwell.method`` returns; all if None.
+        phi: angles Φ = ω₀·dt in radians, above zero and rising, shape (n,); if None, 200 in each unit of Φ up to past the
+            largest limit.
+
+    Returns:
+        A ``Stability``.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+    """
+    chosen = choice(methods)
+    angles = None if phi is None else _checks.numbers("phi", phi, positive=True, unit="rad")
+    if angles is not None and (angles.ndim != 1 or not angles.size):
+        raise ShapeError(f"phi: expected a list of angles in rad, got an array of shape {angles.shape}")
+    if angles is not None and (np.diff(angles) <= 0.0).any():
+        raise ArgumentError("phi: expected angles that rise from one to the next")
+    limits = [stability_limit(Oscillator(), method) for method in chosen]
+    if angles is None:
+        angles = ladder(largest(limits))
+    return Stability(angles, tuple(_locus(method, angles, limit) for method, limit in zip(chosen, limits, strict=True)))
+
+
+def choice(methods: Iterable[Method | str] | None) -> list[Method]:
+    """The methods that are meant, each once."""
+    if isinstance(methods, str):
+        raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
+    chosen = list(dict.fromkeys(every_method() if methods is None else map(find_method, methods)))
+    if not chosen:
+        raise ArgumentError("methods: expected at least one, got none")
+    return chosen
+
+
+def largest(limits: Sequence[float]) -> float:
+    """A round angle past all limits, and past 2, to which every Euler method is worth seeing."""
+    return math.ceil(2.0 * PAST * max([2.0, *filter(math.isfinite, limits)])) / 2.0
+
+
+def ladder(top: float) -> Array:
+    """Angles up to ``top``, evenly spread, without 0."""
+    n = max(1, round(RUNGS * top))
+    return np.asarray(np.arange(1, n + 1) * (top / n))
+
+
+def _locus(method: Method, phi: Array, limit: StabilityLimit) -> Locus:
+    found = analyse(Oscillator(), method, dt=phi)
+    expansion = series(method)
+    radius_terms, ratio_terms = expansion.radius_terms(), expansion.ratio_terms()
+    return Locus(
+        method=method,
+        phi=phi,
+        eigenvalues=found.eigenvalues,
+        r1_squared=found.radius**2,
+        ratio=found.frequency_ratio,
+        kind=found.kind,
+        stable=found.stable,
+        r1_squared_series=_sum(radius_terms, phi),
+        ratio_series=_sum(ratio_terms, phi),
+        limit=limit,
+        radius_terms=tuple(radius_terms),
+        ratio_terms=tuple(ratio_terms),
+    )
+
+
+def _sum(terms: Sequence[tuple[int, Fraction]], phi: Array) -> Array:
+    return sum((float(c) * phi**k for k, c in terms), start=np.ones_like(phi))

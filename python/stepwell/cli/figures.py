@@ -1,0 +1,41 @@
+"""Draw the document's figures (§5 to §11): the samples of each method on the undamped oscillator, beside the cosine."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..charts import figures
+from ..methods import method
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
+    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
+    parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
+    parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="how many periods (default: 4)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Run, draw, write, list."""
+    methods = [method(name) for name in args.methods] or None
+    if not args.json:
+        show.need_rich()
+
+    chart = figures(methods, phi=args.phi, periods=args.periods)
+    files = [str(path) for path in chart.save(args.output)]
+    if args.json:
+        show.print_json({"phi": chart.phi, "files": files, "summary": chart.summary()})
+        return
+    show.table(
+        f"The undamped oscillator with Φ = {chart.phi:g}",
+        ("method", "r₁²>", "Ψ/Φ>", "what the samples do", "largest |y|>", "file"),
+        [
+            (s["title"], f"{s['r1_squared']:.6g}", f"{s['ratio']:.5f}", s["kind"], f"{s['largest_y']:.4g}", file)
+            for s, file in zip(chart.summary(), files[1:], strict=True)
+        ],
+        [f"all in one: {files[0]}"],
+    )

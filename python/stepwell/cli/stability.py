@@ -1,0 +1,90 @@
+"""Chart the stability of methods: the eigenvalues of a step, how much it grows or damps, and where it is stable."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .. import _checks
+from ..charts import Stability, powers, stability, stability_map, style
+from ..charts.zplane import KINDS, ladder
+from ..errors import ArgumentError, UnsupportedError
+from ..methods import method
+from . import show
+
+#: What is drawn unless told otherwise: the pictures of all methods, and the map of each. Powers are drawn if asked for.
+USUAL = (*KINDS, "map")
+CHARTS = (*USUAL, "powers")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="write pictures and numbers there")
+    parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
+    parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Analyse, draw, write, tell."""
+    # All names are looked up, and what is needed is there, before any work.
+    methods = [method(name) for name in args.methods] or None
+    asked = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
+    kinds = [_checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]
+    if args.charts is not None and args.output is None:
+        raise ArgumentError("-o: expected a folder for what --charts asks for")
+    top = None if args.phi is None else _checks.number("--phi", args.phi, positive=True, unit="rad")
+    if not args.json:
+        show.need_rich()
+    if args.output is not None:
+        style.new_figure(1.0, 1.0)  # raises if there can be no picture
+
+    chart = stability(methods, phi=None if top is None else ladder(top))
+    files, refused = ([], {}) if args.output is None else _write(chart, args.output, kinds, top)
+    if args.json:
+        show.print_json({"files": files, "summary": chart.summary(), "refused": refused})
+        return
+    rows = [
+        (
+            row["title"],
+            f"{row['limit']:.7g}" if row["limit"] else "never",
+            f"{row['samples_per_period']:.4g}" if row["limit"] else "–",
+            row["leaves_by"] or "–",
+            row["r1_squared_minus_1"],
+            row["frequency_deviation"],
+        )
+        for row in chart.summary()
+    ]
+    show.table(
+        "Stability of the undamped oscillator, Φ = ω₀·dt",
+        ("method", "stable for Φ <>", "steps a period >>", "past that", "r₁² − 1", "Ψ/Φ − 1"),
+        rows,
+        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()]
+        + ([f"written: {', '.join(files)}"] if files else []),
+    )
+
+
+def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None) -> tuple[list[str], dict[str, str]]:
+    """Write what was asked for; returns the files, and which methods have no map and why."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for kind in kinds:
+        if kind in KINDS:
+            files.append(folder / f"stability-{kind}.png")
+            chart.plot(files[-1], kind=kind)
+    files.append(folder / "stability.csv")
+    chart.to_csv(files[-1])
+    refused = {}
+    for locus in chart.loci if "map" in kinds else ():
+        try:
+            drawn = stability_map(locus.method) if top is None else stability_map(locus.method, phi=(0.0, top))
+        except UnsupportedError as error:
+            refused[locus.method.name] = str(error)
+            continue
+        files.append(folder / f"stability-map-{locus.method.name}.png")
+        drawn.plot(files[-1])
+    for locus in chart.loci if "powers" in kinds else ():
+        files.append(folder / f"powers-{locus.method.name}.png")
+        powers(locus.method).plot(files[-1])
+    return [str(file) for file in files], refused

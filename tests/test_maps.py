@@ -1,0 +1,253 @@
+"""Stability maps: radius by closed forms, what is observed against what is predicted, files and the picture."""
+
+import csv
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnknownNameError, UnsupportedError
+
+METHODS = sw.methods()
+DAMPED = [method for method in METHODS if not method.needs_acceleration]
+UNDAMPED = [method for method in METHODS if method.needs_acceleration]
+
+#: R(x) of the methods that treat both blocks alike: they step e^x, and so e^(λ·dt) of each mode.
+POLYNOMIALS = {
+    "standard_euler": lambda x: 1 + x,
+    "standard_heun": lambda x: 1 + x + x**2 / 2,
+    "rk4": lambda x: 1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24,
+}
+
+
+@pytest.fixture(scope="module")
+def false_euler():
+    return sw.charts.stability_map("false_euler", size=(200, 101))
+
+
+def read(path):
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# ---- the prediction
+
+
+@pytest.mark.parametrize("name", POLYNOMIALS)
+def test_the_radius_is_that_of_the_stability_polynomial(name):
+    """At D = 1 both modes meet, and the rounding of P's elements, below 1000 eps, is magnified to its root, 5e-7."""
+    chart = sw.charts.stability_map(name, size=(80, 61))
+    phi, damping = np.meshgrid(chart.phi, chart.damping)
+    root = np.sqrt((damping**2 - 1).astype(complex))
+    radius = np.max([np.abs(POLYNOMIALS[name](phi * (-damping + sign * root))) for sign in (1, -1)], axis=0)
+    assert chart.radius == pytest.approx(radius, rel=5e-7)
+    clear = np.abs(radius - 1) > 5e-7
+    assert np.array_equal(chart.stable[clear], (radius < 1)[clear])
+
+
+def test_false_euler_is_stable_up_to_the_documents_limit_with_damping(false_euler):
+    """z² − (2 − 2DΦ − Φ²)z + 1 − 2DΦ has a root −1 at Φ = 2(√(1 + D²) − D), which is 2 without damping."""
+    edge = 2 * (np.sqrt(1 + false_euler.damping**2) - false_euler.damping)
+    assert np.array_equal(false_euler.stable, false_euler.phi < edge[:, np.newaxis] * (1 - 1e-9))
+    phi, damping = np.meshgrid(false_euler.phi, false_euler.damping)
+    p, q = 1 - damping * phi - phi**2 / 2, 1 - 2 * damping * phi
+    real = p**2 > q
+    with np.errstate(invalid="ignore"):
+        radius = np.where(real, np.abs(p) + np.sqrt(p**2 - q), np.sqrt(q))
+    assert false_euler.radius == pytest.approx(radius, rel=5e-7)
+
+
+@pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
+def test_every_row_ends_where_the_limit_is(method):
+    chart = sw.charts.stability_map(method, size=(400, 5))
+    for row in chart.summary():
+        limit = float(sw.stability_limit(sw.Oscillator(damping=row["damping"]), method))
+        if not limit:
+            assert row["stable_up_to"] < 0.1  # where growth of a high order begins it is lost in rounding
+            continue
+        assert row["stable_up_to"] <= limit * (1 + 1e-9)
+        assert limit <= row["stable_up_to"] + chart.phi[0] * (1 + 1e-9)
+
+
+def test_the_grid(false_euler):
+    assert false_euler.phi == pytest.approx(np.arange(1, 201) / 50, rel=1e-15)
+    assert false_euler.damping.tolist() == np.linspace(0, 2, 101).tolist()
+    assert false_euler.radius.shape == false_euler.stable.shape == (101, 200)
+    chart = sw.charts.stability_map("rk4", phi=(1, 2), damping=(0.5, 0.7), size=3)
+    assert (chart.phi[0], chart.phi[-1], chart.damping[0], chart.damping[-1]) == pytest.approx((4 / 3, 2, 0.5, 0.7))
+    assert sw.charts.stability_map("rk4").radius.shape == (512, 512)
+
+
+def test_a_double_eigenvalue_on_the_circle_is_not_stable():
+    chart = sw.charts.stability_map("false_euler", damping=None, size=(4, 1))
+    assert chart.phi.tolist() == [1, 2, 3, 4]
+    assert chart.stable.tolist() == [[True, False, False, False]]
+    assert chart.radius[0, 1] == 1
+
+
+@pytest.mark.parametrize("method", UNDAMPED, ids=lambda m: m.name)
+def test_a_method_that_cannot_do_damping_says_so(method):
+    with pytest.raises(UnsupportedError, match=r"needs forces that do not depend on the velocity, but Oscillator\(omega=1.0"):
+        sw.charts.stability_map(method)
+    with pytest.raises(ArgumentError, match="plot: expected a map of 2 × 2 points or more"):
+        sw.charts.stability_map(method, damping=None).plot()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"method": "rk5"}, UnknownNameError, "did you mean 'rk4'"),
+        ({"phi": (2, 1)}, ArgumentError, "phi: expected the lower end first, got 2 and 1"),
+        ({"phi": (-1, 1)}, ArgumentError, "phi: expected angles of 0 rad or more, got -1"),
+        ({"phi": 4}, ShapeError, "phi: expected two numbers"),
+        ({"damping": (0, 1, 2)}, ShapeError, "damping: expected two numbers"),
+        ({"damping": ("a", "b")}, DTypeError, "damping: expected real numbers"),
+        ({"size": 0}, ArgumentError, "size: expected 1 or more"),
+        ({"size": (3, 3, 3)}, ShapeError, "size: expected a number of points or a pair"),
+        ({"size": 2.5}, DTypeError, "size: expected a whole number"),
+        ({"size": 10**7}, TooLargeError, "ask for fewer points"),
+    ],
+)
+def test_what_cannot_be_mapped_is_said(arguments, error, message):
+    with pytest.raises(error, match=message):
+        sw.charts.stability_map(**({"method": "rk4"} | arguments))
+
+
+# ---- the observation
+
+
+def agree(observation, undecided):
+    """No disagreements, on both sides of the circle, and not because too little is decided."""
+    assert observation.disagreements == 0
+    assert np.mean(~observation.decided) < undecided
+    assert (observation.decided & ~observation.bounded).any()
+    assert np.array_equal(observation.bounded | observation.predicted, observation.bounded)
+
+
+@pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
+def test_every_point_does_what_its_eigenvalues_say(method):
+    """400 × 256 oscillators for 2000 steps. The band is half a percent wide, and few points of the map are in it."""
+    chart = sw.charts.stability_map(method, size=(400, 256))
+    observation = chart.observe(2000)
+    agree(observation, 0.02)
+    assert (observation.decided & observation.bounded).any()
+    assert observation.band < 0.008
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
+def test_every_undamped_point_does_what_its_eigenvalues_say(method):
+    """100 000 angles at D = 0, where the stable ones of the symplectic methods are on the circle itself."""
+    chart = sw.charts.stability_map(method, damping=None, size=(100_000, 1))
+    observation = chart.observe(1000)
+    # What grows like Φ⁶ or more, or leaves the circle at a flat angle, has a wide band; half of the map is outside at least.
+    agree(observation, 0.5)
+    below = np.count_nonzero(chart.phi < method.limit * (1 - 1e-12))
+    assert observation.bounded[0, :below].all()
+    # A growth like Φ⁶ is lost in rounding where it begins; a limit is not.
+    assert not method.limit or not chart.stable[0, below + 1]
+
+
+@pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
+def test_a_map_of_other_oscillators_is_found_out(method):
+    """The prediction of steps that are a fiftieth shorter than those that are made."""
+    chart = sw.charts.stability_map(method, size=(200, 100))
+    assert dataclasses.replace(chart, phi=1.02 * chart.phi).observe(2000).disagreements > 10
+
+
+def test_a_wrong_prediction_is_counted(false_euler):
+    wrong = false_euler.stable.copy()
+    wrong[:, :10] = False  # stable, but said to grow; with a radius that says so too
+    radius = np.where(wrong == false_euler.stable, false_euler.radius, 2.0)
+    found = dataclasses.replace(false_euler, stable=wrong, radius=radius).observe(1000)
+    assert found.disagreements == 10 * 101
+    assert "1010 disagreements" in repr(found)
+
+
+def test_threshold_and_band_are_as_derived(false_euler):
+    found = false_euler.observe(500)
+    P = sw.analyse(false_euler.system, "false_euler", dt=1.0)
+    shifted = P.P - P.eigenvalues[0] * np.eye(2)[:, :, np.newaxis, np.newaxis]
+    norms = np.linalg.norm(np.moveaxis(shifted, (0, 1), (-2, -1)), axis=(-2, -1))[false_euler.stable]
+    assert found.threshold == pytest.approx(2 * (1 + 500 * norms.max()))
+    assert (1 + found.band) ** 500 / math.sqrt(2) == pytest.approx(found.threshold)
+    assert np.array_equal(found.decided, false_euler.stable | (false_euler.radius >= 1 + found.band))
+    assert found.band > false_euler.observe(5000).band
+
+
+def test_near_a_double_eigenvalue_the_transient_is_linear_and_stays_below_the_threshold():
+    """At Φ = 2 − δ False Euler's states turn with a radius of about 1/√δ: large, bounded, and not to be called growing."""
+    chart = sw.charts.stability_map("false_euler", phi=(1.999_999, 2.000_001), damping=None, size=(1000, 1))
+    found = chart.observe(4000)
+    assert found.disagreements == 0
+    assert found.bounded[found.predicted].all()
+    run = sw.integrate(sw.Oscillator(chart.phi[498]), "false_euler", v=0.0, y=1.0, dt=1.0, steps=4000, every=1)
+    assert 1000 < np.abs(run.y).max() < found.threshold
+
+
+def test_the_steps_are_checked(false_euler):
+    with pytest.raises(ArgumentError, match="steps: expected 1 or more, got 0"):
+        false_euler.observe(0)
+
+
+# ---- files and the picture
+
+
+def test_the_files_hold_the_map(false_euler, tmp_path):
+    false_euler.to_csv(tmp_path / "map.csv")
+    rows = read(tmp_path / "map.csv")
+    assert [float(row["radius"]) for row in rows] == false_euler.radius.ravel().tolist()
+    assert [row["stable"] == "True" for row in rows] == false_euler.stable.ravel().tolist()
+    assert [(float(rows[k]["phi"]), float(rows[k]["damping"])) for k in (0, 1, 200)] == [
+        (false_euler.phi[0], 0.0),
+        (false_euler.phi[1], 0.0),
+        (false_euler.phi[0], false_euler.damping[1]),
+    ]
+    false_euler.to_json(tmp_path / "map.json")
+    whole = json.loads((tmp_path / "map.json").read_text(encoding="utf-8"))
+    assert whole["phi"] == {"first": 0.02, "last": 4.0, "points": 200}
+    assert (whole["method"], whole["damping"]["points"], whole["summary"]) == ("false_euler", 101, false_euler.summary())
+    assert [row["damping"] for row in whole["summary"]] == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert whole["summary"][0]["stable_up_to"] == pytest.approx(1.98)
+
+
+@pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
+def test_the_picture_has_lines_numbers_and_hatching(method, tmp_path):
+    from matplotlib.image import imread
+
+    chart = sw.charts.stability_map(method, size=128)
+    figure = chart.plot(tmp_path / "map.png")
+    image = imread(tmp_path / "map.png")
+    assert image.shape[:2] == (700, 1000)
+    assert image[..., :3].std() > 0.1
+    axes, bar = figure.axes
+    assert f"Where {method.title} is stable ({method.section})" in [text.get_text() for text in figure.texts]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("Φ = ω₀·dt (rad)", "damping ratio D")
+    assert "r₁" in bar.get_ylabel()
+    assert any(hatch for collection in axes.collections for hatch in getattr(collection, "hatches", ()))
+    assert len(axes.texts) >= 2
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert not any(box.overlaps(other) for i, box in enumerate(boxes) for other in boxes[:i])
+    for box in (*boxes, *(text.get_window_extent() for text in figure.texts), *(a.get_tightbbox() for a in figure.axes)):
+        assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+
+
+def test_the_thick_line_of_false_euler_is_at_its_limit(false_euler):
+    thick = next(c for c in false_euler.plot().axes[0].collections if max(np.atleast_1d(c.get_linewidth())) > 2)
+    for path in thick.get_paths():
+        phi, damping = path.vertices.T
+        assert phi == pytest.approx(2 * (np.sqrt(1 + damping**2) - damping), abs=0.02)
+
+
+def test_a_map_that_is_all_stable_or_all_growing_can_be_drawn(tmp_path):
+    stable = sw.charts.stability_map("rk4", phi=(0.1, 0.2), damping=(0.5, 0.6), size=8)
+    growing = sw.charts.stability_map("standard_euler", phi=(3, 4), damping=(0, 0.1), size=8)
+    assert (stable.stable.all(), growing.stable.any()) == (True, False)
+    for i, chart in enumerate((stable, growing)):
+        chart.plot(tmp_path / f"{i}.png")
+    assert growing.summary()[0]["stable_up_to"] == 0
+    assert stable.summary()[0]["stable_up_to"] == pytest.approx(0.2)
+    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
+        stable.plot(tmp_path / "map.docx")

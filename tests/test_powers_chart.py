@@ -1,0 +1,78 @@
+"""The chart of powers against steps: errors in exact arithmetic, times, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.charts import powers
+from stepwell.charts.powers import FORMS
+from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from truths import CLOSED_FORMS
+
+
+@pytest.mark.parametrize("method", sorted(CLOSED_FORMS))
+def test_errors_are_those_of_exact_arithmetic(method: str) -> None:
+    """The closed form of P in fractions, applied seven times by hand."""
+    chart = powers(method, v=0.25, y=1.0, dt=0.5, steps=[1, 7])
+    half = Fraction(1, 2)
+    matrix: Any = CLOSED_FORMS[method](half)  # type: ignore[arg-type]
+    state = np.array([Fraction(1, 4), Fraction(1)], dtype=object)
+    if method == "verlet":  # in its slots: y₋₁ = y₀ − Φ·v₀ − ½Φ²·y₀
+        matrix = np.array([[0, 1], [-1, 2 - half**2]], dtype=object)
+        state[0] = 1 - half / 4 - half**2 / 2
+    sizes = [float(np.hypot(*map(float, state)))]
+    for k in range(1, 8):
+        state = np.array([sum(a * b for a, b in zip(row, state, strict=True)) for row in matrix], dtype=object)
+        if k in (1, 7):
+            sizes.append(float(np.hypot(*map(float, state))))
+    run = sw.integrate(sw.Oscillator(), method, v=0.25, y=1.0, dt=0.5, steps=7)
+    slot = run.v[-1] if run.carry is None else run.carry
+    distance = np.hypot(float(Fraction(float(slot)) - state[0]), float(Fraction(float(run.y[-1])) - state[1]))
+    assert chart.errors["direct"][1] == pytest.approx(distance / max(sizes), rel=1e-6, abs=1e-30)
+    for form in FORMS:
+        assert chart.errors[form].max() < 1e-14
+        assert (chart.seconds[form] > 0).all()
+
+
+def test_a_power_costs_little_and_errs_like_steps() -> None:
+    """20 squarings for a million steps. Each rounds P by some 2⁻⁵³ of its size, and n of these add up: errors below 8·n·2⁻⁵³."""
+    chart = powers(steps=[10, 10**6])
+    assert (chart.errors["power"] < 8 * chart.steps * 2.0**-53).all()
+    assert chart.errors["power"][1] > 0
+    # A coarse ratio: 30 when measured.
+    assert chart.seconds["matrix"][1] > 3 * chart.seconds["power"][1]
+
+
+def test_files_and_picture(tmp_path: Path) -> None:
+    chart = powers("rk4", system=sw.Chain(3), y=[1.0, 0.0, 0.0], steps=[1, 100, 1000])
+    chart.to_csv(tmp_path / "p.csv")
+    with (tmp_path / "p.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["error"]) for row in rows if row["form"] == "power"] == chart.errors["power"].tolist()
+    assert len(rows) == len(chart.rows()) == 9
+    chart.to_json(tmp_path / "p.json")
+    assert json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))["summary"] == chart.summary()
+    figure = chart.plot(tmp_path / "p.png")
+    assert (tmp_path / "p.png").stat().st_size > 10_000
+    assert [axes.get_xlabel() for axes in figure.axes] == ["steps n", "steps n"]
+    assert len(figure.axes[0].lines) == len(FORMS)
+
+
+def test_what_has_no_powers_is_refused() -> None:
+    with pytest.raises(UnsupportedError, match="only linear systems have powers"):
+        powers(system=sw.NBody())
+    with pytest.raises(ShapeError, match="one member"):
+        powers(system=sw.Oscillator([1.0, 2.0]))
+    with pytest.raises(ArgumentError, match="steps"):
+        powers(steps=[])
+    with pytest.raises(ArgumentError, match="dt"):
+        powers(dt=0.0)
+    with pytest.raises(UnsupportedError):
+        powers("verlet", system=sw.Oscillator(1.0, 0.1))
