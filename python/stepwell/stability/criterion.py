@@ -27,6 +27,9 @@ from .limit import StabilityLimit, stability_limit
 #: The angles per step at which errors are given: 63, 13 and 6 samples per period.
 PHI = (0.1, 0.5, 1.0)
 
+#: What is nearer to 1 than this is 1 but for rounding, when it is written down.
+ROUNDING = 1e-13
+
 
 class At(NamedTuple):
     """A method at one angle per step.
@@ -108,14 +111,15 @@ class Criteria(tuple[Criterion, ...]):
         """Head and rows of texts, for a page or a screen. Heads that end in ``>`` are of numbers."""
         head = ["method", "stable for Φ <>", "steps a period >>", "r₁² − 1", "Ψ/Φ − 1"]
         phis = [at.phi for at in self[0].at] if self else []
-        head += [f"{what} at {phi:g}>" for phi in phis for what in ("r₁²", "Ψ/Φ − 1")]
+        head += [f"{what} at {phi:g}>" for phi in phis for what in ("r₁² − 1", "Ψ/Φ − 1")]
         head += ["+>", "×>", "÷>", "√>", "rates>"]
         rows = []
         for c in self:
             limit = f"{float(c.limit):.7g}" if c.limit else "never"
             row = [c.method.title, limit, f"{c.samples_per_period:.4g}" if c.limit else "–", c.r1_squared, c.deviation]
             for at in c.at:
-                row += [f"{at.r1_squared:.5g}", f"{100 * at.deviation:+.3g} %"]
+                change = at.r1_squared - 1.0
+                row += [f"{change:+.3g}" if abs(change) > ROUNDING else "0", f"{100 * at.deviation:+.3g} %"]
             o = c.operations
             counts = (o.additions, o.multiplications, o.divisions, o.square_roots, o.rate_evaluations)
             rows.append(row + [str(n) for n in counts])
