@@ -60,6 +60,15 @@ SYSTEMS: dict[str, Make] = {
     ),
     "sampled x and a, physical": lambda r, b: sw.Oscillator(_omega(r, b), x=_held(r, b), a=_held(r, b), form="physical"),
     "three bodies": lambda r, b: sw.NBody(G=r.uniform(0.5, 2.0, b)),
+    "three bodies in space, newton": lambda r, b: sw.NBody(
+        [1.0, 0.0, 2.0], force="newton", softening=r.uniform(0.1, 0.2, b), dim=3
+    ),
+    "three bodies, newton": lambda r, b: sw.NBody(r.uniform(0.1, 1.0, (3, b)), force="newton", softening=0.3),
+    "three bodies in space": lambda r, b: sw.NBody(r.uniform(0.1, 1.0, (3, b)), dim=3),
+    "one body": lambda r, b: sw.NBody([1.0]),
+    "two bodies": lambda r, b: sw.NBody(r.uniform(0.1, 1.0, (2, b)), force="newton", softening=0.3),
+    "eight bodies": lambda r, b: sw.NBody(r.uniform(0.0, 1.0, 8), softening=0.2, G=r.uniform(0.5, 1.0, b)),
+    "thirty-five bodies in space, newton": lambda r, b: sw.NBody(r.uniform(0.0, 0.2, 35), force="newton", softening=0.3, dim=3),
     "chain of one": lambda r, b: sw.Chain(1, stiffness=r.uniform(0.5, 2.0, (2, b))),
     "chain of five": lambda r, b: sw.Chain(5, stiffness=r.uniform(0.0, 2.0, (6, b)), mass=r.uniform(0.5, 2.0, 5)),
     "chain of nineteen": lambda r, b: sw.Chain(19, mass=r.uniform(0.5, 2.0, (1, b))),

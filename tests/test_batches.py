@@ -244,3 +244,36 @@ def test_a_run_goes_on_after_somebody_diverged(method: str, form: str, backend: 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sw.integrate(system, method, steps=5, **options, **second.resume)
+
+
+def test_collisions_say_who_met_whom_and_when() -> None:
+    """Equal positions are 0/0 at once; three bodies that fall together meet at the centre. Neighbours go on."""
+    c = np.sqrt(0.75)
+    triangle = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
+    equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
+    y = np.stack([triangle, equal, 3.0 * triangle], axis=-1)
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 member\(s\) diverged; first member 1 .* bodies 0 and 2 were 0 apart"):
+        run = sw.integrate(sw.NBody(force="newton", G=[1.0, 2.0, 1e-3]), "false_euler", v=0.0, y=y, dt=0.01, steps=10)
+    assert run.first_bad_step.tolist() == [-1, 1, -1]
+    (met,) = run.collisions
+    assert (met.member, met.step, met.bodies, met.distance) == ((1,), 1, (0, 2), 0.0)
+    assert np.isfinite(run.y[-1][..., [0, 2]]).all()
+    alone = sw.integrate(sw.NBody(force="newton", G=1e-3), "false_euler", v=0.0, y=y[..., 2], dt=0.01, steps=10)
+    np.testing.assert_array_equal(alone.y[-1], run.y[-1][..., 2])
+    with pytest.raises(sw.errors.UnsupportedError, match="collisions"):
+        _ = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1).collisions
+
+
+def test_a_collision_after_many_steps_is_found_by_running_again() -> None:
+    """Two bodies fall together from rest: the pair and its distance are those of the state before the first bad step."""
+    system = sw.NBody([1.0, 1.0, 0.0], force="printed")
+    y = np.array([[0.0, 0.0], [0.0, 1.0], [5.0, 5.0]])
+    control = sw.EnergyControl(1e4, "printed", target=10.0)  # too strong: it overflows
+    with pytest.warns(sw.ControlWarning), pytest.warns(sw.DivergenceWarning, match="apart before it"):
+        run = sw.integrate(system, "standard_euler", v=0.1, y=y, dt=0.01, steps=1000, control=control)
+    (met,) = run.collisions
+    assert met.step == run.first_bad_step > 2
+    with pytest.warns(sw.ControlWarning):
+        before = sw.integrate(system, "standard_euler", v=0.1, y=y, dt=0.01, steps=met.step - 1, control=control)
+    apart = np.linalg.norm(before.y[-1][:, None] - before.y[-1][None], axis=-1)
+    assert met.distance == apart[met.bodies]

@@ -172,7 +172,13 @@ def _member(system: sw.System, i: int) -> sw.System:
     if isinstance(system, sw.Oscillator):
         return sw.Oscillator(one(system.omega), one(system.damping), x=one(system.x), a=one(system.a), form=system.form)
     if isinstance(system, sw.NBody):
-        return sw.NBody(G=one(system.G))
+        return sw.NBody(
+            system.masses[..., i] if system.masses.ndim > 1 else system.masses,
+            force=system.force,
+            G=one(system.G),
+            softening=one(system.softening),
+            dim=system.dim,
+        )
     if isinstance(system, sw.LinearSystem):
         A, B = (a if a is None or a.ndim == 2 else a[..., i] for a in (system.A, system.B))
         return sw.LinearSystem(A, B, x=None if B is None else [one(x) for x in system.x], velocities=system.velocities)

@@ -36,6 +36,9 @@ MUTANTS = [
     ("verlet", "(2.0 * y - y_prev) + d", "(2.0 * y - y_prev) + 0.5 * d", "a half too much"),
     ("verlet", "y_prev = y_prev + 0.5 * s.dy", "y_prev = y_prev + s.dy", "a lost half at the start"),
     ("verlet", "v = v + 0.5 * s.dv", "v = v + s.dv", "a lost half at the end"),
+    ("leapfrog", "v_half = v_half + s.dv(t, v_half, y)", "v_half = v_half + 0.5 * s.dv(t, v_half, y)", "a half too much"),
+    ("leapfrog", "v + -0.5 * s.dv(t, v, y)", "v - s.dv(t, v, y)", "a lost half at the start"),
+    ("leapfrog", "v_half + 0.5 * s.dv(t, v_half, y)\n", "v_half\n", "a lost half kick at the end"),
     ("verlet", "y_prev = y - s.dy(t, v, y)", "y_prev = y + s.dy(t, v, y)", "a wrong sign at the start"),
 ]
 IDS = [f"{method}: {mistake} #{i}" for i, (method, _, _, mistake) in enumerate(MUTANTS)]

@@ -27,6 +27,7 @@ CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
     "damped_euler": lambda f: np.array([[1 - f**2, -f], [f, 1]]),
     "false_euler": _false_euler,
     "verlet": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 4)], [f, 1 - f**2 / 2]]),
+    "leapfrog": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 4)], [f, 1 - f**2 / 2]]),
     "standard_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f, 1 - f**2 / 2]]),
     "false_heun": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 2)], [f * (1 - f**2 / 2), 1 - f**2 + f**4 / 2]]),
     "semi_false_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f * (1 - f**2 / 2), 1 - f**2 / 2]]),
@@ -51,6 +52,7 @@ WEIGHTS: dict[str, dict[float, float]] = {
     "damped_euler": {0.0: 1.0},
     "false_euler": {0.0: 1.0},
     "verlet": _HEUN,  # of its synchronised velocity
+    "leapfrog": _HEUN,
     "standard_heun": _HEUN,
     "false_heun": _HEUN,
     "semi_false_heun": _HEUN,

@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .errors import DivergenceWarning, StepwellError
+from .control import EnergyControl, Projection
+from .errors import ControlWarning, DivergenceWarning, StepwellError
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
@@ -25,11 +26,14 @@ __version__: str = _core.__version__
 
 __all__ = [
     "Chain",
+    "ControlWarning",
     "DivergenceWarning",
+    "EnergyControl",
     "LinearSystem",
     "Method",
     "NBody",
     "Oscillator",
+    "Projection",
     "Run",
     "Sampled",
     "Sinusoid",

@@ -108,6 +108,13 @@ def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape) -> Wh
     return np.array(steps, dtype=np.int64)
 
 
+def member(array: Array, index: Shape) -> Array:
+    """The part of an array that belongs to one member; batch axes come last."""
+    for i in reversed(index):
+        array = array[..., i]
+    return np.asarray(array)
+
+
 def fits(what: str, rows: int, batch: Shape, remedy: str) -> None:
     """Raise if ``rows`` numbers for each member of a batch do not fit in this machine's memory."""
     members = 1

@@ -78,9 +78,11 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
+    settle = getattr(s, "settle", None)  # only systems that are projected have it
 
     def step(t: float, v: Array, y: Array) -> Blocks:
-        return steps.step(s, t, plan.dt, v, y)
+        v, y = steps.step(s, t, plan.dt, v, y)
+        return settle(v, y) if settle else (v, y)
 
     slot = v if carried else _start(plan, v, y)
     slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes)

@@ -40,3 +40,7 @@ class UnsupportedError(StepwellError, ValueError):
 
 class DivergenceWarning(UserWarning):
     """Some members left the range of finite numbers. Their rows say when; their neighbours are not touched."""
+
+
+class ControlWarning(UserWarning):
+    """A control is so strong that it overshoots."""

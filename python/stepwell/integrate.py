@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import nullcontext
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -11,12 +12,13 @@ import numpy as np
 
 from . import _checks, engine
 from ._checks import Array
+from .control import EnergyControl, Projection
 from .errors import ArgumentError, DivergenceWarning, DTypeError, UnsupportedError
 from .methods import Method
 from .methods import method as find_method
 from .reference.types import Whole
-from .result import Run
-from .systems import Sampled, System
+from .result import Collision, Run
+from .systems import NBody, Sampled, System
 
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
@@ -36,6 +38,7 @@ def integrate(
     start: str | None = None,
     carry: Any = None,
     first_bad_step: Any = None,
+    control: EnergyControl | Projection | None = None,
     form: str = "direct",
     threads: int | None = None,
     backend: str = "rust",
@@ -60,6 +63,7 @@ def integrate(
         start: how a method with a choice starts; see ``method(…).starts``.
         carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used.
         first_bad_step: members that diverged before, from ``run.resume``; only they may begin with NaN or infinities.
+        control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         threads: how many threads share the members; None for as many as pay.
@@ -80,6 +84,7 @@ def integrate(
     if not isinstance(system, System):
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
+    system = system.sized(v, y)
     fits_together(system, how)
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
@@ -110,6 +115,11 @@ def integrate(
     kept = 1 if every is None else steps // every + 2
     _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+    if control is not None:
+        if not isinstance(control, (EnergyControl, Projection)):
+            raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
+        system = system.controlled(control, v, y, dt)
+        fits_together(system, how)
     before = _checks.diverged_before(first_bad_step, v, y, batch)
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
@@ -129,9 +139,22 @@ def integrate(
         start_step=start_step,
         steps=steps,
         start=how.starts[choice] if how.starts else None,
+        collision=partial(_collision, plan, v, y, carry is not None) if isinstance(system, NBody) else None,
     )
     _warn(run, before)
     return run
+
+
+def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
+    """Which bodies were nearest in the last state that was finite: the member is run again up to there, alone."""
+    system, steps = plan.system, step - 1 - plan.first
+    assert isinstance(system, NBody)
+    alone, y = system.member(index, plan.batch), _checks.member(y, index)
+    if steps > 0:
+        again = plan._replace(system=alone, batch=(), steps=steps, every=None, form="direct", progress=None)
+        y = engine.advance(again, _checks.member(v, index), y, carried=carried).y[-1]
+    bodies, distance = alone.closest(y)
+    return Collision(index, step, bodies, distance)
 
 
 def fits_together(system: System, method: Method) -> None:
@@ -183,9 +206,14 @@ def _warn(run: Run, before: Whole | None) -> None:
     step = int(run.first_bad_step[bad].min())
     first = tuple(int(i) for i in np.argwhere(bad & (run.first_bad_step == step))[0])
     who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
+    met = ""
+    if run.collision is not None:
+        pair = run.collision(first, step)
+        if pair.distance < np.inf:
+            met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
     warnings.warn(
         f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {who} at step {step} "
-        f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}",
+        f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",
         DivergenceWarning,
         stacklevel=3,
     )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._checks import Array
+from .errors import UnsupportedError
 from .methods import Method
 from .reference.types import Whole
 from .systems import System
@@ -18,6 +20,22 @@ class Status(IntEnum):
 
     OK = 0
     DIVERGED = 1
+
+
+class Collision(NamedTuple):
+    """Two bodies that were nearest to each other when a member left the finite range.
+
+    Attributes:
+        member: index of the member in the batch.
+        step: number of the first step that was not finite.
+        bodies: the two.
+        distance: between them, one step before.
+    """
+
+    member: tuple[int, ...]
+    step: int
+    bodies: tuple[int, int]
+    distance: float
 
 
 class Run:
@@ -55,6 +73,7 @@ class Run:
         start_step: int,
         steps: int,
         start: str | None,
+        collision: Callable[[tuple[int, ...], int], Collision] | None = None,
     ) -> None:
         self.t = t
         self.v = v
@@ -69,6 +88,8 @@ class Run:
         self.start_step = start_step
         self.steps = steps
         self.start = start
+        #: Who was nearest to whom when the member of that index diverged at that step; see ``collisions``.
+        self.collision = collision
 
     @property
     def energy(self) -> Array:
@@ -89,6 +110,17 @@ class Run:
             return np.stack([self.system.auxiliary(t, v, y) for t, v, y in states])
 
     @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """For bodies that attract each other: who was nearest to whom when a member diverged, one for each such member.
+
+        Found by running these members again up to that step. Members that had diverged before this run are left out.
+        """
+        if self.collision is None:
+            raise UnsupportedError(f"collisions: {self.system!r} has no bodies that collide")
+        diverged = np.argwhere(self.first_bad_step > self.start_step).tolist()
+        return tuple(self.collision(tuple(index), int(self.first_bad_step[tuple(index)])) for index in diverged)
+
+    @property
     def resume(self) -> dict[str, Any]:
         """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
 
@@ -99,6 +131,8 @@ class Run:
             state["start"] = self.start
         if self.status.any():
             state["first_bad_step"] = self.first_bad_step
+        if (control := getattr(self.system, "control", None)) is not None:
+            state["control"] = control
         return state | ({} if self.carry is None else {"carry": self.carry})
 
     def __repr__(self) -> str:

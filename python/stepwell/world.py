@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
+from .control import EnergyControl, Projection
 from .errors import ArgumentError, DTypeError, ShapeError
 from .integrate import fits_together
 from .methods import Method
@@ -28,6 +29,7 @@ class World:
         t0: time of step 0.
         start_step: number of the first step.
         start: how a method with a choice starts.
+        control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -51,10 +53,11 @@ class World:
         t0: float = 0.0,
         start_step: int = 0,
         start: str | None = None,
+        control: EnergyControl | Projection | None = None,
     ) -> None:
         if not isinstance(system, System):
             raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
-        self.system = system
+        self.system = system = system.sized(v, y)
         self.method = find_method(method)
         fits_together(system, self.method)
         self.dt = _checks.number("dt", dt, positive=True, unit="units of time")
@@ -67,6 +70,9 @@ class World:
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         first = _checks.count("start_step", start_step, 0)
+        if control is not None:
+            self.system = system = system.controlled(control, self._v, self._y, self.dt)
+            fits_together(system, self.method)
         system.check_time(abs(t0) + first * self.dt)
         model = engine.model(system.kernel, system.parameters(batch), self.method)
         self._core = _core.World(

@@ -167,9 +167,13 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
     if not isinstance(system, System):
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
+    system = system.sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
-    if dt is None and isinstance(at, Run):
-        dt = at.dt
+    if isinstance(at, Run):
+        if type(at.system) is not type(system):
+            raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")
+        system = system.sized(at.v[0], at.y[0])
+        dt = at.dt if dt is None else dt
     if dt is None:
         raise ArgumentError("dt: expected the step, in units of time, got None")
     step = _checks.numbers("dt", dt, positive=True, unit="units of time")
@@ -195,7 +199,7 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
     P = maps.jacobian(system, how, step, _checks.number("t", t), v, y)
     none = np.zeros((n, 0, *P.shape[2:]))
     Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])
-    return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:]))
+    return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:], t, v, y))
 
 
 def state(argument: str, system: System, at: Any) -> tuple[Array, Array]:
@@ -212,13 +216,13 @@ def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
     expected = (*system.v_shape, *run.status.shape)
     if run.v.shape[1:] != expected:
         raise ShapeError(f"at: expected a run of {system!r}, states of v of shape {expected}, got {run.v.shape[1:]}")
-    matrices, exact = [], []
+    matrices, exact, finish = [], [], []
     for t, v, y in zip(run.t.tolist(), run.v, run.y, strict=True):
         matrices.append(maps.jacobian(system, method, dt, t, v, y))
         exact.append(maps.rates(system, t, v, y))
-    P, A = np.stack(matrices, axis=2), np.stack(exact, axis=2)
-    finish = maps.finish(system, method, dt, P.shape[3:])[:, :, np.newaxis]
-    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, np.broadcast_to(finish, P.shape), run)
+        finish.append(maps.finish(system, method, dt, matrices[-1].shape[2:], t, v, y))
+    P, A, F = (np.stack(each, axis=2) for each in (matrices, exact, finish))
+    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, F, run)
 
 
 def _polynomial(P: Array, z: Complex) -> Array:

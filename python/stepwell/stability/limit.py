@@ -123,6 +123,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     if not isinstance(system, System):
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
+    system = system.sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     if at is None:
         if not system.linear:
@@ -286,7 +287,7 @@ class _Search:
         P = self.matrix(np.stack([at, np.where(known, at * (1.0 + PAST), at)]))
         z, vectors = eigen.eigen(P)
         counted = self.eigenvalues(P)
-        finish = maps.finish(self.system, self.method, np.stack([at, at]), (2, *self.members))
+        finish = maps.finish(self.system, self.method, np.stack([at, at]), (2, *self.members), self.t, self.v, self.y)
         states = np.einsum("ij...,jk...->ik...", finish, vectors)[:, :, 1]
         exact = eigen.matched(z[:, 1], states / np.sqrt((np.abs(states) ** 2).sum(axis=0)), *eigen.eigen(self.rates))
 

@@ -78,20 +78,23 @@ def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | Non
     return _derivative(system, members, v, y, both)
 
 
-def finish(system: System, method: Method, dt: Array, members: Shape) -> Array:
-    """The linear map from slots to states: the identity for a method that carries v.
+def finish(
+    system: System, method: Method, dt: Array, members: Shape, t: float = 0.0, v: Array | None = None, y: Array | None = None
+) -> Array:
+    """The linear map from slots to states: the identity for a method that carries v, else the derivative of its ``finish``.
 
-    What it adds for the present forces (½h·a for Verlet) is that of a linear system; others are given its part that does not
-    depend on them, which is what tells modes apart.
+    That of a system which is not linear is taken at the state (v, y) and time t.
     """
     n = sum(size(system))
     if not method.carry:
         return np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(members)), (n, n, *members))
-    free = system.without_inputs() if system.linear else system
-    slot, y = unit(free, members)
-    choice = 0 if system.linear else len(method.starts) - 1
-    v = method.steps.finish(_scaled(free, dt, (n, *members)), choice, 0.0, slot, y)
-    return rows(system, v, y)
+    if v is None or y is None:
+        free = system.without_inputs()
+        slot, y = unit(free, members)
+        return rows(free, method.steps.finish(_scaled(free, dt, (n, *members)), 0, 0.0, slot, y), y)
+    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y)
+    s = _scaled(system, dt, (n, *members))
+    return _derivative(system, members, slot, y, lambda slot, y: (method.steps.finish(s, 0, t, slot, y), y))
 
 
 def unit(system: System, members: Shape) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from math import prod
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..errors import UnsupportedError
 from ..reference.types import Scaled
 
 if TYPE_CHECKING:
+    from ..control import EnergyControl, Projection
     from .inputs import Input
 
 
@@ -89,6 +90,18 @@ class System(ABC):
         """Raise if the system's inputs make no sense up to a time."""
         for given in self.given_inputs().values():
             given.check(last)
+
+    def sized(self, *states: Any) -> System:
+        """The same system for states of these shapes; only a system that leaves its size open minds."""
+        return self
+
+    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> System:
+        """The same system under control, the target that of the state if the control has none.
+
+        Raises:
+            UnsupportedError: if the system has no energy that a control can keep.
+        """
+        raise UnsupportedError(f"control: {self!r} has no energy control")
 
     # What the transition-matrix form and the analysis ask of a linear system.
 

@@ -243,7 +243,7 @@ impl<'a> Worker<'a> {
         let mut from = 0;
         while from < members {
             let left = members - from;
-            let narrow = left <= crate::group::NARROW.min(self.wide.lanes() - 1);
+            let narrow = left < self.wide.lanes() && self.narrow.pays_for(left);
             let group = if narrow { &mut self.narrow } else { &mut self.wide };
             let count = left.min(group.lanes());
             let mut job = Job { plan: self.plan, group: group.as_mut(), part: &mut part, from, count, good: &mut self.good };

@@ -116,6 +116,11 @@ pub trait Group: Send + Sync {
     /// How many members it steps together.
     fn lanes(&self) -> usize;
 
+    /// Whether a narrow group is better for so few members than a wide one.
+    fn pays_for(&self, members: usize) -> bool {
+        members <= NARROW
+    }
+
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 

@@ -12,9 +12,11 @@
 
 pub mod batch;
 pub mod block;
+pub mod control;
 pub mod error;
 pub mod group;
 pub mod isa;
+pub mod log;
 pub mod matrix;
 pub mod panels;
 pub mod rows;

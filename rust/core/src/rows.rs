@@ -42,7 +42,7 @@ pub fn lanes_mut<const L: usize>(rows: &mut Rows<L>) -> &mut [[f64; L]] {
 /// A system of any size over `L` lanes.
 pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + Sync + 'static {
     /// The system of the members that `member` names for each lane, scaled to the step.
-    fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self;
+    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self;
 
     /// How many velocities and coordinates a member has.
     fn shape(spec: &Spec) -> (usize, usize);
@@ -74,6 +74,7 @@ impl<S: System, St: Stepper> Task for Steps<'_, S, St> {
     fn run(self) {
         for k in self.k..self.k + self.n {
             St::step(self.system, self.clock.at(k), self.clock.h, self.v, self.y, self.work);
+            self.system.settle(self.v, self.y);
         }
     }
 }
@@ -96,7 +97,7 @@ where
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        self.system = Some(S::prepare(spec, self.clock.h, |l| first + l.min(count - 1)));
+        self.system = Some(S::prepare(spec, &self.clock, |l| first + l.min(count - 1)));
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {

@@ -25,4 +25,8 @@ pub trait System {
     fn velocity(&mut self, _d: &Self::Y, out: &mut Self::V) {
         out.numbers_mut().fill(f64::NAN);
     }
+
+    /// Corrects the state after a step: projections onto what should be constant.
+    #[inline(always)]
+    fn settle(&mut self, _v: &mut Self::V, _y: &mut Self::Y) {}
 }

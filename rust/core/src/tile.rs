@@ -10,7 +10,7 @@ use nalgebra::SVector;
 
 use crate::{
     block::Work,
-    group::{Clock, Group, NARROW, Row, Spec, Table, Width},
+    group::{Clock, Group, Row, Spec, Table, Width},
     isa::{Isa, Task, with_isa},
     stepper::Stepper,
     system::System,
@@ -133,6 +133,7 @@ where
                 let mut yl = SVector::from_fn(|i, _| y[i][l]);
                 let mut work = Work::new(St::RECORD.evaluations, &vl, &yl);
                 St::step(&mut s, t, h, &mut vl, &mut yl, &mut work);
+                s.settle(&mut vl, &mut yl);
                 for i in 0..P {
                     v[i][l] = vl[i];
                 }
@@ -194,6 +195,10 @@ where
         L
     }
 
+    fn pays_for(&self, members: usize) -> bool {
+        members <= L
+    }
+
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         let h = self.clock.h;
         let member = |l: usize| first + l.min(count - 1);
@@ -244,8 +249,8 @@ where
     }
 }
 
-/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, or a narrow one.
-pub fn group<S, St, const P: usize, const Q: usize, const C: usize, const WIDE: usize, const HALF: usize>(
+/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, or a narrow one of `FEW`.
+pub fn group<S, St, const P: usize, const Q: usize, const C: usize, const WIDE: usize, const HALF: usize, const FEW: usize>(
     family: S,
     clock: &Clock,
     width: Width,
@@ -258,11 +263,11 @@ where
         clock.level,
         |isa| match width {
             Width::Wide => Tile::<S, St, _, P, Q, C, WIDE>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW>::boxed(family, isa, clock),
         },
         match width {
             Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, NARROW>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW>::boxed(family, isa, clock),
         }
     )
 }

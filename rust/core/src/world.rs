@@ -2,7 +2,7 @@
 
 use crate::{
     error::Error,
-    group::{Clock, Group, NARROW, Width},
+    group::{Clock, Group, Width},
     table::Model,
 };
 
@@ -50,8 +50,11 @@ impl World {
         let mut first = 0;
         while first < members {
             let mut group = model.group(&clock, Width::Wide)?;
-            if members - first <= NARROW.min(group.lanes() - 1) {
-                group = model.group(&clock, Width::Narrow)?;
+            if members - first < group.lanes() {
+                let narrow = model.group(&clock, Width::Narrow)?;
+                if narrow.pays_for(members - first) {
+                    group = narrow;
+                }
             }
             let count = (members - first).min(group.lanes());
             group.prepare(model.spec(), first, count);

@@ -1,26 +1,75 @@
-"""Three equal bodies in the plane under the 1/r law (Appendix C)."""
+"""Bodies that attract each other (Appendix C, D), each pair computed once."""
 
 import numpy as np
 
-from ..types import Array
+from ..control import EnergyControl, Projection
+from ..log import log
+from ..types import Array, Blocks
+
+#: Sums over bodies are kept in this many parts, body i in part i mod LANES; partners are taken two at a time, so far apart.
+LANES = 8
+
+
+def partners(n: int) -> list[tuple[int, ...]]:
+    """The distances k at which body i meets body i + k, in the order in which they are summed: every pair once for k ≤ n/2."""
+    groups: list[tuple[int, ...]] = []
+    k = 1
+    while n // 2 - k + 1 >= 2 * LANES:
+        groups += [(k + q, k + q + LANES) for q in range(LANES)]
+        k += 2 * LANES
+    return groups + [(k,) for k in range(k, n // 2 + 1)]
+
+
+def total(values: Array) -> Array:
+    """The sum over the first axis: body i in part i mod LANES, then part after part."""
+    parts = [values[lane] for lane in range(min(LANES, len(values)))]
+    for i in range(LANES, len(values)):
+        parts[i % LANES] = parts[i % LANES] + values[i]
+    whole: Array = parts[0]
+    for part in parts[1:]:
+        whole = whole + part
+    return whole
+
+
+def square(d: Array) -> Array:
+    """d·d of vectors along the second axis."""
+    length = d[:, 0] * d[:, 0]
+    for c in range(1, d.shape[1]):
+        length = length + d[:, c] * d[:, c]
+    return length
 
 
 class NBody:
-    """v̇ᵢ = G·m·Σⱼ (yⱼ − yᵢ)/r², ẏ = v. Blocks are of shape (bodies, 2)."""
+    """v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), ẏ = v, with f = 1/r² (``logarithmic``, ``printed``) or 1/r³ (``newton``).
 
-    def __init__(self, h: float, strength: Array) -> None:
+    Blocks are of shape (bodies, dim, …), masses of shape (bodies, …).
+    """
+
+    def __init__(
+        self,
+        h: float,
+        force: str,
+        masses: Array,
+        strength: Array,
+        softening: Array,
+        control: EnergyControl | None = None,
+        projection: Projection | None = None,
+    ) -> None:
         self.h = h
-        self.strength = h * strength
+        self.control = control
+        self.projection = projection
+        self.force = force
+        self.masses = masses
+        self.strength = h * strength  # h·G·m
+        self.soft = softening * softening
+        self.half = (0.5 * h) * masses
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
-        """h·v̇: both bodies of a pair move, in opposite directions."""
-        dv = np.zeros_like(y)
-        for i, j in ((0, 1), (0, 2), (1, 2)):
-            d = y[j] - y[i]
-            pull = self.strength / (d[0] * d[0] + d[1] * d[1])
-            dv[i] = dv[i] + d * pull
-            dv[j] = dv[j] - d * pull
-        return dv
+        """h·v̇, and the push of the control."""
+        if self.control is None:
+            return self.meet(y, None)
+        dv, kinetic, energy = self.energies(v, y)
+        return np.asarray(dv - self.control.push(kinetic, energy) * v)
 
     def dy(self, t: float, v: Array, y: Array) -> Array:
         """h·ẏ."""
@@ -29,3 +78,57 @@ class NBody:
     def velocity(self, d: Array) -> Array:
         """The v whose increment of y is d."""
         return d / self.h
+
+    def meet(self, y: Array, potential: Array | None) -> Array:
+        """h·v̇ from every pair once; adds h·G·Σⱼ mⱼ·φ to ``potential`` for each body, if it is there.
+
+        Body i pulls the partner after it, i + k, and is pulled by it; what bodies get from the partners after them and before
+        them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps.
+        """
+        n = len(y)
+        after, before = np.zeros_like(y), np.zeros_like(np.concatenate([y, y]))
+        twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
+        for group in partners(n):
+            pushes = []
+            for k in group:
+                m = k if 2 * k == n else n  # opposite bodies meet once
+                d = twice[k : k + m] - y[:m]
+                r2 = square(d) + self.soft
+                pull = 1.0 / (r2 * np.sqrt(r2)) if self.force == "newton" else 1.0 / r2
+                after[:m] = after[:m] + d * (pull * strength[k : k + m])[:, np.newaxis]
+                pushes.append((k, m, d * (pull * self.strength[:m])[:, np.newaxis]))
+                if potential is not None:
+                    potential[:m] = potential[:m] + self.phi(r2, pull, strength[k : k + m])
+            for k, m, push in reversed(pushes):
+                before[k : k + m] = before[k : k + m] - push
+        dv: Array = after + (before[:n] + before[n:])
+        return dv
+
+    def phi(self, r2: Array, pull: Array, strength: Array) -> Array:
+        """The potential, per mass, that a partner makes: ln r, or −1/r (which ``printed`` has with the wrong force)."""
+        if self.force == "logarithmic":
+            return (0.5 * log(r2)) * strength
+        if self.force == "newton":
+            return -(r2 * (pull * strength))  # the product is at hand
+        return -(np.sqrt(pull) * strength)
+
+    def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
+        """h·v̇, h times the kinetic energy, and h times the whole energy, in one pass over the pairs."""
+        potential = np.zeros_like(y[:, 0])
+        dv = self.meet(y, potential)
+        kinetic = total(self.half * square(v))
+        return dv, kinetic, kinetic + total(self.masses * potential)
+
+    def settle(self, v: Array, y: Array) -> Blocks:
+        """The state after a step, set back onto its energy if there is a projection."""
+        if self.projection is None:
+            return v, y
+        dv, kinetic, energy = self.energies(v, y)
+        off = self.projection.off(energy)
+        if self.projection.way == "scaling":
+            return v * self.projection.factor(kinetic, off), y
+        # Nacozy: along the gradient of the energy, m·v in the velocities and −m·a in the coordinates.
+        masses = self.masses[:, np.newaxis]
+        along_v, along_y = masses * v, masses * (dv / self.h)
+        step = (off / self.h) / total(square(along_v) + square(along_y))
+        return v - step * along_v, y + step * along_y

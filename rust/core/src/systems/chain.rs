@@ -69,7 +69,8 @@ impl<const L: usize> Large<L> for Chain<L> {
         (spec.size(0), spec.size(0))
     }
 
-    fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self {
+    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+        let h = clock.h;
         let n = spec.size(0);
         let mut chain = Chain { stiffness: zeros(n + 1), by_mass: zeros(n), force: zeros(n + 1), h };
         for l in 0..L {

@@ -69,7 +69,8 @@ impl<const L: usize> Large<L> for Linear<L> {
         (spec.size(0), spec.size(1))
     }
 
-    fn prepare(spec: &Spec, h: f64, member: impl Fn(usize) -> usize) -> Self {
+    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+        let h = clock.h;
         let (n_v, n_y) = Self::shape(spec);
         let (n, m) = (n_v + n_y, inputs(spec).len());
         let scaled = |place: usize| std::array::from_fn(|l| h * spec.at(place, member(l)));

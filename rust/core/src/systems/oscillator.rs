@@ -14,7 +14,7 @@ use nalgebra::SVector;
 
 use crate::{
     error::Error,
-    group::{Clock, Group, Spec, Width},
+    group::{Clock, Group, NARROW, Spec, Width},
     signal::{Both, Held, Signal, Sine},
     stepper::{Needs, Stepper},
     system::System,
@@ -245,7 +245,7 @@ fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize
     width: Width,
 ) -> Box<dyn Group> {
     let family = Family::<F, D> { inputs, form: PhantomData };
-    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF>(family, clock, width)
+    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW>(family, clock, width)
 }
 
 fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {

@@ -1,0 +1,148 @@
+"""Control terms: what keeps a quantity that should be constant from drifting (§12, Appendix D)."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from . import _checks
+from ._checks import Array
+from .errors import ArgumentError, ControlWarning
+from .reference import control as reference
+
+FORMS = ("limited", "printed")
+
+
+class EnergyControl:
+    """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
+
+    As the document prints it (Appendix D), the push is h·C·ΔE in a step, and overflows where h·C·K passes 1, K being the kinetic
+    energy, which has no bound at close encounters. The limited form decays ΔE by backward Euler instead, and scales
+    velocities by a factor between ½ and 2: it is the same to first order and stays finite.
+
+    Args:
+        gain: C, in 1 per energy and unit of time; broadcasts over the batch.
+        form: ``"limited"`` or ``"printed"``.
+        relative: in place of C, the number h·C·K at the start, without a unit: the share of ΔE that a step takes away is twice
+            that. Broadcasts.
+        target: the energy to keep; that of the start if None. Broadcasts.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+    """
+
+    def __init__(self, gain: Any = None, form: str = "limited", *, relative: Any = None, target: Any = None) -> None:
+        if (gain is None) == (relative is None):
+            raise ArgumentError("gain, relative: expected one of them, got " + ("neither" if gain is None else "both"))
+        self.form = _checks.known("form", form, FORMS)
+        self.gain = None if gain is None else _not_negative("gain", gain)
+        self.relative = None if relative is None else _not_negative("relative", relative)
+        self.target = None if target is None else _checks.numbers("target", target)
+
+    def __repr__(self) -> str:
+        strength = f"gain={self.gain}" if self.relative is None else f"relative={self.relative}"
+        return f"EnergyControl({strength}, form={self.form!r})"
+
+    def aimed(self, kinetic: Array, energy: Array, dt: float) -> EnergyControl:
+        """The same control with its gain and its target in numbers, from the energies at the start.
+
+        Warns:
+            ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
+        """
+        aimed = copy.copy(self)
+        if aimed.relative is not None:
+            if not (kinetic > 0).all():
+                raise ArgumentError("relative: a start at rest has no kinetic energy to relate the gain to; give gain")
+            aimed.gain = np.asarray(aimed.relative / (dt * kinetic))
+        if aimed.target is None:
+            aimed.target = np.asarray(energy)
+        strength = np.max(dt * np.asarray(aimed.gain) * kinetic)
+        if self.form == "printed" and strength >= 1.0:
+            warnings.warn(
+                f"gain: h·C·K = {strength:.3g} at the start, expected below 1: the printed form overshoots and may overflow; "
+                f'use a smaller gain or step, or form="limited"',
+                ControlWarning,
+                stacklevel=4,
+            )
+        return aimed
+
+    def scaled(self, h: float) -> dict[str, Any]:
+        """The NumPy reference, scaled to the step h, by the name that a system has for it."""
+        return {"control": reference.EnergyControl(h, self.form, np.asarray(self.gain), np.asarray(self.target))}
+
+    def member(self, one: Callable[[Array], Array]) -> EnergyControl:
+        """That of one member."""
+        alone = copy.copy(self)
+        alone.gain, alone.target = one(np.asarray(self.gain)), one(np.asarray(self.target))
+        return alone
+
+    @property
+    def option(self) -> str:
+        """What the core calls it."""
+        return f"control:{self.form}"
+
+    def rows(self) -> list[Any]:
+        """Its parameters, as the core takes them."""
+        return [self.target, self.gain]
+
+
+WAYS = ("scaling", "nacozy")
+
+
+class Projection:
+    """Sets the state back onto the energy after every step.
+
+    ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the least change of the state that
+    does it to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971).
+
+    Args:
+        way: ``"scaling"`` or ``"nacozy"``.
+        target: the energy to keep; that of the start if None. Broadcasts over the batch.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+    """
+
+    def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
+        self.way = _checks.known("way", way, WAYS)
+        self.target = None if target is None else _checks.numbers("target", target)
+
+    def __repr__(self) -> str:
+        return f"Projection({self.way!r})"
+
+    def aimed(self, kinetic: Array, energy: Array, dt: float) -> Projection:
+        """The same projection with its target in numbers."""
+        aimed = copy.copy(self)
+        if aimed.target is None:
+            aimed.target = np.asarray(energy)
+        return aimed
+
+    def scaled(self, h: float) -> dict[str, Any]:
+        """The NumPy reference, scaled to the step h, by the name that a system has for it."""
+        return {"projection": reference.Projection(h, self.way, np.asarray(self.target))}
+
+    def member(self, one: Callable[[Array], Array]) -> Projection:
+        """That of one member."""
+        alone = copy.copy(self)
+        alone.target = one(np.asarray(self.target))
+        return alone
+
+    @property
+    def option(self) -> str:
+        """What the core calls it."""
+        return f"project:{self.way}"
+
+    def rows(self) -> list[Any]:
+        """Its parameters, as the core takes them."""
+        return [self.target]
+
+
+def _not_negative(argument: str, value: Any) -> Array:
+    array = _checks.numbers(argument, value)
+    if (array < 0).any():
+        raise ArgumentError(f"{argument}: expected numbers of zero or more, got {array.min():g}")
+    return array

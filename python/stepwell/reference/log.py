@@ -1,0 +1,33 @@
+"""Natural logarithm, the same to the last bit as the core's: see ``log.rs`` for its error."""
+
+import numpy as np
+
+from .types import Array
+
+LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+L = (
+    6.666666666666735130e-01,
+    3.999999999940941908e-01,
+    2.857142874366239149e-01,
+    2.222219843214978396e-01,
+    1.818357216161805012e-01,
+    1.531383769920937332e-01,
+    1.479819860511658591e-01,
+)
+HALF_ROOT = np.uint64(0x3FE6A09E00000000)  # √½, cut: the mantissa is taken from √½ to √2
+TO_ONE = np.uint64(0x3FF0000000000000) - HALF_ROOT
+MANTISSA = np.uint64(0x000FFFFFFFFFFFFF)
+TWO_52 = np.uint64(0x4330000000000000)  # its low bits hold a whole number
+
+
+def log(x: Array) -> Array:
+    """Ln x of a normal number above zero: x = 2ᵏ·(1 + f), then fdlibm's polynomial in f/(2 + f)."""
+    u = np.asarray(x, dtype=np.float64).view(np.uint64) + TO_ONE
+    k = np.asarray((u >> np.uint64(52)) | TWO_52).view(np.float64) - (4503599627370496.0 + 1023.0)
+    f = np.asarray((u & MANTISSA) + HALF_ROOT).view(np.float64) - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    r = z * (L[0] + z * (L[1] + z * (L[2] + z * (L[3] + z * (L[4] + z * (L[5] + z * L[6]))))))
+    half = 0.5 * f * f
+    value: Array = k * LN2[0] - ((half - (s * (half + r) + k * LN2[1])) - f)
+    return value
