@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import stepwell as sw
 from PIL import Image
@@ -42,3 +42,8 @@ if __name__ == "__main__":
         write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot())
     write("figures.png", sw.charts.figures().plot())
     write("powers.png", sw.charts.powers().plot())
+    eight = sw.scenes.figure_eight()
+    assert eight.period is not None
+    periods: dict[str, Any] = {"horizon": 100 * eight.period, "evaluations": 100_000}
+    write("control-figure-eight.png", sw.charts.control(eight, **periods, title="Figure-eight, 100 periods").plot())
+    write("control-appendix-d.png", sw.charts.control("energy_control", title="Appendix D").plot())

@@ -114,6 +114,48 @@ def test_run_writes_the_kept_states(capsys, tmp_path):
     assert [float(row["state_error"]) for row in rows] == sw.scenes.clover().state_error(run).tolist()
 
 
+def test_run_draws_a_picture_or_a_film(capsys, tmp_path):
+    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF", "gif": b"GIF89a", "html": b"\n<link"}
+    for ending, start in starts.items():
+        path = tmp_path / f"run.{ending}"
+        words = ("run", "figure_eight", "--method", "leapfrog", "-o", str(path), "--seconds", "0.2", "--fps", "10", "--json")
+        code, out, err = told(capsys, *words)
+        report = json.loads(out)
+        assert (code, err, report["written"]) == (0, "", str(path))
+        assert report["kept"] == report["steps"] + 1  # all of them, for a smooth curve
+        assert path.read_bytes().startswith(start)
+
+
+def test_run_takes_a_control(capsys):
+    def last(*words):
+        code, out, err = told(capsys, "run", "energy_control", "--method", "standard_euler", "--steps", "500", "--json", *words)
+        assert (code, err) == (0, "")
+        return json.loads(out)["last_y"]
+
+    scene = sw.scenes.energy_control()
+    for words, control in (
+        ((), sw.EnergyControl(0.3)),
+        (("--control", "off"), None),
+        (("--control", "0.5"), sw.EnergyControl(0.5)),
+        (("--control", "0.5:printed"), sw.EnergyControl(0.5, "printed")),
+        (("--control", "scaling"), sw.Projection("scaling")),
+    ):
+        assert last(*words) == scene.run("standard_euler", steps=500, control=control).y[-1].tolist()
+
+
+def test_a_control_that_overshoots_is_warned_of(capsys):
+    words = ("run", "energy_control", "--method", "standard_euler", "--steps", "5", "--control", "1000:printed")
+    code, _, err = told(capsys, *words)
+    assert code == 0
+    assert err.startswith("stepwell: warning: gain: h·C·K = ")
+
+
+def test_a_run_without_an_exact_solution_tells_the_energy_and_no_state_error(capsys):
+    report = json.loads(told(capsys, "run", "plummer", "--method", "leapfrog", "--steps", "50", "--json")[1])
+    assert 0 < report["largest_energy_error"] < 0.01
+    assert "largest_state_error" not in report
+
+
 def test_a_diverged_run_is_a_warning_and_a_result(capsys):
     words = ("run", "oscillator", "--method", "standard_euler", "--dt", "100", "--steps", "400", "--json")
     code, out, err = told(capsys, *words)
@@ -275,8 +317,18 @@ def test_figures_writes_a_picture_for_each_method(capsys, tmp_path):
         (["run", "clover", "--method", "rk4", "--dt", "-1"], "dt: expected numbers above zero"),
         (["run", "clover", "--method", "rk4", "--steps", "0"], "steps: expected 1 or more"),
         (["run", "clover", "--method", "rk4", "--every", "0"], "every: expected 1 or more"),
-        (["run", "clover", "--method", "rk4", "-o", "run.txt"], "-o: expected a file ending in .csv or .npz"),
+        (["run", "clover", "--method", "rk4", "-o", "run.txt"], "-o: expected a file ending in one of .csv, .npz, .png"),
         (["run", "forced_oscillator", "--method", "verlet"], "verlet needs forces that do not depend on the velocity"),
+        (
+            ["run", "oscillator", "--method", "rk4", "--control", "1"],
+            "control: Oscillator(omega=1.0, form='canonical') has no energy",
+        ),
+        (["run", "clover", "--method", "rk4", "--control", "x"], "--control: expected a gain and a form, such as 0.3:printed"),
+        (["run", "clover", "--method", "rk4", "--control", "1:prnted"], "form: there is no 'prnted'; did you mean 'printed'?"),
+        (["run", "clover", "--method", "rk4", "--control=-1"], "gain: expected numbers of zero or more"),
+        (["run", "clover", "--method", "verlet", "--control", "1"], "use false_euler, or leave energy control out"),
+        (["run", "clover", "--method", "rk4", "-o", "run.gif", "--fps", "0"], "fps: expected numbers above zero"),
+        (["chart", "energy_control", "-o", "."], "scene: energy_control has no exact solution, so there is no error to chart"),
         (["chart", "oscillator", "clovr"], "did you mean 'clover'?"),
         (["chart", "oscillator", "--methods", "rk4,"], "method: there is no ''"),
         (["criteria", "rk5"], "did you mean 'rk4'?"),
@@ -351,6 +403,12 @@ def test_without_matplotlib_numbers_are_told_and_no_folder_is_made(capsys, monke
         assert (code, out) == (2, "")
         assert err == "stepwell: plot: a picture needs matplotlib; pip install 'stepwell[chart]'\n"
     assert list(tmp_path.iterdir()) == []
+    for name in ("run.png", "run.gif"):
+        code, out, err = told(capsys, "run", "clover", "--method", "rk4", "-o", str(tmp_path / name))
+        assert (code, out) == (2, "")
+        assert err == "stepwell: plot: a picture needs matplotlib; pip install 'stepwell[chart]'\n"
+    assert list(tmp_path.iterdir()) == []
+    assert told(capsys, "run", "clover", "--method", "rk4", "-o", str(tmp_path / "run.csv"))[0] == 0
     for words in (("stability",), ("criteria",)):
         assert told(capsys, *words)[0] == 0
 

@@ -27,6 +27,9 @@ def test_errors_are_those_of_exact_arithmetic(method: str) -> None:
     if method == "verlet":  # in its slots: y₋₁ = y₀ − Φ·v₀ − ½Φ²·y₀
         matrix = np.array([[0, 1], [-1, 2 - half**2]], dtype=object)
         state[0] = 1 - half / 4 - half**2 / 2
+    if method == "leapfrog":  # in its slots False Euler, v half a step ago
+        matrix = np.array([[1, -half], [half, 1 - half**2]], dtype=object)
+        state[0] = Fraction(1, 4) + half / 2
     sizes = [float(np.hypot(*map(float, state)))]
     for k in range(1, 8):
         state = np.array([sum(a * b for a, b in zip(row, state, strict=True)) for row in matrix], dtype=object)

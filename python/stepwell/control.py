@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import _checks
-from ._checks import Array
+from ._checks import Array, Shape
 from .errors import ArgumentError, ControlWarning
 from .reference import control as reference
 
@@ -43,6 +43,12 @@ class EnergyControl:
         self.relative = None if relative is None else _not_negative("relative", relative)
         self.target = None if target is None else _checks.numbers("target", target)
 
+    @property
+    def batch(self) -> Shape:
+        """The shape to which its numbers broadcast."""
+        given = {"gain": self.gain, "relative": self.relative, "target": self.target}
+        return _checks.batch_shape({name: each.shape for name, each in given.items() if each is not None})
+
     def __repr__(self) -> str:
         strength = f"gain={self.gain}" if self.relative is None else f"relative={self.relative}"
         return f"EnergyControl({strength}, form={self.form!r})"
@@ -54,10 +60,10 @@ class EnergyControl:
             ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
         """
         aimed = copy.copy(self)
-        if aimed.relative is not None:
+        if self.gain is None:
             if not (kinetic > 0).all():
                 raise ArgumentError("relative: a start at rest has no kinetic energy to relate the gain to; give gain")
-            aimed.gain = np.asarray(aimed.relative / (dt * kinetic))
+            aimed.gain = np.asarray(np.asarray(self.relative) / (dt * kinetic))
         if aimed.target is None:
             aimed.target = np.asarray(energy)
         strength = np.max(dt * np.asarray(aimed.gain) * kinetic)
@@ -110,6 +116,11 @@ class Projection:
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
         self.way = _checks.known("way", way, WAYS)
         self.target = None if target is None else _checks.numbers("target", target)
+
+    @property
+    def batch(self) -> Shape:
+        """The shape of its target."""
+        return () if self.target is None else self.target.shape
 
     def __repr__(self) -> str:
         return f"Projection({self.way!r})"

@@ -90,6 +90,8 @@ def integrate(
     backend = _checks.known("backend", backend, BACKENDS)
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    if control is not None and not isinstance(control, (EnergyControl, Projection)):
+        raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
@@ -110,14 +112,13 @@ def integrate(
     y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
     batch = _checks.batch_shape(
         {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+        | ({} if control is None else {"control": control.batch})
     )
     rows = prod(system.v_shape) + prod(system.y_shape)
     kept = 1 if every is None else steps // every + 2
     _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     if control is not None:
-        if not isinstance(control, (EnergyControl, Projection)):
-            raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
     before = _checks.diverged_before(first_bad_step, v, y, batch)

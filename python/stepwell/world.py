@@ -71,6 +71,10 @@ class World:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         first = _checks.count("start_step", start_step, 0)
         if control is not None:
+            if not isinstance(control, (EnergyControl, Projection)):
+                raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
+            if _checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
+                raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
             self.system = system = system.controlled(control, self._v, self._y, self.dt)
             fits_together(system, self.method)
         system.check_time(abs(t0) + first * self.dt)

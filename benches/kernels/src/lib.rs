@@ -94,6 +94,24 @@ fn linear(n: usize, options: &[&'static str]) -> Variant {
     }
 }
 
+/// Bodies on a circle, at rest.
+fn bodies(n: usize, dim: usize, options: &[&'static str]) -> Variant {
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
+    let place = |i: usize| [angle(i).cos(), angle(i).sin(), 0.1 * i as f64].into_iter().take(dim).collect::<Vec<_>>();
+    let mut parameters = vec![1.0 / n as f64; 2 * n];
+    parameters.push(0.01); // softening
+    parameters.resize(2 * n + 1 + (options.len() - 1) * if options.last() == Some(&"control:limited") { 2 } else { 1 }, 0.0);
+    Variant {
+        system: "nbody",
+        options: options.to_vec(),
+        sizes: vec![n, dim],
+        parameters,
+        v: vec![0.1; n * dim],
+        y: (0..n).flat_map(place).collect(),
+        ..Variant::default()
+    }
+}
+
 /// Every variant of every system.
 pub fn variants() -> Vec<Variant> {
     let mut all = Vec::new();
@@ -110,15 +128,12 @@ pub fn variants() -> Vec<Variant> {
         ];
         all.extend(forces.map(|force| oscillator(&[&[form], force].concat())));
     }
-    let (half, height) = (0.75_f64.sqrt(), 0.5);
-    all.push(Variant {
-        system: "nbody",
-        options: vec!["logarithmic", "planar", "three"],
-        parameters: vec![1.0],
-        v: vec![-height, half, -height, -half, 1.0, 0.0],
-        y: vec![-half, -height, half, -height, 0.0, 1.0],
-        ..Variant::default()
-    });
+    all.push(bodies(3, 2, &["logarithmic"]));
+    all.push(bodies(3, 3, &["newton"]));
+    all.push(bodies(6, 3, &["newton"]));
+    all.push(bodies(64, 3, &["newton"]));
+    all.push(bodies(64, 3, &["newton", "control:limited"]));
+    all.push(bodies(64, 3, &["newton", "project:scaling"]));
     all.extend([4, 32].map(|n| Variant {
         system: "chain",
         sizes: vec![n],

@@ -1,26 +1,33 @@
 """Charts: data objects with ``.plot()``, ``.to_csv()``, ``.to_json()`` and ``.summary()``."""
 
+from .control import ControlSweep, Held, control
 from .data import Curve, Point, Timing, WorkPrecision
 from .figures import Figures, Samples, figures
 from .maps import Observation, StabilityMap, stability_map
 from .powers import Powers, powers
+from .runs import RunPicture, run_picture
 from .work_precision import work_precision
 from .zplane import Locus, Stability, stability
 
 __all__ = [
+    "ControlSweep",
     "Curve",
     "Figures",
+    "Held",
     "Locus",
     "Observation",
     "Point",
     "Powers",
+    "RunPicture",
     "Samples",
     "Stability",
     "StabilityMap",
     "Timing",
     "WorkPrecision",
+    "control",
     "figures",
     "powers",
+    "run_picture",
     "stability",
     "stability_map",
     "work_precision",

@@ -19,6 +19,9 @@ from .data import Curve, WorkPrecision
 #: The ladder goes from this many times the scene's step, beyond every method's limit, to this small a part of it.
 LARGEST, SMALLEST = 16.0, 1 / 3000
 
+#: But no run of the ladder has more steps than this, for it would take minutes.
+MOST = 2_000_000
+
 #: Rungs of the ladder per factor of ten.
 RUNGS = 10
 
@@ -40,7 +43,7 @@ def work_precision(
         scene: a ``Scene`` with an exact solution, or the name of one.
         methods: names, or what ``stepwell.method`` returns; all if None.
         steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 16
-            times the scene's down to a 3000th of it.
+            times the scene's down to a 3000th of it, or to two million steps.
         progress: is called with the share that is done.
 
     Returns:
@@ -51,9 +54,7 @@ def work_precision(
     """
     if not isinstance(scene, (Scene, str)):
         raise DTypeError(f"scene: expected a Scene or its name, got {type(scene).__name__}")
-    scene = find_scene(scene)
-    if scene.exact is None:
-        raise ArgumentError(f"scene: {scene.name} has no exact solution, so there is no error to chart")
+    scene = chartable(find_scene(scene))
     if isinstance(methods, str):
         raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
     chosen = list(dict.fromkeys(every_method() if methods is None else map(find_method, methods)))
@@ -75,8 +76,19 @@ def work_precision(
     return WorkPrecision(scene, tuple(curves), refused, measure.MEMBERS, measure.REPEATS, _core.isa())
 
 
+def chartable(scene: Scene) -> Scene:
+    """The scene, if there is anything to chart.
+
+    Raises:
+        ArgumentError: if it has no exact solution.
+    """
+    if scene.exact is None:
+        raise ArgumentError(f"scene: {scene.name} has no exact solution, so there is no error to chart")
+    return scene
+
+
 def _ladder(scene: Scene) -> list[int]:
     """Numbers of steps, evenly spread on a logarithmic scale."""
-    few, many = scene.horizon / (LARGEST * scene.dt), scene.horizon / (SMALLEST * scene.dt)
+    few, many = scene.horizon / (LARGEST * scene.dt), min(MOST, scene.horizon / (SMALLEST * scene.dt))
     rungs = np.geomspace(max(4.0, few), many, round(RUNGS * np.log10(many / few)) + 1)
     return sorted({round(n) for n in rungs.tolist()})

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..charts import WorkPrecision, work_precision
 from ..charts.data import TARGETS
+from ..charts.work_precision import chartable
 from ..methods import method
 from ..scenes import scene
 from . import show
@@ -25,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(args: argparse.Namespace) -> None:
     """Measure, draw, write, summarise."""
     # All names are looked up, and what is needed is there, before any work.
-    chosen = [scene(name) for name in args.scenes]
+    chosen = [chartable(scene(name)) for name in args.scenes]
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
     if not args.json:
         show.need_rich()

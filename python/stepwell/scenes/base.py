@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from ..control import EnergyControl, Projection
 from ..errors import ArgumentError
 from ..integrate import integrate
 from ..methods import Method
@@ -37,7 +38,11 @@ class Scene:
         y: coordinate block at t = 0, of the system's ``y_shape``.
         dt: the usual step, in units of time; the document's where it gives one.
         horizon: time over which errors are measured, in units of time.
-        exact: the solution as a function of times of shape (n,): blocks v and y of shape (n, *block); or None.
+        exact: the solution as a function of times of shape (n,): blocks v and y of shape (n, *block). A formula, or an orbit
+            computed to more digits than a float holds; None for a chaotic motion, which nothing follows for long.
+        until: the last time that ``exact`` is asked for, in units of time; errors after it are NaN, for they are not known.
+        control: the control with which ``run`` steps, or None.
+        period: time after which the exact solution is where it began, in units of time, or None.
     """
 
     name: str
@@ -51,6 +56,9 @@ class Scene:
     dt: float
     horizon: float
     exact: Callable[[Array], tuple[Array, Array]] | None = None
+    until: float = math.inf
+    control: EnergyControl | Projection | None = None
+    period: float | None = None
 
     def run(self, method: str | Method, dt: float | None = None, *, steps: int | None = None, **options: Any) -> Run:
         """Step the scene from its start.
@@ -59,7 +67,8 @@ class Scene:
             method: its name, or what ``stepwell.method`` returns.
             dt: the step, in units of time; the scene's if None.
             steps: how many steps; if None, the least number that reaches the horizon.
-            **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``.
+            **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``. ``control`` is the
+                scene's own if it is not given; ``control=None`` leaves it out.
 
         Returns:
             A ``Run`` with blocks of shape (saved, *block).
@@ -73,7 +82,7 @@ class Scene:
         """
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
-        return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **options)
+        return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
 
     def steps_for(self, dt: float) -> int:
         """The least number of steps of ``dt`` that reach the horizon.
@@ -89,7 +98,7 @@ class Scene:
         return max(1, math.ceil(quotient - 1e-9))
 
     def state_error(self, run: Run) -> Array:
-        """How wrong each kept state is, shape (saved,); infinite where the state is not finite.
+        """How wrong each kept state is, shape (saved,); infinite where it is not finite, NaN where the true one is not known.
 
         The larger of the errors of the two blocks; that of a block is the length of its difference from the exact one,
         divided by the block's largest length in the exact solution. At 1 the error is as large as the solution.
@@ -97,27 +106,28 @@ class Scene:
         Raises:
             ArgumentError: if the scene has no exact solution.
         """
-        exact = self._solution(run.t)
+        exact, known = self._solution(run.t)
         with np.errstate(all="ignore"):
             errors = [
                 _length(block - true, shape) / scale
                 for block, true, shape, scale in zip((run.v, run.y), exact, self._shapes, self.scales, strict=True)
             ]
         error = np.maximum(*errors)
-        return np.where(np.isfinite(error), error, np.inf)
+        return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def energy_error(self, run: Run) -> Array:
         """How wrong the energy of each kept state is, shape (saved,), relative to the largest kinetic energy.
 
         The kinetic energy is the scale because it has a zero of its own; that of a potential is a convention.
+        Not finite and not known are as in ``state_error``.
 
         Raises:
             ArgumentError: if the scene has no exact solution.
         """
-        true_v, true_y = self._solution(run.t)
+        (true_v, true_y), known = self._solution(run.t)
         with np.errstate(all="ignore"):
             error = np.abs(run.energy - self._energy(true_v, true_y)) / self._kinetic_scale
-        return np.where(np.isfinite(error), error, np.inf)
+        return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def amplitude(self, run: Run) -> Array:
         """The larger of both blocks' lengths in each kept state, shape (saved,), in the exact solution's ``scales``."""
@@ -136,7 +146,7 @@ class Scene:
 
     @cached_property
     def _sampled(self) -> tuple[Array, Array]:
-        return self._solution(np.linspace(0.0, self.horizon, SCALE_SAMPLES))
+        return self._solution(np.linspace(0.0, self.horizon, SCALE_SAMPLES))[0]
 
     @cached_property
     def _kinetic_scale(self) -> float:
@@ -147,10 +157,11 @@ class Scene:
     def _shapes(self) -> tuple[Shape, Shape]:
         return self.system.v_shape, self.system.y_shape
 
-    def _solution(self, t: Array) -> tuple[Array, Array]:
+    def _solution(self, t: Array) -> tuple[tuple[Array, Array], np.ndarray[Any, np.dtype[np.bool_]]]:
+        """The exact blocks, and at which times they are known; at the others they are those of the last known time."""
         if self.exact is None:
             raise ArgumentError(f"scene: {self.name} has no exact solution, so there is no error to measure")
-        return self.exact(t)
+        return self.exact(np.minimum(t, self.until)), t <= self.until
 
     def _energy(self, v: Array, y: Array) -> Array:
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))

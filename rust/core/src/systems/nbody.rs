@@ -14,6 +14,8 @@
 //! Sizes: bodies, dimensions (2 or 3). Options: the force; then `control:printed`, `control:limited`, `project:scaling` or
 //! `project:nacozy`. Parameters: G·m of each body, m of each body, ε; then the target energy, and the gain of a control.
 
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
 use nalgebra::SVector;
 
 use crate::{

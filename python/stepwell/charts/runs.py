@@ -1,0 +1,220 @@
+"""The picture of one run: where it went, and how wrong it was in energy and in state."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._checks import Array
+from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from ..result import Run
+from ..scenes import Scene
+from ..scenes import scene as find_scene
+from ..systems import NBody, System
+from .files import write_csv, write_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Times at which the exact solution is drawn.
+EXACT = 6001
+
+
+@dataclass(frozen=True, eq=False)
+class RunPicture:
+    """A run of a scene, with its errors at the kept states; arrays are of shape (saved,).
+
+    Attributes:
+        scene: what was run.
+        run: what came of it.
+        energy_error: of each kept state, relative to ``energy_scale``; infinite where it is not finite, NaN where the true one
+            is not known; None for a system without an energy. Without an exact solution it is the change since the first state.
+        energy_scale: what the energy error is relative to, in words.
+        state_error: ``Scene.state_error``, or None if the scene has no exact solution.
+    """
+
+    scene: Scene
+    run: Run
+    energy_error: Array | None
+    energy_scale: str
+    state_error: Array | None
+
+    @property
+    def kind(self) -> str:
+        """What is drawn: ``"orbits"`` of bodies, ``"swing"`` of a single coordinate, or ``"rows"`` of coordinates."""
+        if isinstance(self.run.system, NBody):
+            return "orbits"
+        return "rows" if self.scene.system.y_shape else "swing"
+
+    @property
+    def title(self) -> str:
+        """What, and by which method."""
+        return f"{self.scene.title} by {self.run.method.title}"
+
+    @property
+    def finite(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Which kept states are finite."""
+        return np.asarray(
+            np.isfinite(self.run.y).reshape(len(self.run.t), -1).all(axis=1)
+            & np.isfinite(self.run.v).reshape(len(self.run.t), -1).all(axis=1)
+        )
+
+    @cached_property
+    def exact(self) -> tuple[Array, Array, Array] | None:
+        """Times, v and y of the exact solution over the run, as far as it is known, or None."""
+        first, last = float(self.run.t[0]), min(float(self.run.t[-1]), self.scene.until)
+        if self.scene.exact is None or last <= first:
+            return None
+        if self.scene.period is not None and self.kind == "orbits":
+            last = min(last, first + self.scene.period)  # the rest is the same curve
+        t = np.linspace(first, last, EXACT)
+        return t, *self.scene.exact(t)
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw it, and write it to ``path`` if given; the ending says in which format.
+
+        Raises:
+            ArgumentError: if there is no such format.
+            UnsupportedError: if matplotlib is missing.
+        """
+        from .runs_picture import draw
+        from .style import save
+
+        figure = draw(self)
+        if path is not None:
+            save(figure, path)
+        return figure
+
+    def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
+        """Write a film of the run; the kept states are its frames, none is made up between them.
+
+        Args:
+            path: the file, ending in .gif, .mp4 or .html.
+            seconds: how long it lasts, above zero.
+            fps: frames a second, above zero; fewer if fewer states were kept.
+
+        Raises:
+            ArgumentError: what was given and what was expected.
+            UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
+        """
+        from .runs_film import need, write
+
+        seconds, fps = need(path, seconds, fps)
+        write(self, path, seconds, fps)
+
+    def summary(self) -> dict[str, Any]:
+        """The run in a few numbers; errors that are not known are left out of the largest."""
+        return {
+            "scene": self.scene.name,
+            "method": self.run.method.name,
+            "dt": self.run.dt,
+            "steps": self.run.steps,
+            "kept": len(self.run.t),
+            "diverged_at_step": int(self.run.first_bad_step) if self.run.status else None,
+            "largest_state_error": _largest(self.state_error),
+            "largest_energy_error": _largest(self.energy_error),
+        }
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each kept state: time, each number of the blocks, energy and errors."""
+        columns = self._columns()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write ``rows()``, one line each; every number reads back as itself."""
+        write_csv(self._columns(), path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write summary and rows; what is not finite is null."""
+        write_json({"summary": self.summary(), "rows": self.rows()}, path)
+
+    def columns(self) -> dict[str, Array]:
+        """The kept states as arrays with the time along the first axis: t, v, y, energy and errors, as far as there are any."""
+        given: dict[str, Array] = {"t": self.run.t, "v": self.run.v, "y": self.run.y}
+        if self.energy_error is not None:
+            given["energy"] = self.run.energy
+        if self.state_error is not None:
+            given["state_error"] = self.state_error
+        if self.energy_error is not None:
+            given["energy_error"] = self.energy_error
+        return given
+
+    def _columns(self) -> dict[str, list[Any]]:
+        """A column for each number."""
+        return {
+            name + (str(list(index)) if index else ""): values[(slice(None), *index)].tolist()
+            for name, values in self.columns().items()
+            for index in np.ndindex(values.shape[1:])
+        }
+
+
+def run_picture(scene: Scene | str, run: Run) -> RunPicture:
+    """Look at a run of a scene: where it went, and how wrong it was.
+
+    Args:
+        scene: the ``Scene`` that was run, or its name.
+        run: what ``scene.run(…, every=…)`` returned, with two states or more.
+
+    Returns:
+        A ``RunPicture``.
+
+    Raises:
+        ArgumentError: if the run is not of that scene, or keeps too little.
+    """
+    if not isinstance(scene, (Scene, str)):
+        raise DTypeError(f"scene: expected a Scene or its name, got {type(scene).__name__}")
+    scene = find_scene(scene)
+    if not isinstance(run, Run):
+        raise DTypeError(f"run: expected what scene.run returns, got {type(run).__name__}")
+    if run.y.shape[1:] != scene.system.y_shape or run.v.shape[1:] != scene.system.v_shape:
+        raise ShapeError(f"run: expected one member with states of shape {scene.system.y_shape}, got {run.y.shape[1:]}")
+    if (run.t[0] == 0.0 and not _begins(scene, run)) or _left_alone(run.system) != _left_alone(scene.system):
+        raise ArgumentError(f"run: expected a run of the scene {scene.name}, got another start or system: {run!r}")
+    if len(run.t) < 2:
+        raise ArgumentError(f"run: expected two kept states or more, got {len(run.t)}; run with every=")
+    energy_error, scale = _energy_error(scene, run)
+    return RunPicture(scene, run, energy_error, scale, None if scene.exact is None else scene.state_error(run))
+
+
+def _begins(scene: Scene, run: Run) -> bool:
+    """Whether the first state is the scene's start, but for the rounding of a method that makes v from something else."""
+    pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
+    scale = max(float(np.abs(block).max()) for _, block in pairs)
+    return all(np.allclose(found, block, rtol=0.0, atol=1e-9 * scale) for found, block in pairs)
+
+
+def _left_alone(system: System) -> str:
+    """A system in words, without its control."""
+    if isinstance(system, NBody):
+        system = copy.copy(system)
+        system.control = None
+    return repr(system)
+
+
+def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
+    try:
+        energy = run.energy
+    except UnsupportedError:
+        return None, ""
+    if scene.exact is not None:
+        return scene.energy_error(run), "the largest kinetic energy of the exact solution"
+    # The kinetic energy is the scale because it has a zero of its own.
+    at_rest = float(scene.system.energy(0.0 * scene.v, scene.y))
+    scale, name = float(scene.system.energy(scene.v, scene.y)) - at_rest, "the kinetic energy at the start"
+    if scale == 0.0:
+        scale, name = abs(at_rest) or 1.0, "the energy at the start"
+    with np.errstate(all="ignore"):
+        error = np.abs(energy - energy[0]) / scale
+    return np.where(np.isfinite(error), error, np.inf), name
+
+
+def _largest(error: Array | None) -> float | None:
+    """The largest that is known, or None."""
+    if error is None or np.isnan(error).all():
+        return None
+    return float(np.nanmax(error))

@@ -1,0 +1,98 @@
+"""A small star cluster: Plummer's sphere (Aarseth, Hénon and Wielen 1974)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..._checks import Array, count, number
+from ...errors import ArgumentError
+from ...systems import NBody
+from ..base import Scene
+
+#: Share of the mass that is sampled: the outermost thousandth would be far away.
+INNER = 0.999
+
+
+def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
+    """Equal stars at random in Plummer's sphere, over ten of Hénon's units of time.
+
+    Hénon's units: G = 1, mass 1 and energy −1/4 in all, half as much kinetic energy as potential but for the sign, the centre of
+    mass at rest in the origin. The stars are drawn as Aarseth, Hénon and Wielen do (Astronomy and Astrophysics 37, 1974), then
+    moved and scaled so that these hold for them and not for the average only. The motion is chaotic: no solution is
+    exact for long.
+
+    Args:
+        n: how many stars, two or more.
+        seed: of the random numbers, a whole number of zero or more; the same seed gives the same stars.
+        softening: length ε of the force, in Hénon's units of length, zero or more. With 0 close pairs need a very small step.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+    """
+    n, seed = count("n", n, 2), count("seed", seed, 0)
+    softening = number("softening", softening)
+    if softening < 0.0:
+        raise ArgumentError(f"softening: expected a length of zero or more, got {softening:g}")
+    random = np.random.default_rng(seed)
+    masses = np.full(n, 1.0 / n)
+    y, v = _drawn(random, n)
+    y, v = y - y.mean(axis=0), v - v.mean(axis=0)
+    system = NBody(masses, force="newton", softening=softening, dim=3)
+    y = y * _scale(masses, y, softening)
+    v = v * math.sqrt(0.25 / float(system.energy(v, y) - system.energy(0.0 * v, y)))
+    return Scene(
+        name="plummer",
+        title=f"Plummer's sphere of {n} stars",
+        section="beyond the document",
+        description="A star cluster in space, softened, in equilibrium as a whole and chaotic star by star.",
+        error="not measured: the motion is chaotic",
+        system=system,
+        v=v,
+        y=y,
+        dt=0.01,
+        horizon=10.0,
+    )
+
+
+def _drawn(random: np.random.Generator, n: int) -> tuple[Array, Array]:
+    """Places and velocities of n stars in a sphere of radius, mass and G of 1; shape (n, 3) each."""
+    radius = ((INNER * (1.0 - random.random(n))) ** (-2.0 / 3.0) - 1.0) ** -0.5
+    # The share q of the escape velocity has the density q²·(1 − q²)^(7/2), at most 0.0923; drawn and rejected.
+    share = np.empty(n)
+    for i in range(n):
+        while True:
+            q, height = random.random(2)
+            if 0.1 * height < q * q * (1.0 - q * q) ** 3.5:
+                share[i] = q
+                break
+    speed = share * math.sqrt(2.0) * (1.0 + radius * radius) ** -0.25
+    return radius[:, np.newaxis] * _directions(random, n), speed[:, np.newaxis] * _directions(random, n)
+
+
+def _directions(random: np.random.Generator, n: int) -> Array:
+    """Unit vectors, all directions alike, shape (n, 3)."""
+    z, angle = 1.0 - 2.0 * random.random(n), 2.0 * math.pi * random.random(n)
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
+
+
+def _scale(masses: Array, y: Array, softening: float) -> float:
+    """The factor of all places with which the potential energy is −1/2; it falls with the factor, so halving finds it."""
+    i, j = np.triu_indices(len(masses), 1)
+    square = ((y[i] - y[j]) ** 2).sum(axis=-1)
+    product = masses[i] * masses[j]
+
+    def depth(scale: float) -> float:
+        return float((product / np.sqrt(scale * scale * square + softening * softening)).sum())
+
+    low, high = 0.0, 1.0
+    if softening > 0.0 and depth(0.0) <= 0.5:
+        raise ArgumentError(f"softening: {softening:g} is too long for {len(masses)} stars to have the energy −1/4")
+    while depth(high) > 0.5:
+        high *= 2.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if depth(middle) > 0.5 else (low, middle)
+    return high

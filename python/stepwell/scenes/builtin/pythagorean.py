@@ -1,0 +1,38 @@
+"""The Pythagorean three-body problem (Burrau 1913; Szebehely and Peters 1967)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...systems import NBody
+from ..base import Scene
+from ..taylor import Orbit
+
+#: The first body leaves for good at about t = 60, and the other two go on as a pair: all has been seen.
+UNTIL = 70.0
+
+
+def pythagorean() -> Scene:
+    """Masses 3, 4 and 5 from rest at the corners of the right triangle with these sides, up to t = 10.
+
+    Under Newton's law they fall into near collisions; 4 and 5 pass each other at 0.0097 at t = 1.879, at 0.061 at t = 3.80 and at
+    0.0085 at t = 8.760. Within 0.0004 of time there the velocities turn round, so that a fixed step that would do is
+    ten thousand times too small for the rest. ``exact`` is computed to more digits than a float holds, up to t = 70.
+    """
+    masses = [3.0, 4.0, 5.0]
+    v = np.zeros((3, 2))
+    y = np.array([[1.0, 3.0], [-2.0, -1.0], [1.0, -1.0]])
+    return Scene(
+        name="pythagorean",
+        title="Pythagorean problem",
+        section="beyond the document",
+        description="Masses 3, 4 and 5 fall from rest into near collisions, which no step of fixed length is small enough for.",
+        error="bodies as far from their true places as the largest true distance from the centre, or likewise velocities",
+        system=NBody(masses, force="newton"),
+        v=v,
+        y=y,
+        dt=0.001,
+        horizon=10.0,
+        exact=Orbit(masses, v, y),
+        until=UNTIL,
+    )

@@ -1,0 +1,387 @@
+"""Pictures and films of runs: what is in them, and that nothing is cut off or covered."""
+
+import csv
+import dataclasses
+import json
+import math
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import stepwell as sw
+from PIL import Image
+from stepwell.charts import runs_film, runs_picture
+from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
+
+
+def looked_at(scene, method="false_euler", dt=None, **options):
+    return sw.charts.run_picture(scene, scene.run(method, dt, **({"every": 1} | options)))
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """One of each kind of picture, and of what can go wrong in it."""
+    scenes = sw.scenes
+    with pytest.warns(sw.DivergenceWarning):
+        crash = looked_at(scenes.oscillator(), "standard_euler", 100.0, steps=400)
+    return {
+        "orbits": looked_at(scenes.figure_eight(), "leapfrog"),
+        "long": looked_at(scenes.energy_control(), "standard_euler", steps=5000),
+        "space": looked_at(scenes.plummer(), "leapfrog", steps=200),
+        "two": looked_at(scenes.kepler()),
+        "gone": looked_at(scenes.pythagorean(), "leapfrog", every=5),
+        "swing": looked_at(scenes.oscillator()),
+        "steady": looked_at(scenes.forced_oscillator(), "rk4"),
+        "grown": looked_at(scenes.oscillator(), "standard_euler"),
+        "crash": crash,
+        "rows": looked_at(scenes.chain()),
+        "many rows": looked_at(scenes.chain(100, {1: 1.0, 3: 0.4}), steps=900),
+    }
+
+
+KINDS = ("orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def said(figure):
+    return " ".join(text.get_text() for text in figure.texts)
+
+
+# ---- the data
+
+
+def test_a_picture_holds_the_errors_of_the_scene():
+    scene = sw.scenes.kepler()
+    run = scene.run("leapfrog", every=10)
+    chart = sw.charts.run_picture("kepler", run)
+    assert np.array_equal(chart.state_error, scene.state_error(run))
+    assert np.array_equal(chart.energy_error, scene.energy_error(run))
+    assert chart.energy_scale == "the largest kinetic energy of the exact solution"
+    assert chart.summary() == {
+        "scene": "kepler",
+        "method": "leapfrog",
+        "dt": 0.01,
+        "steps": run.steps,
+        "kept": len(run.t),
+        "diverged_at_step": None,
+        "largest_state_error": scene.state_error(run).max(),
+        "largest_energy_error": scene.energy_error(run).max(),
+    }
+
+
+def test_without_an_exact_solution_the_energy_is_compared_with_the_start():
+    chart = looked_at(sw.scenes.energy_control(), "standard_euler", steps=300)
+    assert chart.state_error is None
+    assert chart.summary()["largest_state_error"] is None
+    energy = chart.run.energy
+    kinetic = 0.5 * (chart.scene.v**2).sum()
+    np.testing.assert_allclose(chart.energy_error, np.abs(energy - energy[0]) / kinetic, rtol=1e-12)
+    rest = dataclasses.replace(sw.scenes.pythagorean(), exact=None)
+    chart = looked_at(rest, "leapfrog", steps=10)
+    np.testing.assert_allclose(chart.energy_error, np.abs(chart.run.energy / (-769 / 60) - 1), rtol=0, atol=1e-12)
+    assert chart.energy_scale == "the energy at the start"
+
+
+def test_what_is_not_known_is_left_out_of_the_largest():
+    scene = dataclasses.replace(sw.scenes.clover(), until=3.0)
+    chart = looked_at(scene)
+    known = scene.state_error(chart.run)[chart.run.t <= 3.0]
+    assert 0 < len(known) < len(chart.run.t)
+    assert chart.summary()["largest_state_error"] == known.max()
+    assert "not known after t = 3" in [text.get_text() for axes in chart.plot().axes for text in axes.texts]
+
+
+def test_files_hold_the_kept_states(tmp_path, pictures):
+    chart = pictures["crash"]
+    chart.to_csv(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["t", "v", "y", "energy", "state_error", "energy_error"] == list(chart.rows()[0])
+    assert [float(row["y"]) for row in rows[:100]] == chart.run.y[:100].tolist()
+    chart.to_json(tmp_path / "run.json")
+    whole = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert whole["summary"]["diverged_at_step"] == chart.run.first_bad_step
+    assert whole["rows"][-1]["y"] is None
+    pictures["space"].to_csv(tmp_path / "space.csv")
+    with (tmp_path / "space.csv").open(encoding="utf-8") as file:
+        assert "y[63, 2]" in file.readline()
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (lambda s: ("clovr", s.run("rk4", every=1)), UnknownNameError, "did you mean 'clover'"),
+        (lambda s: (3, s.run("rk4", every=1)), DTypeError, "scene: expected a Scene or its name, got int"),
+        (lambda s: (s, 3), DTypeError, "run: expected what scene.run returns, got int"),
+        (lambda s: (s, s.run("rk4")), ArgumentError, "run: expected two kept states or more, got 1; run with every="),
+        (lambda s: ("plummer", s.run("rk4", every=1)), ShapeError, r"run: expected one member with states of shape \(64, 3\)"),
+        (lambda s: ("figure_eight", s.run("rk4", every=1)), ArgumentError, "got another start or system"),
+        (
+            lambda s: (sw.scenes.oscillator(2.0), sw.scenes.oscillator().run("rk4", every=1)),
+            ArgumentError,
+            "another start or system",
+        ),
+        (
+            lambda s: (s, sw.integrate(s.system, "rk4", v=s.v, y=2 * s.y, dt=0.1, steps=5, every=1)),
+            ArgumentError,
+            "another start or system",
+        ),
+        (
+            lambda s: (s, sw.integrate(s.system, "rk4", v=s.v, y=np.repeat(s.y[..., None], 2, -1), dt=0.1, steps=5, every=1)),
+            ShapeError,
+            "run: expected one member",
+        ),
+    ],
+)
+def test_what_is_no_run_of_the_scene_is_refused(make, error, message):
+    with pytest.raises(error, match=message):
+        sw.charts.run_picture(*make(sw.scenes.clover()))
+
+
+def test_a_controlled_run_is_a_run_of_the_scene():
+    scene = sw.scenes.clover()
+    chart = looked_at(scene, "standard_euler", control=sw.EnergyControl(1.0))
+    assert "EnergyControl" in said(chart.plot())
+
+
+# ---- the picture
+
+
+@every_kind
+def test_nothing_in_the_picture_is_cut_off_or_covered(pictures, kind, tmp_path):
+    figure = pictures[kind].plot(tmp_path / "run.png")
+    with Image.open(tmp_path / "run.png") as picture:
+        width, height = picture.size
+    assert (width, height) == (1600, 900)
+    page = figure.bbox
+    panels = [axes.get_tightbbox() for axes in figure.axes]
+    texts = [text.get_window_extent() for text in figure.texts if text.get_text()]
+    for box in (*panels, *texts):
+        assert page.x0 <= box.x0 < box.x1 <= page.x1
+        assert page.y0 <= box.y0 < box.y1 <= page.y1
+    boxes = [*panels, *texts]
+    for i, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[:i])
+
+
+@every_kind
+def test_energy_is_never_shown_alone(pictures, kind):
+    """Below it the state error, or the words that there is none."""
+    chart = pictures[kind]
+    energy, state = chart.plot().axes[-2:]
+    assert energy.get_title(loc="left").startswith("energy error")
+    assert state.get_title(loc="left").startswith("state error")
+    words = " ".join(text.get_text() for text in state.texts)
+    assert ("no exact solution" in words) is (chart.state_error is None)
+    for axes, error in ((energy, chart.energy_error), (state, chart.state_error)):
+        if error is not None:
+            shown = axes.lines[0].get_ydata()
+            good = np.isfinite(error) & (error > 0)
+            assert np.array_equal(shown[good], error[good])
+            assert np.isnan(shown[~good]).all()
+            assert axes.get_ylim()[1] > min(error[good].max(), 1e300)
+
+
+def test_orbits_are_where_the_bodies_went(pictures):
+    chart = pictures["two"]
+    axes = chart.plot().axes[0]
+    assert axes.get_aspect() == 1.0
+    paths = [line for line in axes.lines if len(line.get_xdata()) == len(chart.run.t)]
+    assert [line.get_xydata().tolist() for line in paths] == [chart.run.y[:, i].tolist() for i in (0, 1)]
+    single = [(line.get_xydata().tolist()[0], line.get_markerfacecolor()) for line in axes.lines if len(line.get_xdata()) == 1]
+    for i, look in enumerate(runs_picture.BODIES[:2]):
+        assert (chart.run.y[0, i].tolist(), "white") in single
+        assert (chart.run.y[-1, i].tolist(), look["color"]) in single
+    exact = [line for line in axes.lines if line.get_linewidth() == runs_picture.EXACT["linewidth"]]
+    assert len(exact) == 2
+    box = axes.get_xlim() + axes.get_ylim()
+    assert np.abs(chart.run.y).max() < max(map(abs, box))
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["body 1", "body 2", "exact", "start", "end"]
+
+
+def test_bodies_in_space_are_seen_from_two_sides(pictures):
+    chart = pictures["space"]
+    above, side = chart.plot().axes[:2]
+    assert [(a.get_xlabel(), a.get_ylabel(), a.get_title(loc="left")) for a in (above, side)] == [
+        ("x", "y", "seen along z"),
+        ("x", "z", "seen along y"),
+    ]
+    assert np.ptp(above.get_xlim()) == pytest.approx(np.ptp(side.get_ylim()))
+    for axes, plane in ((above, (0, 1)), (side, (0, 2))):
+        assert np.array_equal(axes.lines[0].get_xydata(), chart.run.y[:, 0][:, plane])
+
+
+def test_bodies_are_told_apart_in_grey():
+    looks = runs_picture.BODIES
+    assert len({look["marker"] for look in looks}) == len({look["color"] for look in looks}) == len(looks)
+    assert all(look["color"][1:3] == look["color"][3:5] == look["color"][5:7] for look in looks)
+
+
+def test_a_long_run_does_not_hide_the_exact_orbit():
+    chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=runs_picture.LONG + 1)
+    lines = chart.plot().axes[0].lines
+    paths = [line.get_zorder() for line in lines if len(line.get_xdata()) == len(chart.run.t)]
+    exact = [line.get_zorder() for line in lines if line.get_linestyle() == "--"]
+    assert min(exact) > max(paths)
+
+
+def test_what_leaves_the_picture_is_said(pictures):
+    assert "A body leaves the picture." in said(pictures["gone"].plot())
+    assert "The curve leaves the picture." in said(pictures["grown"].plot())
+    for kind in ("orbits", "two", "swing", "rows", "space"):
+        assert "leaves" not in said(pictures[kind].plot())
+    low, high = pictures["grown"].plot().axes[0].get_ylim()
+    assert -4 < low < -1 < 1 < high < 4
+
+
+def test_a_diverged_run_says_when(pictures):
+    chart = pictures["crash"]
+    figure = chart.plot()
+    step = int(chart.run.first_bad_step)
+    assert f"Diverged at step {step} (t = {step * 100:g})" in said(figure)
+    assert " not finite " in [text.get_text() for text in figure.axes[-1].texts]
+
+
+def test_swings_and_rows_are_the_states(pictures):
+    chart = pictures["swing"]
+    above, below = chart.plot().axes[:2]
+    assert np.array_equal(above.lines[1].get_ydata(), chart.run.y)
+    assert np.array_equal(below.lines[1].get_ydata(), chart.run.v)
+    np.testing.assert_allclose(above.lines[0].get_ydata(), np.cos(above.lines[0].get_xdata()), rtol=0, atol=1e-14)
+    chart = pictures["rows"]
+    axes = chart.plot().axes[0]
+    drawn = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == len(chart.run.t)]
+    assert len(drawn) == 8
+    for i, (line, tick) in enumerate(zip(drawn, axes.get_yticks(), strict=True)):
+        np.testing.assert_allclose(line - tick, chart.run.y[:, i], rtol=0, atol=1e-12)
+    axes = pictures["many rows"].plot().axes[0]
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert (labels[0], labels[-1], len(labels)) == ("1", "100", runs_picture.MOST_ROWS)
+
+
+@pytest.mark.parametrize("ending", ["svg", "pdf"])
+def test_pictures_can_be_drawings(pictures, ending, tmp_path):
+    path = tmp_path / f"run.{ending}"
+    pictures["orbits"].plot(path)
+    assert path.read_bytes()[:5] in (b"<?xml", b"%PDF-")
+
+
+# ---- the film
+
+
+@every_kind
+def test_a_film_shows_the_states(pictures, kind, tmp_path):
+    chart = pictures[kind]
+    chart.animate(tmp_path / "run.gif", seconds=0.4, fps=10)
+    frames = []
+    with Image.open(tmp_path / "run.gif") as film:
+        assert (film.size, film.n_frames, film.info["duration"]) == ((1000, 562), 4, 100)
+        for i in range(4):
+            film.seek(i)
+            frames.append(np.asarray(film.convert("L"), dtype=int))
+    for one, other in pairwise(frames):
+        assert (np.abs(one - other) > 60).sum() > 30  # the bodies moved, and the clock went on
+
+
+@every_kind
+def test_nothing_in_a_film_is_cut_off_or_covered(pictures, kind):
+    figure, show = runs_film.stage(pictures[kind])
+    show(int(np.flatnonzero(pictures[kind].finite)[-1]))
+    page = figure.bbox
+    boxes = [axes.get_tightbbox() for axes in figure.axes]
+    boxes += [text.get_window_extent() for text in figure.texts if text.get_text()]
+    for i, box in enumerate(boxes):
+        assert page.x0 <= box.x0 < box.x1 <= page.x1
+        assert page.y0 <= box.y0 < box.y1 <= page.y1
+        assert not any(box.overlaps(other) for other in boxes[:i])
+
+
+def test_a_frame_is_the_state_of_its_time(pictures):
+    chart = pictures["orbits"]
+    figure, show = runs_film.stage(chart)
+    show(70)
+    assert f"t = {chart.run.t[70]:6.3f}" in [text.get_text() for text in figure.texts]
+    marks = [line.get_xydata().tolist() for line in figure.axes[0].lines if len(line.get_xdata()) == 1]
+    assert marks == [[chart.run.y[70, i].tolist()] for i in range(3)]
+    trails = [line.get_xydata() for line in figure.axes[0].lines if 1 < len(line.get_xdata()) <= 71]
+    for i, trail in enumerate(trails):
+        assert np.array_equal(trail, chart.run.y[71 - len(trail) : 71, i])
+        assert len(trail) == pytest.approx(0.3 * chart.scene.period / chart.run.dt, abs=2)
+    assert len(trails) == 3
+
+    chart = pictures["rows"]
+    figure, show = runs_film.stage(chart)
+    show(33)
+    exact, mark = figure.axes[0].lines[1:3]
+    assert np.array_equal(mark.get_ydata(), chart.run.y[33])
+    assert np.array_equal(exact.get_ydata(), chart.scene.exact(chart.run.t[33:34])[1][0])
+
+    chart = pictures["swing"]
+    figure, show = runs_film.stage(chart)
+    show(33)
+    show(20)
+    grown = next(line for line in figure.axes[0].lines if line.get_zorder() == 3)
+    assert np.array_equal(grown.get_ydata(), chart.run.y[:21])
+
+
+def test_no_frame_is_made_up(tmp_path):
+    """Six states are six frames, and the film is as long as was asked."""
+    chart = looked_at(sw.scenes.clover(), every=20)
+    chart.animate(tmp_path / "run.gif", seconds=3, fps=25)
+    with Image.open(tmp_path / "run.gif") as film:
+        assert (film.n_frames, film.info["duration"]) == (6, 500)
+
+
+def test_a_film_can_be_a_page(tmp_path):
+    chart = looked_at(sw.scenes.clover(), every=50)
+    chart.animate(tmp_path / "run.html", seconds=1, fps=2)
+    page = (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64") >= 2
+    assert [path.name for path in tmp_path.iterdir()] == ["run.html"]
+
+
+def test_without_ffmpeg_an_mp4_is_refused_by_name(monkeypatch, tmp_path):
+    from matplotlib import animation
+
+    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    chart = looked_at(sw.scenes.clover())
+    with pytest.raises(UnsupportedError, match=r"an \.mp4 needs the program ffmpeg, which is not found"):
+        chart.animate(tmp_path / "run.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_with_ffmpeg_an_mp4_is_written(tmp_path):
+    from matplotlib import animation
+
+    if not animation.FFMpegWriter.isAvailable():
+        pytest.skip("there is no ffmpeg here")
+    looked_at(sw.scenes.clover(), every=50).animate(tmp_path / "run.mp4", seconds=1, fps=2)
+    assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize(
+    ("path", "options", "message"),
+    [
+        ("run.avi", {}, r"path: expected an ending of a film, one of \.gif, \.mp4, \.html, got"),
+        ("run.gif", {"seconds": 0}, "seconds: expected numbers above zero"),
+        ("run.gif", {"fps": math.inf}, "fps"),
+        ("run.gif", {"seconds": 1e6, "fps": 1e3}, "expected 20000 or fewer"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused(path, options, message, tmp_path):
+    chart = looked_at(sw.scenes.clover())
+    with pytest.raises(ArgumentError, match=message):
+        chart.animate(tmp_path / path, **options)
+    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
+        chart.plot(tmp_path / "run.gif2")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_matplotlib_the_numbers_are_still_there(monkeypatch, tmp_path):
+    chart = looked_at(sw.scenes.clover())
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    for draw in (chart.plot, lambda: chart.animate(tmp_path / "run.gif")):
+        with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
+            draw()
+    chart.to_csv(tmp_path / "run.csv")
