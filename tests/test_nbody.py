@@ -1,0 +1,164 @@
+"""What bodies that attract each other keep, whatever the method or only by some: properties over random bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+EPS = float(np.finfo(float).eps)
+METHODS = [m.name for m in sw.methods()]
+FORCES = ("logarithmic", "newton")
+#: Their P is a product of kicks along the lines between bodies and of drifts along v, each of which keeps angular momentum.
+SYMPLECTIC = ["false_euler", "damped_euler", "leapfrog"]
+
+
+def bodies(seed: int, n: int, dim: int, force: str) -> tuple[sw.NBody, Any, Any]:
+    """Bodies some tenths apart or more (softened), with masses of up to 1."""
+    rng = np.random.default_rng(seed)
+    system = sw.NBody(rng.uniform(0.1, 1.0, n), force=force, softening=0.3)
+    return system, rng.normal(size=(n, dim)), 2.0 * rng.normal(size=(n, dim))
+
+
+def spin(masses: Any, v: Any, y: Any) -> Any:
+    """Σ m·(yᵢvⱼ − yⱼvᵢ) over bodies, an antisymmetric matrix in the plane and in space."""
+    return np.einsum("b,bi,bj->ij", masses, y, v) - np.einsum("b,bi,bj->ij", masses, v, y)
+
+
+RANDOM = {
+    "seed": st.integers(0, 10**6),
+    "n": st.sampled_from([1, 2, 3, 4, 7, 8, 9, 33]),
+    "dim": st.sampled_from([2, 3]),
+    "force": st.sampled_from(FORCES),
+}
+
+
+@settings(max_examples=60, deadline=None)
+@given(**RANDOM, method=st.sampled_from(METHODS))
+def test_momentum_is_kept_by_every_method(seed: int, n: int, dim: int, force: str, method: str) -> None:
+    """The two pushes of a pair are G·m·m times the same numbers, so they cancel but for rounding."""
+    system, v, y = bodies(seed, n, dim, force)
+    run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=200)
+    m = system.masses[:, np.newaxis]
+    # A body gets n pushes of at most G·m/(2ε) a stage, each of some roundings; steps add up. Verlet's v divides by h what rounds.
+    size = np.abs(m * v).sum() + n * n / 0.6
+    bound = 200 * 20 * EPS * size * (100 if method == "verlet" else 1)
+    np.testing.assert_allclose((m * run.v[-1]).sum(axis=0), (m * v).sum(axis=0), rtol=0, atol=bound)
+
+
+@settings(max_examples=40, deadline=None)
+@given(**RANDOM, method=st.sampled_from(SYMPLECTIC))
+def test_angular_momentum_is_kept_by_symplectic_methods(seed: int, n: int, dim: int, force: str, method: str) -> None:
+    system, v, y = bodies(seed, n, dim, force)
+    run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=200)
+    before, after = spin(system.masses, v, y), spin(system.masses, run.v[-1], run.y[-1])
+    reach = np.abs(y).max() + 2.0 * np.abs(run.v[-1]).max() + np.abs(run.y[-1]).max()
+    np.testing.assert_allclose(after, before, rtol=0, atol=200 * 40 * EPS * n * n * reach * (1.0 + np.abs(v).max()))
+
+
+def test_angular_momentum_is_not_kept_by_standard_euler() -> None:
+    """So the test above can fail."""
+    system, v, y = bodies(3, 3, 2, "newton")
+    run = sw.integrate(system, "standard_euler", v=v, y=y, dt=0.01, steps=200)
+    assert np.abs(spin(system.masses, run.v[-1], run.y[-1]) - spin(system.masses, v, y)).max() > 1e-3
+
+
+@settings(max_examples=40, deadline=None)
+@given(**RANDOM, method=st.sampled_from(METHODS))
+def test_the_order_of_the_bodies_does_not_matter(seed: int, n: int, dim: int, force: str, method: str) -> None:
+    """Sums are made in another order: equal to rounding, which close encounters multiply."""
+    system, v, y = bodies(seed, n, dim, force)
+    order = np.random.default_rng(seed).permutation(n)
+    run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=100)
+    mixed = sw.integrate(
+        sw.NBody(system.masses[order], force=force, softening=0.3), method, v=v[order], y=y[order], dt=0.01, steps=100
+    )
+    # One unit of time; neighbours part by at most e^(t·√(n·m/ε³)) ≲ e^35 for 33 bodies at one point, in practice below 1e4.
+    np.testing.assert_allclose(mixed.y[-1], run.y[-1][order], rtol=0, atol=1e-8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(**RANDOM, method=st.sampled_from(METHODS))
+def test_scaling_by_powers_of_two_is_exact(seed: int, n: int, dim: int, force: str, method: str) -> None:
+    """Lengths × 4: times × 8 and speeds × ½ under Newton's law, times × 4 and the same speeds under the 1/r law. To the bit."""
+    system, v, y = bodies(seed, n, dim, force)
+    times, speeds = (8.0, 0.5) if force == "newton" else (4.0, 1.0)
+    wide = sw.NBody(system.masses, force=force, softening=4.0 * 0.3)
+    run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=50)
+    scaled = sw.integrate(wide, method, v=speeds * v, y=4.0 * y, dt=times * 0.01, steps=50)
+    np.testing.assert_array_equal(scaled.y[-1], 4.0 * run.y[-1])
+    np.testing.assert_array_equal(scaled.v[-1], speeds * run.v[-1])
+
+
+@settings(max_examples=30, deadline=None)
+@given(**RANDOM)
+def test_leapfrog_goes_back(seed: int, n: int, dim: int, force: str) -> None:
+    """With the velocities turned round it comes back to where it was, but for rounding."""
+    system, v, y = bodies(seed, n, dim, force)
+    there = sw.integrate(system, "leapfrog", v=v, y=y, dt=0.01, steps=100)
+    back = sw.integrate(system, "leapfrog", v=-there.v[-1], y=there.y[-1], dt=0.01, steps=100)
+    np.testing.assert_allclose(back.y[-1], y, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(back.v[-1], -v, rtol=0, atol=1e-8)
+    euler = sw.integrate(system, "standard_euler", v=v, y=y, dt=0.01, steps=100)
+    again = sw.integrate(system, "standard_euler", v=-euler.v[-1], y=euler.y[-1], dt=0.01, steps=100)
+    assert n == 1 or np.abs(again.y[-1] - y).max() > 1e-5
+
+
+def test_false_eulers_energy_stays_in_a_band_over_a_million_steps() -> None:
+    """On the figure-eight with 1000 steps a period, a thousand periods: the band of the last tenth is that of the first."""
+    eight = sw.scenes.figure_eight()
+    run = eight.run("false_euler", dt=eight.period / 1000, steps=1_000_000, every=7)
+    off = np.abs(run.energy - run.energy[0])
+    tenth = len(off) // 10
+    assert off[-tenth:].max() < 1.2 * off[:tenth].max() < 0.01
+    standard = eight.run("standard_euler", dt=eight.period / 1000, steps=10_000, every=7)
+    assert np.abs(standard.energy - standard.energy[0]).max() > 0.1  # no band at all
+
+
+@pytest.mark.parametrize("force", FORCES)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_force_is_minus_the_gradient_of_the_energy(force: str, dim: int) -> None:
+    """h·v̇ of the reference against differences of the potential energy, with unequal masses and softening."""
+    system, v, y = bodies(11, 5, dim, force)
+    system = system.sized(v, y)
+    a = system.scaled(1.0, ()).dv(0.0, v, y)
+    rest, d = np.zeros_like(v), 1e-5
+    for i in range(5):
+        for c in range(dim):
+            moved = np.zeros_like(y)
+            moved[i, c] = d
+            slope = (system.energy(rest, y + moved) - system.energy(rest, y - moved)) / (2 * d)
+            # Differences: d² times the third derivative (≲ 1/ε³) plus an eps over d.
+            assert system.masses[i] * a[i, c] == pytest.approx(-slope, abs=1e-7)
+
+
+def test_the_printed_pair_is_no_pair() -> None:
+    """Its force is that of the 1/r law to the bit, its energy is not kept by an accurate motion (Appendix D)."""
+    scene = sw.scenes.energy_control("printed")
+    printed = scene.run("rk4", dt=1e-3, steps=1000, every=100, control=None)
+    matching = sw.scenes.energy_control().run("rk4", dt=1e-3, steps=1000, every=100, control=None)
+    np.testing.assert_array_equal(printed.y, matching.y)
+    assert np.ptp(printed.energy) > 0.1
+    assert np.ptp(matching.energy) < 1e-10
+
+
+def test_test_particles_do_not_pull() -> None:
+    """The massive pair moves as it does alone; the dust falls as it should: a = G·M/r² towards a body far heavier."""
+    y = np.array([[0.0, 0.0], [1.0, 0.0], [10.0, 0.0], [0.0, 7.0]])
+    v = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    alone = sw.integrate(sw.NBody([1.0, 0.1], force="newton"), "rk4", v=v[:2], y=y[:2], dt=0.01, steps=300)
+    among = sw.integrate(sw.NBody([1.0, 0.1, 0.0, 0.0], force="newton"), "rk4", v=v, y=y, dt=0.01, steps=300)
+    np.testing.assert_allclose(among.y[-1][:2], alone.y[-1], rtol=0, atol=1e-12)
+    assert 0 < 10.0 - among.y[-1][2, 0] < 0.06  # ½·1.1/100·3² = 0.05
+
+
+def test_threads_share_systems_and_change_no_bit() -> None:
+    system, v, y = bodies(5, 9, 3, "newton")
+    v, y = (np.repeat(a[..., np.newaxis], 37, axis=-1) * np.linspace(0.5, 1.5, 37) for a in (v, y))
+    runs = [sw.integrate(system, "leapfrog", v=v, y=y, dt=0.01, steps=20, threads=k) for k in (1, 2, 3)]
+    for run in runs[1:]:
+        np.testing.assert_array_equal(run.y, runs[0].y)
