@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from typing import Any
 
@@ -258,10 +259,23 @@ def test_collisions_say_who_met_whom_and_when() -> None:
     (met,) = run.collisions
     assert (met.member, met.step, met.bodies, met.distance) == ((1,), 1, (0, 2), 0.0)
     assert np.isfinite(run.y[-1][..., [0, 2]]).all()
+    start = y.copy()
+    y[...] = 7.0  # the user's to change
+    assert run.collisions == (met,)
+    y = start
     alone = sw.integrate(sw.NBody(force="newton", G=1e-3), "false_euler", v=0.0, y=y[..., 2], dt=0.01, steps=10)
     np.testing.assert_array_equal(alone.y[-1], run.y[-1][..., 2])
     with pytest.raises(sw.errors.UnsupportedError, match="collisions"):
         _ = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1).collisions
+
+
+def test_a_warning_does_not_run_a_long_run_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["stepwell.integrate"], "QUICK", 0)  # the name alone is the function
+    equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
+    with pytest.warns(sw.DivergenceWarning) as caught:
+        run = sw.integrate(sw.NBody(), "rk4", v=0.0, y=equal, dt=0.01, steps=3)
+    assert "apart" not in str(caught[0].message)
+    assert run.collisions[0].bodies == (0, 2)
 
 
 def test_a_collision_after_many_steps_is_found_by_running_again() -> None:

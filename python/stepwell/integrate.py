@@ -23,6 +23,10 @@ from .systems import NBody, Sampled, System
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
 
+#: A warning says which bodies met if the member can be run again in so many steps times numbers, a moment. Otherwise
+#: ``Run.collisions`` is there to ask.
+QUICK = 10_000_000
+
 
 def integrate(
     system: System,
@@ -126,6 +130,8 @@ def integrate(
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
         plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told)
         out = engine.advance(plan, v, y, before, carried=carry is not None)
+    if isinstance(system, NBody) and (out.first_bad > start_step).any():
+        v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
         t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
         v=out.v,
@@ -208,7 +214,7 @@ def _warn(run: Run, before: Whole | None) -> None:
     first = tuple(int(i) for i in np.argwhere(bad & (run.first_bad_step == step))[0])
     who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
     met = ""
-    if run.collision is not None:
+    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= QUICK:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"

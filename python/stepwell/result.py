@@ -113,7 +113,8 @@ class Run:
     def collisions(self) -> tuple[Collision, ...]:
         """For bodies that attract each other: who was nearest to whom when a member diverged, one for each such member.
 
-        Found by running these members again up to that step. Members that had diverged before this run are left out.
+        Found by running these members again up to that step, which takes as long as they took. Members that had diverged before
+        this run are left out.
         """
         if self.collision is None:
             raise UnsupportedError(f"collisions: {self.system!r} has no bodies that collide")

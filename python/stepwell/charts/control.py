@@ -22,6 +22,7 @@ from ..scenes import Scene
 from ..scenes import scene as find_scene
 from ..systems import NBody
 from .files import write_csv, write_json
+from .style import Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,7 +79,7 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class ControlSweep:
+class ControlSweep(Drawn):
     """Errors of energy and state against the gain of a control.
 
     Attributes:
@@ -109,19 +110,11 @@ class ControlSweep:
         of_method = {line.kind: line for line in self.lines if line.method.name == name}
         return of_method[_checks.known("kind", kind, of_method)]
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
-
-        Raises:
-            UnsupportedError: if matplotlib is missing.
-        """
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
         from .control_picture import draw
-        from .style import save
 
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return draw(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each method, kind and gain."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..methods import Method
 from ..scenes import Scene
+from .style import Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,7 +91,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class WorkPrecision:
+class WorkPrecision(Drawn):
     """Error against cost of several methods on one scene.
 
     Attributes:
@@ -109,19 +110,11 @@ class WorkPrecision:
     repeats: int
     isa: str
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
-
-        Raises:
-            UnsupportedError: if matplotlib is missing.
-        """
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
         from .picture import draw
-        from .style import save
 
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return draw(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each point, and one for each refused method. Columns named ``measured_…`` are not repeatable."""

@@ -23,6 +23,7 @@ from ..stability import maps
 from ..stability.expansion import polynomials
 from ..systems import Oscillator, System
 from .files import write_csv, write_json
+from .style import Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,7 +42,7 @@ BITS = 320
 
 
 @dataclass(frozen=True, eq=False)
-class Powers:
+class Powers(Drawn):
     """Cost and error of n steps in each form.
 
     Attributes:
@@ -63,19 +64,11 @@ class Powers:
     errors: dict[str, Array]
     isa: str
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
-
-        Raises:
-            UnsupportedError: if matplotlib is missing.
-        """
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
         from .powers_picture import draw
-        from .style import save
 
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return draw(self)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each number of steps and form. ``measured_seconds`` is not repeatable."""

@@ -17,6 +17,7 @@ from ..scenes import Scene
 from ..scenes import scene as find_scene
 from ..systems import NBody, System
 from .files import write_csv, write_json
+from .style import Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +27,7 @@ EXACT = 6001
 
 
 @dataclass(frozen=True, eq=False)
-class RunPicture:
+class RunPicture(Drawn):
     """A run of a scene, with its errors at the kept states; arrays are of shape (saved,).
 
     Attributes:
@@ -75,20 +76,11 @@ class RunPicture:
         t = np.linspace(first, last, EXACT)
         return t, *self.scene.exact(t)
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw it, and write it to ``path`` if given; the ending says in which format.
-
-        Raises:
-            ArgumentError: if there is no such format.
-            UnsupportedError: if matplotlib is missing.
-        """
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
         from .runs_picture import draw
-        from .style import save
 
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return draw(self)
 
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
         """Write a film of the run; the kept states are its frames, none is made up between them.

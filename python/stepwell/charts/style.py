@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,3 +74,23 @@ def save(figure: Figure, path: str | Path) -> None:
     if Path(path).suffix.lower().removeprefix(".") not in known:
         raise ArgumentError(f"path: expected an ending of a picture, one of {', '.join(known)}, got {str(path)!r}")
     figure.savefig(path, facecolor="white")
+
+
+class Drawn(ABC):
+    """A chart of which there is one picture."""
+
+    @abstractmethod
+    def draw(self) -> Figure:
+        """The picture, on a new figure."""
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw it, and write it to ``path`` if given; the ending says in which format.
+
+        Raises:
+            ArgumentError: if there is no such format.
+            UnsupportedError: if matplotlib is missing.
+        """
+        figure = self.draw()
+        if path is not None:
+            save(figure, path)
+        return figure
