@@ -1,8 +1,8 @@
 //! Lists `src/steppers/*.rs` and `src/systems/*.rs`, so that a new file in either folder is its whole registration.
 //!
 //! A file `false_euler.rs` in `steppers/` holds a type `FalseEuler` that implements `Stepper`; a file `oscillator.rs` in
-//! `systems/` holds a function `group`. From the two lists this script writes the modules, the catalogue of records and the
-//! function that turns the names of a system and a method into a kernel.
+//! `systems/` holds a function `group`; a large system may be a folder with a `mod.rs`. From the two lists this script writes the
+//! modules, the catalogue of records and the function that turns the names of a system and a method into a kernel.
 
 use std::{env, fs, io, path::Path};
 
@@ -11,7 +11,7 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        if path.extension().is_some_and(|e| e == "rs")
+        if (path.extension().is_some_and(|e| e == "rs") || path.join("mod.rs").is_file())
             && let Some(stem) = path.file_stem().and_then(|s| s.to_str())
         {
             names.push(stem.to_owned());
@@ -28,7 +28,10 @@ fn camel(name: &str) -> String {
 }
 
 fn modules(root: &Path, folder: &str, names: &[String]) -> String {
-    let module = |n: &String| format!("#[path = {:?}]\npub mod {n};\n", root.join(folder).join(format!("{n}.rs")));
+    let file = |n: &String| {
+        [format!("{n}.rs"), format!("{n}/mod.rs")].map(|f| root.join(folder).join(f)).into_iter().find(|f| f.is_file())
+    };
+    let module = |n: &String| format!("#[path = {:?}]\npub mod {n};\n", file(n).unwrap_or_default());
     names.iter().map(module).collect()
 }
 

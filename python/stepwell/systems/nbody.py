@@ -134,7 +134,7 @@ class NBody(System):
         return reference.NBody(h, self.force, masses, strength, softening, **keeps)
 
     def parameters(self, batch: Shape) -> Parameters:
-        """Options, sizes and rows for the core, as ``nbody.rs`` documents them."""
+        """Options, sizes and rows for the core, as ``nbody/mod.rs`` documents them."""
         masses, strength, softening = self._parts(batch)
         given = [rows(strength, batch), rows(masses, batch), rows(softening[np.newaxis], batch)]
         options = [self.force]

@@ -1,0 +1,135 @@
+//! The energy of bodies, and what keeps it: a push on the velocities, or a way back to it after a step.
+
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+use super::SIDE;
+use crate::{
+    control::{EnergyControl, Projection, Way},
+    isa::Task,
+};
+
+/// Σ over the bodies, body i in part i mod `SIDE`, then part after part.
+#[inline(always)]
+fn total<const L: usize>(n: usize, value: impl Fn(usize, usize) -> f64) -> [f64; L] {
+    let mut parts = [[0.0; L]; SIDE];
+    let used = n.min(SIDE);
+    for i in 0..n {
+        for l in 0..L {
+            let value = value(i, l);
+            parts[i % SIDE][l] = if i < SIDE { value } else { parts[i % SIDE][l] + value };
+        }
+    }
+    let mut whole = parts[0];
+    for part in &parts[1..used] {
+        for l in 0..L {
+            whole[l] += part[l];
+        }
+    }
+    whole
+}
+
+/// |v|² of a body in a lane.
+#[inline(always)]
+fn square<const L: usize>(v: &[[f64; L]], dim: usize, i: usize, l: usize) -> f64 {
+    let mut square = v[dim * i][l] * v[dim * i][l];
+    for v in &v[dim * i + 1..dim * (i + 1)] {
+        square += v[l] * v[l];
+    }
+    square
+}
+
+/// h times the kinetic and h times the whole energy.
+#[inline(always)]
+fn energies<const L: usize>(
+    n: usize,
+    dim: usize,
+    mass: &[[f64; L]],
+    half: &[[f64; L]],
+    potential: &[[f64; L]],
+    v: &[[f64; L]],
+) -> ([f64; L], [f64; L]) {
+    let kinetic = total(n, |i, l| half[i][l] * square(v, dim, i, l));
+    let potential = total::<L>(n, |i, l| mass[i][l] * potential[i][l]);
+    let mut energy = kinetic;
+    for l in 0..L {
+        energy[l] += potential[l];
+    }
+    (kinetic, energy)
+}
+
+/// Sets a state back onto its energy.
+pub(super) struct Back<'a, const L: usize> {
+    pub(super) n: usize,
+    pub(super) dim: usize,
+    pub(super) h: f64,
+    pub(super) projection: &'a Projection<L>,
+    pub(super) mass: &'a [[f64; L]],
+    pub(super) half: &'a [[f64; L]],
+    pub(super) potential: &'a [[f64; L]],
+    pub(super) dv: &'a [[f64; L]],
+    pub(super) v: &'a mut [[f64; L]],
+    pub(super) y: &'a mut [[f64; L]],
+}
+
+impl<const L: usize> Task for Back<'_, L> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { n, dim, h, projection, mass, half, potential, dv, v, y } = self;
+        let (kinetic, energy) = energies(n, dim, mass, half, potential, v);
+        let off = projection.off(&energy);
+        if projection.way == Way::Scaling {
+            let factor = projection.factor(&kinetic, &off);
+            for row in v {
+                for l in 0..L {
+                    row[l] *= factor[l];
+                }
+            }
+            return;
+        }
+        // The gradient: m·v in the velocities, −m·a in the coordinates.
+        let along = |row: &[[f64; L]], over: f64, r: usize, l: usize| mass[r / dim][l] * (row[r][l] / over);
+        let length = |row: &[[f64; L]], over: f64, i: usize, l: usize| {
+            let mut square = along(row, over, dim * i, l) * along(row, over, dim * i, l);
+            for r in dim * i + 1..dim * (i + 1) {
+                square += along(row, over, r, l) * along(row, over, r, l);
+            }
+            square
+        };
+        let norm = total::<L>(n, |i, l| length(v, 1.0, i, l) + length(dv, h, i, l));
+        let mut step = [0.0; L];
+        for l in 0..L {
+            step[l] = (off[l] / h) / norm[l];
+        }
+        for r in 0..n * dim {
+            for l in 0..L {
+                y[r][l] += step[l] * along(dv, h, r, l);
+                v[r][l] -= step[l] * along(v, 1.0, r, l);
+            }
+        }
+    }
+}
+
+/// Adds −g·v to an increment, of the energy that was found beside the force.
+pub(super) struct Push<'a, const L: usize> {
+    pub(super) n: usize,
+    pub(super) dim: usize,
+    pub(super) control: &'a EnergyControl<L>,
+    pub(super) mass: &'a [[f64; L]],
+    pub(super) half: &'a [[f64; L]],
+    pub(super) potential: &'a [[f64; L]],
+    pub(super) v: &'a [[f64; L]],
+    pub(super) out: &'a mut [[f64; L]],
+}
+
+impl<const L: usize> Task for Push<'_, L> {
+    #[inline(always)]
+    fn run(self) {
+        let (kinetic, energy) = energies(self.n, self.dim, self.mass, self.half, self.potential, self.v);
+        let g = self.control.push(&kinetic, &energy);
+        for (out, v) in self.out.iter_mut().zip(self.v) {
+            for l in 0..L {
+                out[l] -= g[l] * v[l];
+            }
+        }
+    }
+}

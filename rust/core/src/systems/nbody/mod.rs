@@ -1,0 +1,333 @@
+//! Bodies that attract each other (Appendix C, D): v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), each pair computed once.
+//!
+//! | force | f | potential of a pair |
+//! |---|---|---|
+//! | `logarithmic` | 1/r² | G·m·m·ln r |
+//! | `newton` | 1/r³ | −G·m·m/r |
+//! | `printed` | 1/r² | −G·m·m/r, which belongs to the other force |
+//!
+//! Body i meets body i + k for k = 1 … n/2, counted round the circle, so every pair comes once and a run of bodies meets a run of
+//! partners. What a body gets from partners after it and before it is summed apart, the latter over two rounds, so that no index
+//! wraps. The order of these sums is the reference's (`partners`), whatever the kernel: three bodies in a lane tile, several systems
+//! side by side, or one large system with eight bodies at a time.
+//!
+//! Sizes: bodies, dimensions (2 or 3). Options: the force; then `control:printed`, `control:limited`, `project:scaling` or
+//! `project:nacozy`. Parameters: G·m of each body, m of each body, ε; then the target energy, and the gain of a control.
+
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+mod along;
+mod beside;
+mod energy;
+mod law;
+mod three;
+
+use self::{
+    along::Along,
+    beside::SideBySide,
+    energy::{Back, Push},
+    law::{LOGARITHMIC, NEWTON, PRINTED},
+    three::Three,
+};
+use crate::{
+    control::{EnergyControl, Projection, Way},
+    error::Error,
+    group::{Clock, Group, Spec, Width},
+    isa::{Level, with_isa},
+    rows::{self, Large, Rows, lanes, lanes_mut, zeros},
+    stepper::{Needs, Stepper},
+    system::System,
+    tile,
+};
+
+/// Bodies that are taken side by side in a large system, and parts in which sums over bodies are kept.
+const SIDE: usize = 8;
+/// The distances k, in the order in which they are summed; two of them `SIDE` apart are taken together while both are there.
+fn partners(n: usize) -> Vec<(usize, Option<usize>)> {
+    let (mut groups, mut k) = (Vec::new(), 1);
+    while n / 2 + 1 >= 2 * SIDE + k {
+        groups.extend((k..k + SIDE).map(|k| (k, Some(k + SIDE))));
+        k += 2 * SIDE;
+    }
+    groups.extend((k..n / 2 + 1).map(|k| (k, None)));
+    groups
+}
+
+/// How many bodies meet a partner at this distance: all, but opposite ones meet once.
+fn meeting(n: usize, k: usize) -> usize {
+    if 2 * k == n { k } else { n }
+}
+
+/// Which kernel meets the bodies: chosen once, called for each force.
+#[derive(Clone, Copy)]
+struct Kind {
+    law: u8,
+    dim: usize,
+    level: Level,
+}
+
+/// Runs a kernel at the CPU level at hand. It is compiled once for each law and dimension, not once in every method.
+macro_rules! at {
+    ($kind:expr, $task:ident, $dim:literal, $law:expr, $energy:literal, $fields:tt) => {
+        with_isa!($kind.level, |isa| isa.run(at!(@ $task, $dim, $law, $energy, $fields)))
+    };
+    (@ $task:ident, $dim:literal, $law:expr, $energy:literal, { $($field:tt)* }) => {
+        $task::<$dim, { $law }, $energy, _> { $($field)* }
+    };
+}
+
+/// Runs a kernel for the law and the dimensions at hand.
+macro_rules! meet {
+    ($kind:expr, $energy:expr, $task:ident $fields:tt) => {
+        match ($kind.dim, $kind.law, $energy) {
+            (2, NEWTON, false) => at!($kind, $task, 2, NEWTON, false, $fields),
+            (2, _, false) => at!($kind, $task, 2, LOGARITHMIC, false, $fields),
+            (_, NEWTON, false) => at!($kind, $task, 3, NEWTON, false, $fields),
+            (_, _, false) => at!($kind, $task, 3, LOGARITHMIC, false, $fields),
+            (2, LOGARITHMIC, true) => at!($kind, $task, 2, LOGARITHMIC, true, $fields),
+            (2, NEWTON, true) => at!($kind, $task, 2, NEWTON, true, $fields),
+            (2, _, true) => at!($kind, $task, 2, PRINTED, true, $fields),
+            (_, LOGARITHMIC, true) => at!($kind, $task, 3, LOGARITHMIC, true, $fields),
+            (_, NEWTON, true) => at!($kind, $task, 3, NEWTON, true, $fields),
+            (_, _, true) => at!($kind, $task, 3, PRINTED, true, $fields),
+        }
+    };
+}
+/// Bodies of `L` members, scaled to the step.
+pub struct Bodies<const L: usize> {
+    n: usize,
+    kind: Kind,
+    h: f64,
+    groups: Vec<(usize, Option<usize>)>,
+    /// h·G·m, m and ½·h·m of each body.
+    strength: Vec<[f64; L]>,
+    mass: Vec<[f64; L]>,
+    half: Vec<[f64; L]>,
+    soft: [f64; L],
+    after: Vec<[f64; L]>,
+    before: Vec<[f64; L]>,
+    potential: Vec<[f64; L]>,
+    /// For one system: places, h·G·m of partners, and h·G·m of bodies, along the bodies, for two rounds and more.
+    places: Vec<Vec<f64>>,
+    partners: Vec<f64>,
+    bodies: Vec<f64>,
+    control: Option<EnergyControl<L>>,
+    projection: Option<Projection<L>>,
+    /// h·v̇ of the state that is projected.
+    dv: Rows<L>,
+}
+impl<const L: usize> Bodies<L> {
+    fn push(&self, v: &Rows<L>, out: &mut Rows<L>) {
+        let Some(control) = &self.control else { return };
+        let task = Push {
+            n: self.n,
+            dim: self.kind.dim,
+            control,
+            mass: &self.mass,
+            half: &self.half,
+            potential: &self.potential,
+            v: lanes(v),
+            out: lanes_mut(out),
+        };
+        with_isa!(self.kind.level, |isa| isa.run(task));
+    }
+
+    fn back(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
+        let Some(projection) = &self.projection else { return };
+        let task = Back {
+            n: self.n,
+            dim: self.kind.dim,
+            h: self.h,
+            projection,
+            mass: &self.mass,
+            half: &self.half,
+            potential: &self.potential,
+            dv: lanes(&self.dv),
+            v: lanes_mut(v),
+            y: lanes_mut(y),
+        };
+        with_isa!(self.kind.level, |isa| isa.run(task));
+    }
+}
+/// h·ẏ, its inverse, and the projection, the same for any number of lanes.
+macro_rules! straight {
+    () => {
+        #[inline(always)]
+        fn dy(&mut self, _t: f64, v: &Self::V, _y: &Self::Y, out: &mut Self::Y) {
+            for (out, v) in out.as_mut_slice().iter_mut().zip(v.as_slice()) {
+                *out = self.h * *v;
+            }
+        }
+
+        #[inline(always)]
+        fn velocity(&mut self, d: &Self::Y, out: &mut Self::V) {
+            for (out, d) in out.as_mut_slice().iter_mut().zip(d.as_slice()) {
+                *out = *d / self.h;
+            }
+        }
+
+        #[inline(always)]
+        fn settle(&mut self, v: &mut Self::V, y: &mut Self::Y) {
+            if self.projection.is_some() {
+                let mut dv = std::mem::replace(&mut self.dv, zeros(0));
+                self.meet(true, y, &mut dv);
+                self.dv = dv;
+                self.back(v, y);
+            }
+        }
+    };
+}
+
+impl System for Bodies<{ rows::LANES }> {
+    type V = Rows<{ rows::LANES }>;
+    type Y = Rows<{ rows::LANES }>;
+
+    #[inline(always)]
+    fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
+        self.meet(self.control.is_some(), y, out);
+        self.push(v, out);
+    }
+
+    straight!();
+}
+
+impl Bodies<{ rows::LANES }> {
+    // Never inlined: the kernels stand once in the core, not once in every stage of every method.
+    #[inline(never)]
+    fn meet(&mut self, energy: bool, y: &Rows<{ rows::LANES }>, out: &mut Rows<{ rows::LANES }>) {
+        meet!(self.kind, energy, SideBySide {
+            n: self.n,
+            groups: &self.groups,
+            y: lanes(y),
+            strength: &self.strength,
+            soft: &self.soft,
+            after: &mut self.after,
+            before: &mut self.before,
+            potential: &mut self.potential,
+            out: lanes_mut(out),
+        });
+    }
+}
+
+impl System for Bodies<1> {
+    type V = Rows<1>;
+    type Y = Rows<1>;
+
+    #[inline(always)]
+    fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
+        self.meet(self.control.is_some(), y, out);
+        self.push(v, out);
+    }
+
+    straight!();
+}
+
+impl Bodies<1> {
+    // Never inlined: the kernels stand once in the core, not once in every stage of every method.
+    #[inline(never)]
+    fn meet(&mut self, energy: bool, y: &Rows<1>, out: &mut Rows<1>) {
+        meet!(self.kind, energy, Along {
+            n: self.n,
+            groups: &self.groups,
+            y: y.as_slice(),
+            places: &mut self.places,
+            partners: &self.partners,
+            bodies: &self.bodies,
+            soft: self.soft[0],
+            after: self.after.as_flattened_mut(),
+            before: self.before.as_flattened_mut(),
+            potential: self.potential.as_flattened_mut(),
+            out: out.as_mut_slice(),
+        });
+    }
+}
+
+impl<const L: usize> Bodies<L> {
+    fn new(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+        let (n, dim, h) = (spec.size(0), spec.size(1), clock.h);
+        let law = match spec.options.first() {
+            Some(&"newton") => NEWTON,
+            Some(&"printed") => PRINTED,
+            _ => LOGARITHMIC,
+        };
+        let row = |at: usize, scale: &dyn Fn(f64) -> f64| -> [f64; L] { std::array::from_fn(|l| scale(spec.at(at, member(l)))) };
+        let strength: Vec<[f64; L]> = (0..n).map(|i| row(i, &|m| h * m)).collect();
+        // One system: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
+        let (rounds, chunks) = if L == 1 { (2 * n + 4 * SIDE, n.next_multiple_of(SIDE)) } else { (2 * n, n) };
+        let along = |i: usize| strength.get(i).map_or(0.0, |row| row[0]);
+        let keeps = spec.options.get(1).copied().unwrap_or_default();
+        let control = keeps.starts_with("control:").then(|| EnergyControl::new(spec, keeps == "control:limited", 2 * n + 1, h, &member));
+        let way = if keeps == "project:nacozy" { Way::Nacozy } else { Way::Scaling };
+        let projection = keeps.starts_with("project:").then(|| Projection::new(spec, way, 2 * n + 1, h, &member));
+        Bodies {
+            n,
+            kind: Kind { law, dim, level: clock.level },
+            h,
+            groups: partners(n),
+            mass: (0..n).map(|i| row(n + i, &|m| m)).collect(),
+            half: (0..n).map(|i| row(n + i, &|m| (0.5 * h) * m)).collect(),
+            soft: row(2 * n, &|e| e * e),
+            after: vec![[0.0; L]; dim * chunks],
+            before: vec![[0.0; L]; dim * rounds],
+            potential: vec![[0.0; L]; chunks],
+            places: vec![vec![0.0; rounds]; dim],
+            partners: (0..rounds).map(|i| along(i % n)).collect(),
+            bodies: (0..chunks).map(along).collect(),
+            dv: zeros(if projection.is_some() { n * dim } else { 0 }),
+            control,
+            projection,
+            strength,
+        }
+    }
+}
+
+impl Large<{ rows::LANES }> for Bodies<{ rows::LANES }> {
+    fn shape(spec: &Spec) -> (usize, usize) {
+        (spec.size(0) * spec.size(1), spec.size(0) * spec.size(1))
+    }
+
+    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+        Bodies::new(spec, clock, member)
+    }
+}
+
+impl Large<1> for Bodies<1> {
+    fn shape(spec: &Spec) -> (usize, usize) {
+        (spec.size(0) * spec.size(1), spec.size(0) * spec.size(1))
+    }
+
+    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+        Bodies::new(spec, clock, member)
+    }
+}
+
+/// A group of N-body systems.
+pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+    let (&[n, dim @ (2 | 3)], [law, control @ ..]) = (spec.sizes.as_slice(), spec.options.as_slice()) else {
+        return Err(spec.unknown_options());
+    };
+    let more = match control {
+        [] => Some(0),
+        ["control:printed" | "control:limited"] => Some(2),
+        ["project:scaling" | "project:nacozy"] => Some(1),
+        _ => None,
+    };
+    let known = ["logarithmic", "newton", "printed"].contains(law) && more.is_some();
+    let expected = 2 * n + 1 + more.unwrap_or(0);
+    if !known || n == 0 {
+        return Err(spec.unknown_options());
+    }
+    if spec.rows.len() != expected {
+        return Err(Error::Shape { what: "parameters", expected, got: spec.rows.len() });
+    }
+    if St::RECORD.needs == Needs::Acceleration && !control.is_empty() {
+        return Err(Error::VelocityDependent { method: St::RECORD.name, system: "nbody", term: "energy control" });
+    }
+    // Lanes: what was fastest when tried.
+    Ok(match (n, dim, *law, control.len()) {
+        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1>(Three::<2, NEWTON>, clock, width),
+        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1>(Three::<2, LOGARITHMIC>, clock, width),
+        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 8, 8, 1>(Three::<3, NEWTON>, clock, width),
+        _ => rows::group::<Bodies<{ rows::LANES }>, Bodies<1>, St>(spec, clock, width),
+    })
+}
