@@ -396,6 +396,8 @@ def test_the_core_refuses_too() -> None:
             "y": np.zeros((1, 1)),
             "saved_v": np.zeros((1, 1, 4)),
             "saved_y": np.zeros((1, 1, 4)),
+            "recorded": np.zeros(0),
+            "tally": np.zeros(0),
             "carry": np.zeros(0),
         }
         clock = {
@@ -433,6 +435,8 @@ def test_the_core_refuses_too() -> None:
         ({"v": np.zeros((1, 3))}, "a row of v: expected 4, got 3"),
         ({"carry": np.zeros(3)}, "carry: expected 4, got 3"),
         ({"saved_y": np.zeros((3, 1, 4))}, "saved_y: expected 4, got 12"),
+        ({"recorded": np.zeros((1, 1, 4))}, "recorded: expected 0, got 4"),
+        ({"tally": np.zeros(3)}, "tally: expected 4, got 3"),
         ({"row": np.ones((1, 3))}, "a parameter: expected 4, got 3"),
     ):
         with pytest.raises(ValueError, match=re.escape(text)):

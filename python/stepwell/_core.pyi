@@ -20,6 +20,7 @@ class ModelSpec:
         tables: list[tuple[float, float, NDArray[np.float64]]],
         method: str,
         matrix: tuple[list[float], int] | None = None,
+        record: list[str] = ...,
     ) -> ModelSpec: ...
 
 @final
@@ -62,6 +63,8 @@ def run(
     y: NDArray[np.float64],
     saved_v: NDArray[np.float64],
     saved_y: NDArray[np.float64],
+    recorded: NDArray[np.float64],
+    tally: NDArray[np.float64],
     carry: NDArray[np.float64],
     first_bad: NDArray[np.int64],
     progress: Callable[[float], object] | None,

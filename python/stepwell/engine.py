@@ -14,6 +14,7 @@ import numpy as np
 
 from . import _core
 from ._checks import Array, Shape
+from .control import EnergyControl
 from .methods import Method
 from .reference import run as reference
 from .reference.types import Blocks, Whole
@@ -40,6 +41,12 @@ class Plan(NamedTuple):
     backend: str = "rust"
     form: str = "direct"
     progress: Callable[[float], object] | None = None
+    record: tuple[str, ...] = ()
+
+    @property
+    def controlled(self) -> bool:
+        """Whether the system adds up what a control does."""
+        return getattr(self.system, "control", None) is not None
 
     @property
     def saves(self) -> list[int]:
@@ -53,12 +60,14 @@ class Plan(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Kept states, last slots, and the first step of each member that was not finite."""
+    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did."""
 
     v: Array
     y: Array
     slot: Array
     first_bad: Whole
+    recorded: dict[str, Array] | None = None
+    work: Array | None = None
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
@@ -86,7 +95,20 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
 
     slot = v if carried else _start(plan, v, y)
     slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes)
-    return _finished(plan, slot, kept, first_bad)
+    out = _finished(plan, slot, kept, first_bad)
+    with np.errstate(all="ignore"):
+        states = list(zip(out.v, out.y, strict=True)) if plan.record else []
+        recorded = {name: np.stack([s.record(name, *state) for state in states]) for name in plan.record}  # type: ignore[attr-defined]
+    work = np.broadcast_to(np.asarray(s.work), plan.batch).copy() if plan.controlled else None  # type: ignore[attr-defined]
+    return out._replace(recorded=recorded, work=_per_step(plan, work))
+
+
+def _per_step(plan: Plan, work: Array | None) -> Array | None:
+    """What a control did, in units of energy, from h times the sum over all evaluations."""
+    if work is None:
+        return None
+    evaluations = plan.method.evaluations if isinstance(getattr(plan.system, "control", None), EnergyControl) else 1
+    return np.asarray(work / (evaluations * plan.dt))
 
 
 def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, block_axes: tuple[int, int]) -> Looped:
@@ -126,13 +148,19 @@ def _finished(plan: Plan, slot: Array, kept: list[Blocks], first_bad: Any) -> Ou
 
 
 def _model(plan: Plan) -> _core.ModelSpec:
-    return model(plan.system.kernel, plan.system.parameters(plan.batch), plan.method)
+    return model(plan.system.kernel, plan.system.parameters(plan.batch), plan.method, record=plan.record)
 
 
-def model(kernel: str, p: Parameters, method: Method, matrix: tuple[list[float], int] | None = None) -> _core.ModelSpec:
+def model(
+    kernel: str,
+    p: Parameters,
+    method: Method,
+    matrix: tuple[list[float], int] | None = None,
+    record: Iterable[str] = (),
+) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     tables = [(start, interval, values) for values, interval, start in p.tables]
-    return _core.ModelSpec(kernel, p.options, p.sizes, p.rows, tables, method.name, matrix)
+    return _core.ModelSpec(kernel, p.options, p.sizes, p.rows, tables, method.name, matrix, list(record))
 
 
 def _rust(
@@ -142,6 +170,9 @@ def _rust(
     kept = 1 if plan.every is None else len(plan.saves)
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
     carry = np.empty(v.shape if carries else 0)
+    shapes = {name: plan.system.quantities[name] for name in plan.record}
+    recorded = np.empty((kept, sum(prod(shape) for shape in shapes.values()), *plan.batch))
+    work = np.empty(plan.batch) if plan.controlled else None
     _core.run(
         model,
         t0=plan.t0,
@@ -156,11 +187,17 @@ def _rust(
         y=_flat(plan, y),
         saved_v=saved_v,
         saved_y=saved_y,
+        recorded=recorded,
+        tally=np.empty(0) if work is None else work.reshape(-1),
         carry=carry,
         first_bad=before.reshape(-1),
         progress=plan.progress,
     )
-    return Outcome(saved_v, saved_y, carry if carries else saved_v[-1], before)
+    by_name: dict[str, Array] = {}
+    for name, shape in shapes.items():
+        mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
+        by_name[name] = mine.reshape(kept, *shape, *plan.batch)
+    return Outcome(saved_v, saved_y, carry if carries else saved_v[-1], before, by_name, _per_step(plan, work))
 
 
 def _flat(plan: Plan, array: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from math import prod
@@ -37,6 +38,7 @@ def integrate(
     dt: float,
     steps: int,
     every: int | None = None,
+    record: Sequence[str] = (),
     t0: float = 0.0,
     start_step: int = 0,
     start: str | None = None,
@@ -62,6 +64,8 @@ def integrate(
         dt: the step, in units of time, above zero.
         steps: how many steps, one or more.
         every: keep the state every so many steps, with the first and the last; None keeps the last alone.
+        record: quantities to record of every kept state, ``run.recorded``: "energy", and for ``NBody`` also "momentum",
+            "angular_momentum" and "closest". Bodies find them beside the force of the next step, at little cost.
         t0: time of step 0. Step k is at t0 + k·dt, computed so and never accumulated.
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how a method with a choice starts; see ``method(…).starts``.
@@ -104,6 +108,7 @@ def integrate(
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
     system.check_time(max(abs(t0 + k * dt) for k in (start_step, start_step + steps)))
     every = None if every is None else _checks.count("every", every, 1)
+    record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     choice = how.start_choice(start)
     if carry is not None and how.carry is None:
@@ -129,6 +134,7 @@ def integrate(
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
         plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told)
+        plan = plan._replace(record=tuple(name for name in record if name in system.quantities))
         out = engine.advance(plan, v, y, before, carried=carry is not None)
     if isinstance(system, NBody) and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
@@ -147,7 +153,11 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         collision=partial(_collision, plan, v, y, carry is not None) if isinstance(system, NBody) else None,
+        recorded=out.recorded,
+        work=out.work,
     )
+    if "energy" in record and "energy" not in run.recorded:
+        run.recorded["energy"] = run.energy
     _warn(run, before)
     return run
 
@@ -158,7 +168,7 @@ def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tupl
     assert isinstance(system, NBody)
     alone, y = system.member(index, plan.batch), _checks.member(y, index)
     if steps > 0:
-        again = plan._replace(system=alone, batch=(), steps=steps, every=None, form="direct", progress=None)
+        again = plan._replace(system=alone, batch=(), steps=steps, every=None, form="direct", progress=None, record=())
         y = engine.advance(again, _checks.member(v, index), y, carried=carried).y[-1]
     bodies, distance = alone.closest(y)
     return Collision(index, step, bodies, distance)
@@ -175,6 +185,17 @@ def fits_together(system: System, method: Method) -> None:
             f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
             f"use false_euler, or leave {system.velocity_term} out"
         )
+
+
+def _quantities(system: System, record: Sequence[str]) -> list[str]:
+    """What to record, each once; raise if the system does not have it."""
+    given = [record] if isinstance(record, str) else list(record)
+    known = list(dict.fromkeys(["energy", *system.quantities]))
+    for name in given:
+        _checks.known("record", name, known)
+    if "energy" in given and "energy" not in system.quantities:
+        system.energy(np.zeros(system.v_shape), np.zeros(system.y_shape))  # raises if there is none, before any work
+    return list(dict.fromkeys(given))
 
 
 def _goes_on_by_a_rule(system: System) -> None:

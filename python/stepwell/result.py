@@ -55,6 +55,9 @@ class Run:
         start_step: number of the first step.
         steps: how many steps were made.
         start: how the method was started, or None.
+        recorded: what was asked for by ``record=``, by name, shapes (saved, *shape of it, *batch).
+        work: the energy that a control or a projection gave to each member in this run, or None, shape (*batch). Of a control it
+            is the sum over the steps of ((1 − g)² − 1)·K, what its push −g·v alone would change, averaged over the evaluations.
     """
 
     def __init__(
@@ -74,6 +77,8 @@ class Run:
         steps: int,
         start: str | None,
         collision: Callable[[tuple[int, ...], int], Collision] | None = None,
+        recorded: dict[str, Array] | None = None,
+        work: Array | None = None,
     ) -> None:
         self.t = t
         self.v = v
@@ -90,13 +95,17 @@ class Run:
         self.start = start
         #: Who was nearest to whom when the member of that index diverged at that step; see ``collisions``.
         self.collision = collision
+        self.recorded = recorded or {}
+        self.work = work
 
     @property
     def energy(self) -> Array:
-        """Energy of every kept state, shape (saved, *batch), computed now; see the system's ``energy``."""
+        """Energy of every kept state, shape (saved, *batch): what was recorded, or computed now by the system's ``energy``."""
+        if "energy" in self.recorded:
+            return self.recorded["energy"]
         v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
         with np.errstate(all="ignore"):
-            return self.system.energy(v, y)
+            return self.system.recordable("energy", v, y, self.dt)
 
     @property
     def z(self) -> Array:

@@ -185,6 +185,7 @@ impl Kernel {
             sizes: sizes.clone(),
             rows: parameters.chunks(1).map(Row).collect(),
             tables: vec![table; *tables],
+            record: Vec::new(),
         };
         let model = match self.method {
             "" => Model::Matrix { spec, nodes, v_rows: v.len() },

@@ -109,6 +109,7 @@ class RunPicture(Drawn):
             "kept": len(self.run.t),
             "diverged_at_step": int(self.run.first_bad_step) if self.run.status else None,
             "largest_state_error": _largest(self.state_error),
+            **({} if self.run.work is None else {"work_of_the_control": float(self.run.work)}),
             "largest_energy_error": _largest(self.energy_error),
         }
 

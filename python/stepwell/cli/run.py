@@ -63,7 +63,7 @@ def command(args: argparse.Namespace) -> None:
     with warnings.catch_warnings(record=True) as told:
         for kind in (DivergenceWarning, ControlWarning):
             warnings.simplefilter("always", kind)
-        run = chosen.run(args.method, dt, steps=steps, every=every, **control)
+        run = chosen.run(args.method, dt, steps=steps, every=every, record=list(chosen.system.quantities)[:1], **control)
     for warning in told:
         print(f"stepwell: warning: {warning.message}", file=sys.stderr)
 

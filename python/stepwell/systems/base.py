@@ -62,6 +62,11 @@ class System(ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
 
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """What the core can record beside the states, with the shape of each."""
+        return {}
+
     @abstractmethod
     def scaled(self, h: float, batch: Shape) -> Scaled:
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape."""
@@ -77,6 +82,10 @@ class System(ABC):
             UnsupportedError: if the system has none of its own.
         """
         raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
+
+    def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
+        """A quantity of states of a run with that step, the same to the bit as if it had been recorded."""
+        return self.energy(v, y)
 
     def auxiliary(self, t: float, v: Array, y: Array) -> Array:
         """The auxiliary outputs z (§3) of states at time t, shape (outputs, *batch).

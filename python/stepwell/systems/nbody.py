@@ -143,6 +143,16 @@ class NBody(System):
             given += [rows(np.asarray(each)[np.newaxis], batch) for each in self.control.rows()]
         return Parameters(options, list(self.y_shape), given)
 
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """What can be recorded: energy, momentum, angular momentum (about the origin), and the least distance of two bodies."""
+        dim = self.dim or 2
+        return {"energy": (), "momentum": (dim,), "angular_momentum": () if dim == 2 else (3,), "closest": ()}
+
+    def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
+        """A quantity of states of a run with that step, the same to the bit as if it had been recorded."""
+        return self._left_alone().scaled(dt, np.broadcast_shapes(v.shape[2:], y.shape[2:])).record(name, v, y)
+
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² and the potential of every pair; see the table above."""
         return self._energies(v, y)[1]

@@ -52,6 +52,10 @@ pub struct Arrays<'a> {
     pub saved_v: &'a mut [f64],
     /// What is kept of y.
     pub saved_y: &'a mut [f64],
+    /// What is recorded beside each kept state.
+    pub recorded: &'a mut [f64],
+    /// What the systems added up, one number per member; empty if nobody asks.
+    pub tally: &'a mut [f64],
     /// The v slot at the end; empty if nobody asks.
     pub carry: &'a mut [f64],
     /// Per member, the number of the first step that is not finite, or −1; members that have one are not looked at.
@@ -80,6 +84,8 @@ struct Part<'a> {
     first: usize,
     saved_v: Vec<&'a mut [f64]>,
     saved_y: Vec<&'a mut [f64]>,
+    recorded: Vec<&'a mut [f64]>,
+    tally: Vec<&'a mut [f64]>,
     carry: Vec<&'a mut [f64]>,
     first_bad: &'a mut [i64],
 }
@@ -113,6 +119,10 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("y", q, plan.y.len())?;
     expect("saved_v", kept * p * b, arrays.saved_v.len())?;
     expect("saved_y", kept * q * b, arrays.saved_y.len())?;
+    expect("recorded", kept * wide.recorded() * b, arrays.recorded.len())?;
+    if !arrays.tally.is_empty() {
+        expect("tally", b, arrays.tally.len())?;
+    }
     if !arrays.carry.is_empty() {
         expect("carry", p * b, arrays.carry.len())?;
     }
@@ -144,15 +154,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
 
     let mut first = 0;
     let mut parts = Vec::with_capacity(shares.len());
-    let pieces = cut(arrays.saved_v, b, &shares)
-        .into_iter()
-        .zip(cut(arrays.saved_y, b, &shares))
-        .zip(cut(arrays.carry, b, &shares))
-        .zip(cut(arrays.first_bad, b, &shares));
-    for (((saved_v, saved_y), carry), mut first_bad) in pieces {
-        if let Some(first_bad) = first_bad.pop() {
+    let numbers = [arrays.saved_v, arrays.saved_y, arrays.recorded, arrays.tally, arrays.carry].map(|a| cut(a, b, &shares));
+    let [mut saved_v, mut saved_y, mut recorded, mut tally, mut carry] = numbers.map(Vec::into_iter);
+    let next = |of: &mut std::vec::IntoIter<_>| of.next().unwrap_or_default();
+    for first_bad in cut(arrays.first_bad, b, &shares) {
+        let (saved_v, saved_y) = (next(&mut saved_v), next(&mut saved_y));
+        let (recorded, tally, carry) = (next(&mut recorded), next(&mut tally), next(&mut carry));
+        if let Some(first_bad) = first_bad.into_iter().next() {
             let count = first_bad.len();
-            parts.push(Part { first, saved_v, saved_y, carry, first_bad });
+            parts.push(Part { first, saved_v, saved_y, recorded, tally, carry, first_bad });
             first += count;
         }
     }
@@ -220,12 +230,20 @@ impl Drop for Leave<'_> {
     }
 }
 
+/// Both slots and the tally when everybody was last looked at.
+#[derive(Default)]
+struct Good {
+    v: Vec<f64>,
+    y: Vec<f64>,
+    tally: Vec<f64>,
+}
+
 /// One thread's groups, and where it stands.
 struct Worker<'a> {
     plan: &'a Plan<'a>,
     wide: Box<dyn Group>,
     narrow: Box<dyn Group>,
-    good: (Vec<f64>, Vec<f64>),
+    good: Good,
 }
 
 impl<'a> Worker<'a> {
@@ -263,7 +281,7 @@ struct Job<'a, 'b> {
     part: &'a mut Part<'b>,
     from: usize,
     count: usize,
-    good: &'a mut (Vec<f64>, Vec<f64>),
+    good: &'a mut Good,
 }
 
 /// Copies the rows of a group into row slices.
@@ -314,6 +332,7 @@ impl Job<'_, '_> {
             }
         }
         put(&mut self.part.carry, self.from, self.count, self.group.slots().0, lanes);
+        put(&mut self.part.tally, self.from, self.count, self.group.tally(), lanes);
         true
     }
 
@@ -327,6 +346,12 @@ impl Job<'_, '_> {
         let (v, y) = self.group.slots();
         put(&mut self.part.saved_v[i * p..(i + 1) * p], self.from, self.count, v, lanes);
         put(&mut self.part.saved_y[i * q..(i + 1) * q], self.from, self.count, y, lanes);
+        let recorded = self.group.recorded();
+        if recorded > 0 {
+            let mut rows = vec![0.0; recorded * lanes];
+            self.group.record(&mut rows);
+            put(&mut self.part.recorded[i * recorded..(i + 1) * recorded], self.from, self.count, &rows, lanes);
+        }
         if let Some(carried) = carried {
             self.group.slots_mut().0.copy_from_slice(&carried);
         }
@@ -335,10 +360,10 @@ impl Job<'_, '_> {
     /// Keeps the present state to come back to.
     fn remember(&mut self) {
         let (v, y) = self.group.slots();
-        self.good.0.clear();
-        self.good.0.extend_from_slice(v);
-        self.good.1.clear();
-        self.good.1.extend_from_slice(y);
+        for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
+            good.clear();
+            good.extend_from_slice(now);
+        }
     }
 
     /// Whether a member that was finite so far no longer is; infinities and NaN stay, so looking now and then is enough.
@@ -362,8 +387,9 @@ impl Job<'_, '_> {
     fn look(&mut self, looked: i64, k: i64) {
         if self.newly_bad() {
             let (v, y) = self.group.slots_mut();
-            v.copy_from_slice(&self.good.0);
-            y.copy_from_slice(&self.good.1);
+            v.copy_from_slice(&self.good.v);
+            y.copy_from_slice(&self.good.y);
+            self.group.tally_mut().copy_from_slice(&self.good.tally);
             for at in looked..k {
                 self.group.advance(at, 1);
                 for l in 0..self.count {

@@ -51,6 +51,8 @@ pub struct Spec<'a> {
     pub rows: Vec<Row<'a>>,
     /// Its sampled inputs, in the order in which the options name them.
     pub tables: Vec<Table<'a>>,
+    /// Quantities to record beside the states; each system documents its own.
+    pub record: Vec<&'a str>,
 }
 
 impl Spec<'_> {
@@ -138,4 +140,22 @@ pub trait Group: Send + Sync {
 
     /// Turns what the method carries into velocities, at step `k`: the inverse of `start`.
     fn finish(&mut self, k: i64);
+
+    /// How many numbers of a member it records.
+    fn recorded(&self) -> usize {
+        0
+    }
+
+    /// Records the present state, whose v slot is finished: rows of lanes.
+    fn record(&mut self, _rows: &mut [f64]) {}
+
+    /// What the system adds up over the steps, a row of lanes or nothing.
+    fn tally(&self) -> &[f64] {
+        &[]
+    }
+
+    /// What the system adds up, to write.
+    fn tally_mut(&mut self) -> &mut [f64] {
+        &mut []
+    }
 }

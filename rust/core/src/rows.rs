@@ -46,6 +46,11 @@ pub trait Large<const L: usize>: System<V = Rows<L>, Y = Rows<L>> + Send + Sync 
 
     /// How many velocities and coordinates a member has.
     fn shape(spec: &Spec) -> (usize, usize);
+
+    /// How many numbers of a member it records.
+    fn recorded(_spec: &Spec) -> usize {
+        0
+    }
 }
 
 struct RowGroup<S: Large<L>, St, I, const L: usize> {
@@ -55,6 +60,7 @@ struct RowGroup<S: Large<L>, St, I, const L: usize> {
     v: Rows<L>,
     y: Rows<L>,
     work: Work<S>,
+    recorded: usize,
     stepper: PhantomData<fn() -> St>,
 }
 
@@ -84,7 +90,8 @@ impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> RowGroup<S, St, I, L> {
         let (p, q) = S::shape(spec);
         let (v, y) = (zeros(p), zeros(q));
         let work = Work::new(St::RECORD.evaluations, &v, &y);
-        Box::new(Self { clock: *clock, isa, system: None, v, y, work, stepper: PhantomData::<fn() -> St> })
+        let recorded = S::recorded(spec);
+        Box::new(Self { clock: *clock, isa, system: None, v, y, work, recorded, stepper: PhantomData::<fn() -> St> })
     }
 }
 
@@ -131,8 +138,30 @@ where
 
     fn finish(&mut self, k: i64) {
         if let Some(s) = &mut self.system {
+            if self.recorded > 0 {
+                s.foresee(&self.y);
+            }
             St::finish(s, self.clock.start, self.clock.at(k), &mut self.v, &self.y, &mut self.work);
         }
+    }
+
+    fn recorded(&self) -> usize {
+        self.recorded
+    }
+
+    fn record(&mut self, rows: &mut [f64]) {
+        if let Some(s) = &mut self.system {
+            s.foresee(&self.y);
+            s.record(&self.v, &self.y, rows);
+        }
+    }
+
+    fn tally(&self) -> &[f64] {
+        self.system.as_ref().map_or(&[], |s| s.tally())
+    }
+
+    fn tally_mut(&mut self) -> &mut [f64] {
+        self.system.as_mut().map_or(&mut [], |s| s.tally_mut())
     }
 }
 

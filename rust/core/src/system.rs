@@ -29,4 +29,20 @@ pub trait System {
     /// Corrects the state after a step: projections onto what should be constant.
     #[inline(always)]
     fn settle(&mut self, _v: &mut Self::V, _y: &mut Self::Y) {}
+
+    /// Says that the state of these coordinates is about to be recorded, and that the next step will begin there.
+    fn foresee(&mut self, _y: &Self::Y) {}
+
+    /// Records quantities of a state, as rows.
+    fn record(&mut self, _v: &Self::V, _y: &Self::Y, _rows: &mut [f64]) {}
+
+    /// What it adds up over the steps.
+    fn tally(&self) -> &[f64] {
+        &[]
+    }
+
+    /// What it adds up, to write.
+    fn tally_mut(&mut self) -> &mut [f64] {
+        &mut []
+    }
 }

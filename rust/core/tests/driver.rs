@@ -31,7 +31,8 @@ type Last = (Vec<f64>, Vec<f64>, Vec<i64>);
 /// The last v and y from v = 0 and y = 1, and who diverged when.
 fn last(plan: &Plan) -> Result<Last, Error> {
     let (mut v, mut y, mut bad) = (vec![0.0; plan.members], vec![0.0; plan.members], vec![-1; plan.members]);
-    let arrays = Arrays { saved_v: &mut v, saved_y: &mut y, carry: &mut [], first_bad: &mut bad };
+    let arrays =
+        Arrays { saved_v: &mut v, saved_y: &mut y, recorded: &mut [], tally: &mut [], carry: &mut [], first_bad: &mut bad };
     run(plan, arrays, &mut |_| true)?;
     Ok((v, y, bad))
 }
@@ -81,7 +82,8 @@ fn a_monitor_that_says_no_ends_the_run() {
         let omega = vec![1.0; 1000];
         let plan = plan(oscillators(&omega, "rk4"), 0.1, 1_000_000_000, 1000, threads);
         let (mut v, mut y, mut bad) = (vec![0.0; 1000], vec![1.0; 1000], vec![-1; 1000]);
-        let arrays = Arrays { saved_v: &mut v, saved_y: &mut y, carry: &mut [], first_bad: &mut bad };
+        let arrays =
+            Arrays { saved_v: &mut v, saved_y: &mut y, recorded: &mut [], tally: &mut [], carry: &mut [], first_bad: &mut bad };
         let mut shares = Vec::new();
         let mut monitor = |share: f64| {
             shares.push(share);

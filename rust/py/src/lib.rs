@@ -70,7 +70,7 @@ fn saves(steps: i64, every: Option<i64>) -> Vec<i64> {
 
 /// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
 #[pyfunction]
-#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, carry, first_bad, progress))]
+#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, recorded, tally, carry, first_bad, progress))]
 #[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
 fn run(
     py: Python<'_>,
@@ -87,6 +87,8 @@ fn run(
     y: PyReadonlyArray2<'_, f64>,
     mut saved_v: PyReadwriteArrayDyn<'_, f64>,
     mut saved_y: PyReadwriteArrayDyn<'_, f64>,
+    mut recorded: PyReadwriteArrayDyn<'_, f64>,
+    mut tally: PyReadwriteArrayDyn<'_, f64>,
     mut carry: PyReadwriteArrayDyn<'_, f64>,
     mut first_bad: PyReadwriteArray1<'_, i64>,
     progress: Option<Py<PyAny>>,
@@ -95,6 +97,8 @@ fn run(
     let arrays = Arrays {
         saved_v: saved_v.as_slice_mut()?,
         saved_y: saved_y.as_slice_mut()?,
+        recorded: recorded.as_slice_mut()?,
+        tally: tally.as_slice_mut()?,
         carry: carry.as_slice_mut()?,
         first_bad: first_bad.as_slice_mut()?,
     };

@@ -32,6 +32,7 @@ pub struct ModelSpec {
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     method: String,
     matrix: Option<(Vec<f64>, usize)>,
+    record: Vec<String>,
 }
 
 /// The parameters, borrowed for a run.
@@ -49,7 +50,8 @@ pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>
 impl ModelSpec {
     /// `matrix` is the nodes and the number of rows in the v slot, if the transition-matrix form is asked for.
     #[new]
-    #[pyo3(signature = (system, options, sizes, rows, tables, method, matrix=None))]
+    #[pyo3(signature = (system, options, sizes, rows, tables, method, matrix=None, record=Vec::new()))]
+    #[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
     fn new(
         system: String,
         options: Vec<String>,
@@ -58,8 +60,9 @@ impl ModelSpec {
         tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
         method: String,
         matrix: Option<(Vec<f64>, usize)>,
+        record: Vec<String>,
     ) -> Self {
-        ModelSpec { system, options, sizes, rows, tables, method, matrix }
+        ModelSpec { system, options, sizes, rows, tables, method, matrix, record }
     }
 }
 
@@ -90,6 +93,7 @@ impl ModelSpec {
                 .iter()
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
+            record: self.record.iter().map(String::as_str).collect(),
         };
         Ok(match &self.matrix {
             None => Model::Direct { spec, method: &self.method },

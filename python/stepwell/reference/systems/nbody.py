@@ -63,13 +63,16 @@ class NBody:
         self.strength = h * strength  # h·G·m
         self.soft = softening * softening
         self.half = (0.5 * h) * masses
+        self.work: Array | float = 0.0  # h times what control or projection changed of the energy
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇, and the push of the control."""
         if self.control is None:
             return self.meet(y, None)
         dv, kinetic, energy = self.energies(v, y)
-        return np.asarray(dv - self.control.push(kinetic, energy) * v)
+        g = self.control.push(kinetic, energy)
+        self.work = self.work - (g * (2.0 - g)) * kinetic  # what the push alone would change: ((1 − g)² − 1)·K
+        return np.asarray(dv - g * v)
 
     def dy(self, t: float, v: Array, y: Array) -> Array:
         """h·ẏ."""
@@ -126,9 +129,28 @@ class NBody:
         dv, kinetic, energy = self.energies(v, y)
         off = self.projection.off(energy)
         if self.projection.way == "scaling":
-            return v * self.projection.factor(kinetic, off), y
+            factor = self.projection.factor(kinetic, off)
+            self.work = self.work + (factor * factor - 1.0) * kinetic
+            return v * factor, y
         # Nacozy: along the gradient of the energy, m·v in the velocities and −m·a in the coordinates.
         masses = self.masses[:, np.newaxis]
         along_v, along_y = masses * v, masses * (dv / self.h)
         step = (off / self.h) / total(square(along_v) + square(along_y))
+        self.work = self.work - off
         return v - step * along_v, y + step * along_y
+
+    def record(self, name: str, v: Array, y: Array) -> Array:
+        """A quantity of a state: a number for each member, or a vector along the first axis."""
+        if name == "energy":
+            return np.asarray(self.energies(v, y)[2] / self.h)
+        if name == "momentum":
+            return total(self.masses[:, np.newaxis] * v)
+        if name == "angular_momentum":
+            pairs = [(0, 1)] if y.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
+            spin = [total(self.masses * (y[:, a] * v[:, b] - y[:, b] * v[:, a])) for a, b in pairs]
+            return spin[0] if len(spin) == 1 else np.stack(spin)
+        least = np.full(y.shape[2:], np.inf)  # "closest": the least distance of two bodies
+        for i in range(len(y)):
+            for r2 in square(y[i + 1 :] - y[i]):
+                least = np.where(r2 < least, r2, least)
+        return np.asarray(np.sqrt(least))

@@ -10,7 +10,7 @@ use crate::{
 
 /// Σ over the bodies, body i in part i mod `SIDE`, then part after part.
 #[inline(always)]
-fn total<const L: usize>(n: usize, value: impl Fn(usize, usize) -> f64) -> [f64; L] {
+pub(super) fn total<const L: usize>(n: usize, value: impl Fn(usize, usize) -> f64) -> [f64; L] {
     let mut parts = [[0.0; L]; SIDE];
     let used = n.min(SIDE);
     for i in 0..n {
@@ -40,7 +40,7 @@ fn square<const L: usize>(v: &[[f64; L]], dim: usize, i: usize, l: usize) -> f64
 
 /// h times the kinetic and h times the whole energy.
 #[inline(always)]
-fn energies<const L: usize>(
+pub(super) fn energies<const L: usize>(
     n: usize,
     dim: usize,
     mass: &[[f64; L]],
@@ -69,16 +69,21 @@ pub(super) struct Back<'a, const L: usize> {
     pub(super) dv: &'a [[f64; L]],
     pub(super) v: &'a mut [[f64; L]],
     pub(super) y: &'a mut [[f64; L]],
+    /// Gains h times what it changes of the energy.
+    pub(super) work: &'a mut [f64; L],
 }
 
 impl<const L: usize> Task for Back<'_, L> {
     #[inline(always)]
     fn run(self) {
-        let Self { n, dim, h, projection, mass, half, potential, dv, v, y } = self;
+        let Self { n, dim, h, projection, mass, half, potential, dv, v, y, work } = self;
         let (kinetic, energy) = energies(n, dim, mass, half, potential, v);
         let off = projection.off(&energy);
         if projection.way == Way::Scaling {
             let factor = projection.factor(&kinetic, &off);
+            for l in 0..L {
+                work[l] += (factor[l] * factor[l] - 1.0) * kinetic[l];
+            }
             for row in v {
                 for l in 0..L {
                     row[l] *= factor[l];
@@ -99,6 +104,7 @@ impl<const L: usize> Task for Back<'_, L> {
         let mut step = [0.0; L];
         for l in 0..L {
             step[l] = (off[l] / h) / norm[l];
+            work[l] -= off[l];
         }
         for r in 0..n * dim {
             for l in 0..L {
@@ -119,6 +125,8 @@ pub(super) struct Push<'a, const L: usize> {
     pub(super) potential: &'a [[f64; L]],
     pub(super) v: &'a [[f64; L]],
     pub(super) out: &'a mut [[f64; L]],
+    /// Gains h times what the push alone would change of the energy.
+    pub(super) work: &'a mut [f64; L],
 }
 
 impl<const L: usize> Task for Push<'_, L> {
@@ -126,6 +134,9 @@ impl<const L: usize> Task for Push<'_, L> {
     fn run(self) {
         let (kinetic, energy) = energies(self.n, self.dim, self.mass, self.half, self.potential, self.v);
         let g = self.control.push(&kinetic, &energy);
+        for l in 0..L {
+            self.work[l] -= (g[l] * (2.0 - g[l])) * kinetic[l];
+        }
         for (out, v) in self.out.iter_mut().zip(self.v) {
             for l in 0..L {
                 out[l] -= g[l] * v[l];

@@ -12,7 +12,7 @@
 //! side by side, or one large system with eight bodies at a time.
 //!
 //! Sizes: bodies, dimensions (2 or 3). Options: the force; then `control:printed`, `control:limited`, `project:scaling` or
-//! `project:nacozy`. Parameters: G·m of each body, m of each body, ε; then the target energy, and the gain of a control.
+//! `project:nacozy`. Recorded: `energy`, `momentum`, `angular_momentum`, `closest`. Parameters: G·m of each body, m of each body, ε; then the target energy, and the gain of a control.
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
@@ -20,6 +20,7 @@ mod along;
 mod beside;
 mod energy;
 mod law;
+mod record;
 mod three;
 
 use self::{
@@ -27,6 +28,7 @@ use self::{
     beside::SideBySide,
     energy::{Back, Push},
     law::{LOGARITHMIC, NEWTON, PRINTED},
+    record::{Quantity, Record},
     three::Three,
 };
 use crate::{
@@ -113,11 +115,18 @@ pub struct Bodies<const L: usize> {
     bodies: Vec<f64>,
     control: Option<EnergyControl<L>>,
     projection: Option<Projection<L>>,
-    /// h·v̇ of the state that is projected.
+    /// What to record of a state.
+    record: Vec<Quantity>,
+    /// Σ over the evaluations of h times what the push takes from the energy, or h times what the projection took.
+    work: [f64; L],
+    /// Places whose forces and potentials are at hand, until others are asked for: a state that is projected or recorded, at
+    /// which the next step begins.
+    at_hand: bool,
+    y: Rows<L>,
     dv: Rows<L>,
 }
 impl<const L: usize> Bodies<L> {
-    fn push(&self, v: &Rows<L>, out: &mut Rows<L>) {
+    fn push(&mut self, v: &Rows<L>, out: &mut Rows<L>) {
         let Some(control) = &self.control else { return };
         let task = Push {
             n: self.n,
@@ -128,8 +137,14 @@ impl<const L: usize> Bodies<L> {
             potential: &self.potential,
             v: lanes(v),
             out: lanes_mut(out),
+            work: &mut self.work,
         };
         with_isa!(self.kind.level, |isa| isa.run(task));
+    }
+
+    /// Whether the forces and potentials of these places are at hand.
+    fn has(&self, y: &Rows<L>) -> bool {
+        self.at_hand && y.as_slice().iter().zip(self.y.as_slice()).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
     fn back(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
@@ -145,13 +160,30 @@ impl<const L: usize> Bodies<L> {
             dv: lanes(&self.dv),
             v: lanes_mut(v),
             y: lanes_mut(y),
+            work: &mut self.work,
         };
         with_isa!(self.kind.level, |isa| isa.run(task));
     }
 }
-/// h·ẏ, its inverse, and the projection, the same for any number of lanes.
-macro_rules! straight {
-    () => {
+
+/// Everything but the kernel, the same for any number of lanes.
+macro_rules! bodies {
+    ($lanes:expr) => {
+        impl System for Bodies<{ $lanes }> {
+        type V = Rows<{ $lanes }>;
+        type Y = Rows<{ $lanes }>;
+
+        #[inline(always)]
+        fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
+            if self.has(y) {
+                out.copy_from(&self.dv);
+            } else {
+                self.at_hand = false;
+                self.meet(self.control.is_some(), y, out);
+            }
+            self.push(v, out);
+        }
+
         #[inline(always)]
         fn dy(&mut self, _t: f64, v: &Self::V, _y: &Self::Y, out: &mut Self::Y) {
             for (out, v) in out.as_mut_slice().iter_mut().zip(v.as_slice()) {
@@ -169,27 +201,69 @@ macro_rules! straight {
         #[inline(always)]
         fn settle(&mut self, v: &mut Self::V, y: &mut Self::Y) {
             if self.projection.is_some() {
+                self.foresee(y);
+                self.back(v, y);
+            }
+        }
+
+        #[inline(always)]
+        fn foresee(&mut self, y: &Self::Y) {
+            if !self.has(y) {
                 let mut dv = std::mem::replace(&mut self.dv, zeros(0));
                 self.meet(true, y, &mut dv);
-                self.dv = dv;
-                self.back(v, y);
+                (self.dv, self.at_hand) = (dv, true);
+                self.y.copy_from(y);
+            }
+        }
+
+        fn record(&mut self, v: &Self::V, y: &Self::Y, rows: &mut [f64]) {
+            let task = Record {
+                n: self.n,
+                dim: self.kind.dim,
+                h: self.h,
+                what: &self.record,
+                mass: &self.mass,
+                half: &self.half,
+                potential: &self.potential,
+                v: lanes(v),
+                y: lanes(y),
+                rows: rows.as_chunks_mut().0,
+            };
+            with_isa!(self.kind.level, |isa| isa.run(task));
+        }
+
+        fn tally(&self) -> &[f64] {
+            &self.work
+        }
+
+        fn tally_mut(&mut self) -> &mut [f64] {
+            &mut self.work
+        }
+        }
+
+        impl Large<{ $lanes }> for Bodies<{ $lanes }> {
+            fn shape(spec: &Spec) -> (usize, usize) {
+                (spec.size(0) * spec.size(1), spec.size(0) * spec.size(1))
+            }
+
+            fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
+                Bodies::new(spec, clock, member)
+            }
+
+            fn recorded(spec: &Spec) -> usize {
+                quantities(spec).map(|q| q.size(spec.size(1))).sum()
             }
         }
     };
 }
 
-impl System for Bodies<{ rows::LANES }> {
-    type V = Rows<{ rows::LANES }>;
-    type Y = Rows<{ rows::LANES }>;
-
-    #[inline(always)]
-    fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
-        self.meet(self.control.is_some(), y, out);
-        self.push(v, out);
-    }
-
-    straight!();
+/// What a spec asks to record.
+fn quantities(spec: &Spec) -> impl Iterator<Item = Quantity> {
+    spec.record.iter().filter_map(|name| Quantity::named(name))
 }
+
+bodies!(rows::LANES);
+bodies!(1);
 
 impl Bodies<{ rows::LANES }> {
     // Never inlined: the kernels stand once in the core, not once in every stage of every method.
@@ -207,19 +281,6 @@ impl Bodies<{ rows::LANES }> {
             out: lanes_mut(out),
         });
     }
-}
-
-impl System for Bodies<1> {
-    type V = Rows<1>;
-    type Y = Rows<1>;
-
-    #[inline(always)]
-    fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
-        self.meet(self.control.is_some(), y, out);
-        self.push(v, out);
-    }
-
-    straight!();
 }
 
 impl Bodies<1> {
@@ -259,6 +320,7 @@ impl<const L: usize> Bodies<L> {
         let control = keeps.starts_with("control:").then(|| EnergyControl::new(spec, keeps == "control:limited", 2 * n + 1, h, &member));
         let way = if keeps == "project:nacozy" { Way::Nacozy } else { Way::Scaling };
         let projection = keeps.starts_with("project:").then(|| Projection::new(spec, way, 2 * n + 1, h, &member));
+        let kept = if projection.is_some() || !spec.record.is_empty() { n * dim } else { 0 };
         Bodies {
             n,
             kind: Kind { law, dim, level: clock.level },
@@ -273,31 +335,15 @@ impl<const L: usize> Bodies<L> {
             places: vec![vec![0.0; rounds]; dim],
             partners: (0..rounds).map(|i| along(i % n)).collect(),
             bodies: (0..chunks).map(along).collect(),
-            dv: zeros(if projection.is_some() { n * dim } else { 0 }),
+            record: quantities(spec).collect(),
+            work: [0.0; L],
+            at_hand: false,
+            y: zeros(kept),
+            dv: zeros(kept),
             control,
             projection,
             strength,
         }
-    }
-}
-
-impl Large<{ rows::LANES }> for Bodies<{ rows::LANES }> {
-    fn shape(spec: &Spec) -> (usize, usize) {
-        (spec.size(0) * spec.size(1), spec.size(0) * spec.size(1))
-    }
-
-    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
-        Bodies::new(spec, clock, member)
-    }
-}
-
-impl Large<1> for Bodies<1> {
-    fn shape(spec: &Spec) -> (usize, usize) {
-        (spec.size(0) * spec.size(1), spec.size(0) * spec.size(1))
-    }
-
-    fn prepare(spec: &Spec, clock: &Clock, member: impl Fn(usize) -> usize) -> Self {
-        Bodies::new(spec, clock, member)
     }
 }
 
@@ -320,11 +366,14 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     if spec.rows.len() != expected {
         return Err(Error::Shape { what: "parameters", expected, got: spec.rows.len() });
     }
+    if let Some(unknown) = spec.record.iter().find(|name| Quantity::named(name).is_none()) {
+        return Err(Error::Options { system: spec.system.to_owned(), options: format!("record {unknown}") });
+    }
     if St::RECORD.needs == Needs::Acceleration && !control.is_empty() {
         return Err(Error::VelocityDependent { method: St::RECORD.name, system: "nbody", term: "energy control" });
     }
     // Lanes: what was fastest when tried.
-    Ok(match (n, dim, *law, control.len()) {
+    Ok(match (n, dim, *law, control.len() + spec.record.len()) {
         (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1>(Three::<2, NEWTON>, clock, width),
         (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1>(Three::<2, LOGARITHMIC>, clock, width),
         (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 8, 8, 1>(Three::<3, NEWTON>, clock, width),
