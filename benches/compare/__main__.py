@@ -28,12 +28,12 @@ def main() -> None:
     contestants = peers.catalogue()
     for work in workloads.catalogue():
         if given.quick:
-            work = work.cut(members=2000, steps=2000 if work.members == 1 else 200)
+            work = work.quick()
         rows = runner.measure(contestants, work, repeats, given.quick)
         made = report.table(work, rows)
         report.show(*made)
         parts += [report.markdown(*made), report.threads(rows)]
-    made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats)]
+    made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]
     described = [*machine.describe(), ("load of the machine", f"{load} before, {machine.load()} after")]

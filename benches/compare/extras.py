@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import subprocess
 import sys
 import time
@@ -10,6 +11,9 @@ from statistics import median
 
 import numpy as np
 import stepwell as sw
+
+from . import runner
+from .workloads import w4_one_system
 
 ROOT = Path(__file__).parents[2]
 
@@ -51,10 +55,38 @@ def wheel() -> str:
     return f"{wheels[-1].stat().st_size / 1e6:.2f} MB ({wheels[-1].name})" if wheels else "none in dist/"
 
 
-def table(repeats: int) -> list[tuple[str, str, str]]:
+def control_cost(bodies: int, repeats: int, quick: bool) -> str:
+    """Energy control beside the same method without it, in turns. By False Euler: leapfrog has no velocity to push.
+
+    Worlds step, so that what is done once, the energy of the start, is not counted.
+    """
+    (work,) = (w for w in w4_one_system.ONE if w.bodies == bodies)
+    work = work.quick() if quick else work
+    data = {name: row[..., 0] for name, row in work.data.items()}
+    system = sw.NBody(data["masses"], force="newton", softening=data["softening"])
+
+    def world(control: sw.EnergyControl | None) -> sw.World:
+        return sw.World(system, "false_euler", v=data["v"].copy(), y=data["y"].copy(), dt=work.dt, control=control)
+
+    worlds, energy = [world(None), world(sw.EnergyControl(relative=0.1))], system.energy(data["v"], data["y"])
+    calls = max(1, round(runner.SAMPLE / runner.sample(functools.partial(worlds[0].step, work.steps), 1)))
+    ratios = []
+    for _ in range(repeats):
+        plain, controlled = (runner.sample(functools.partial(each.step, work.steps), calls) for each in worlds)
+        ratios.append(controlled / plain)
+    lowest, middle, highest = (100.0 * (each - 1.0) for each in (min(ratios), median(ratios), max(ratios)))
+    without, off = (float(abs(system.energy(each.v, each.y) - energy)) for each in worlds)
+    return f"{middle:+.0f} % ({lowest:+.0f} … {highest:+.0f}); energy error {off:.1e}, without {without:.1e}"
+
+
+def table(repeats: int, quick: bool = False) -> list[tuple[str, str, str]]:
     """What, how much, and what was aimed at."""
     return [
         ("`import stepwell` after NumPy", import_time(repeats), "≤ 20 ms"),
         ("`World.step(1)`, one oscillator", world_step(repeats), "≤ 0.2 µs beyond arithmetic"),
+        *(
+            (f"energy control beyond the plain step, {n} bodies, False Euler", control_cost(n, repeats, quick), "≤ 15 %")
+            for n in (64, 1024)
+        ),
         ("wheel", wheel(), "≤ 3 MB"),
     ]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import stepwell as sw
 
-from .peers import MissingPeerError, c_peer, stepwell_peer
+from .peers import MissingPeerError, c_peer, threads
 
 
 def cpu() -> str:
@@ -53,9 +53,9 @@ def describe() -> list[tuple[str, str]]:
     """What there is to know."""
     return [
         ("date", time.strftime("%Y-%m-%d")),
-        ("CPU", f"{cpu()}, {stepwell_peer.threads()} cores"),
+        ("CPU", f"{cpu()}, {threads()} cores"),
         ("system", f"{platform.system()} {platform.machine()}"),
         ("CPU level of stepwell", f"{sw.isa()} of {', '.join(sw.isa_levels())}"),
-        ("Python", ", ".join([platform.python_version(), *map(version, ("stepwell", "numpy", "numba", "llvmlite"))])),
+        ("Python", ", ".join([platform.python_version(), *map(version, ("stepwell", "numpy", "numba", "llvmlite", "rebound"))])),
         ("C", compiler()),
     ]

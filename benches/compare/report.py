@@ -7,21 +7,30 @@ from .workloads import Workload
 
 Table = tuple[str, list[str], list[list[str]]]
 
-HEAD = ["contestant", "G steps/s", "min … max", "error", "÷ numba", "÷ C", "÷ C, exact", "remarks"]
+HEAD = ["contestant", "speed", "min … max", "error", "÷ numba", "÷ C", "÷ C, exact", "remarks"]
 
 READING = """\
-G steps/s are 10⁹ member-steps a second: members × steps ÷ time of one call that goes from the user's arrays to the
-final state. Shown is the median of {repeats} repeats, then the slowest and the fastest. The contestants take turns
-in every repeat, and each sample lasts at least {sample:.0f} ms.
+A call goes from the user's arrays to the final state. Shown is the median of {repeats} repeats, then the least and the
+most. The contestants take turns in every repeat, and each sample lasts at least {sample:.0f} ms. The columns with ÷
+say how many times as fast.
 
-*Error* is the largest distance of a member's (v, y) from the exact solution at the end, at amplitudes of about 1.
-Who exceeds what the method explains is not timed. All contestants use the same method, so equal errors mean equal
-work and the speeds may be compared; who did a smaller share has the error of that share.
+- G steps/s: 10⁹ member-steps a second, members × steps ÷ time.
+- ns/step: time ÷ steps, of one member.
+- M system-steps/s: 10⁶ member-steps a second.
+- G pairs/s: 10⁹ directed pairs a second. N bodies have N(N − 1) in an evaluation, also for who computes each pair once.
+  Counted are the evaluations made: steps + 1 by C and numba, steps + 2 by stepwell, whose leapfrog ends each of
+  both half kicks apart, and steps by REBOUND.
 
-*C* may contract to FMA, and *numba* may also reorder. *C, exact* computes as stepwell does, whose results are the
-same to the last bit on every machine. All of them are the best of several block shapes, found before the timing;
-one thread each. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file
-mean anything: another machine, or another hour on a shared one, gives other speeds.
+*Error* is the largest distance of a member's, or a body's, (v, y) from the truth at the end: the exact solution, or
+that of a better method with a fine step. Amplitudes are about 1. Who exceeds what the method explains is not timed.
+All contestants use the same method, so equal errors mean equal work and the speeds may be compared; who did a smaller
+share has the error of that share. REBOUND's leapfrog alone is another: drift-kick-drift in place of kick-drift-kick.
+
+*C* may contract to FMA, and with bodies also reorder and replace root and division by a close approximation (rsqrt);
+*numba* may contract and reorder. *C, exact* computes as stepwell does, whose results are the same to the last bit on
+every machine. All of them are the best of several shapes, found before the timing; one thread each, unless the title
+says all. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file mean
+anything: another machine, or another hour on a shared one, gives other speeds.
 """
 
 
@@ -38,11 +47,12 @@ def table(work: Workload, rows: list[Row]) -> Table:
         if row.missing:
             lines.append([row.name, *["—"] * (len(HEAD) - 2), row.missing])
             continue
-        slowest, middle, fastest = row.rates
+        middle = row.rates[1]
         ratios = [f"{middle / speed[peer]:.2f}" if peer in speed else "—" for peer in ("numba", "C", "C, exact")]
-        lines.append([row.name, number(middle), f"{number(slowest)} … {number(fastest)}", f"{row.error:.1e}", *ratios, row.note])
-    title = f"{work.name}: {work.about}, {work.members:,} member(s), {work.steps:,} steps of {work.dt:g}"
-    return title, HEAD, lines
+        low, shown, high = (number(each) for each in sorted(work.unit.shown(rate) for rate in row.rates))
+        lines.append([row.name, shown, f"{low} … {high}", f"{row.error:.1e}", *ratios, row.note])
+    title = f"{work.name}: {work.about}, {work.size}, {work.steps:,} steps of {work.dt:g}"
+    return title, [HEAD[0], work.unit.name, *HEAD[2:]], lines
 
 
 def threads(rows: list[Row]) -> str:

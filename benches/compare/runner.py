@@ -23,15 +23,14 @@ class Row:
     note: str = ""
     missing: str = ""
     error: float = float("nan")
-    member_steps: int = 0
+    amount: float = 0.0  # of work in a call
     calls: int = 1
     seconds: list[float] = field(default_factory=list)  # per call
 
     @property
     def rates(self) -> tuple[float, float, float]:
-        """Lowest, median and highest speed, in 10⁹ member-steps a second."""
-        work = self.member_steps / 1e9
-        return work / max(self.seconds), work / median(self.seconds), work / min(self.seconds)
+        """Lowest, median and highest speed, in pieces of work a second."""
+        return tuple(self.amount / statistic(self.seconds) for statistic in (max, median, min))
 
 
 def sample(call: Callable[[], object], calls: int) -> float:
@@ -50,11 +49,15 @@ def share(contestant: Contestant, work: Workload, quick: bool) -> Workload:
     """The part of the work that a slow contestant does in good time, judged by a little of it."""
     if contestant.slow is None:
         return work
-    members = 1 if contestant.slow == "members" else work.members
-    trial = work.cut(members=members, steps=100)
-    seconds = sample(contestant.kernels[work.kind](trial, quick).call, 1) / (trial.members * trial.steps)
+    members, steps, seconds = 1 if contestant.slow == "members" else work.members, 1, 0.0
+    while seconds < SAMPLE / 2:
+        trial = work.cut(members=members, steps=steps)
+        seconds = sample(contestant.kernels[work.kind](trial, quick).call, 1)
+        if trial.steps == work.steps:
+            break
+        steps *= 10
     patience = PATIENCE / 10 if quick else PATIENCE
-    affordable = max(100, int(patience / seconds))  # member-steps
+    affordable = max(1, int(patience / seconds * trial.members * trial.steps))  # member-steps
     if contestant.slow == "members":
         work = work.cut(members=max(1, affordable // work.steps))
     return work.cut(steps=max(1, affordable // work.members))
@@ -75,7 +78,7 @@ def prepare(contestant: Contestant, work: Workload, quick: bool) -> tuple[Row, R
         row.missing = f"not timed: {why}"
     if row.missing:
         return row, None
-    row.member_steps = part.members * part.steps
+    row.amount = part.amount(part.steps + ready.more)
     less = "" if part.members == work.members else f"{part.members:,} member(s)"
     less += "" if part.steps == work.steps else f"{', ' * bool(less)}{part.steps:,} steps"
     row.note = "; ".join(filter(None, [ready.note, less and f"did {less} only"]))

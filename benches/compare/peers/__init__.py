@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import time
 from collections.abc import Callable, Mapping
@@ -11,6 +12,9 @@ from dataclasses import dataclass
 from ..workloads import Array, Workload
 
 Call = Callable[[], tuple[Array, Array]]
+
+#: Seconds after which a configuration is tried no more.
+ENOUGH = 0.2
 
 
 class MissingPeerError(Exception):
@@ -23,10 +27,14 @@ class WrongResultError(Exception):
 
 @dataclass(frozen=True)
 class Ready:
-    """A workload made ready: ``call`` does all of it, from the workload's arrays to v and y at the end."""
+    """A workload made ready: ``call`` does all of it, from the workload's arrays to v and y at the end.
+
+    ``more`` is how often it evaluates the rates beyond once a step, which some ways to begin and end a method need.
+    """
 
     call: Call
     note: str = ""
+    more: int = 0
 
 
 @dataclass(frozen=True)
@@ -34,12 +42,19 @@ class Contestant:
     """A peer in one configuration.
 
     ``kernels`` maps each kind of workload that it can do to what makes one ready, given whether the run is a quick one.
-    A ``slow`` one does less: fewer "members" or fewer "steps", whichever leaves its speed as it is.
+    A ``slow`` one does less: fewer "members" or fewer "steps", whichever leaves its speed as it is. One that is not ``alike``
+    has another form of the method, with errors of the same order but not the same.
     """
 
     name: str
     kernels: Mapping[str, Callable[[Workload, bool], Ready]]
     slow: str | None = None
+    alike: bool = True
+
+
+def threads() -> int:
+    """How many threads this process may use at once."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def catalogue() -> list[Contestant]:
@@ -56,12 +71,15 @@ def fastest(makers: list[Callable[[Workload], Ready]], work: Workload) -> Ready:
         call = maker(part).call
         if not part.error(*call()) <= part.bound():
             continue
+        begin = time.perf_counter()
         for _ in range(5):
             start = time.perf_counter()
             call()
             took = time.perf_counter() - start
             if took < best:
                 best, make = took, maker
+            if time.perf_counter() - begin > ENOUGH:
+                break
     if make is None:
         raise WrongResultError(f"none of {len(makers)} configurations gives the right result")
     return make(work)

@@ -1,4 +1,4 @@
-"""C, compiled on the spot for this machine, the fastest of several block sizes; with FMA, and exact as stepwell is."""
+"""C, compiled on the spot for this machine, the fastest of several forms; with FMA and more, and exact as stepwell is."""
 
 from __future__ import annotations
 
@@ -10,16 +10,20 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from . import Contestant, MissingPeerError, Ready, Workload, fastest
+from . import Contestant, MissingPeerError, Ready, Workload, fastest, threads
 
-SOURCE = Path(__file__).with_name("kernels.c")
+OSCILLATORS, BODIES = (Path(__file__).with_name(name) for name in ("kernels.c", "bodies.c"))
 FLAGS = ["-O3", "-fno-math-errno", "-shared", "-fPIC"]
 BLOCKS = (32, 64, 80, 96, 128)
 FEW = (1, 8)  # for a member or a few
+BODY_BLOCKS = (8, 16, 32)
+EXACT = ("-ffp-contract=off",)
+FAST = ("-ffast-math",)  # for bodies, where it is faster; it may also reorder
 
 numbers = ctypes.POINTER(ctypes.c_double)
 
@@ -47,49 +51,99 @@ def folder() -> Path:
 
 
 @functools.cache
-def library(*options: str) -> ctypes.CDLL:
-    """The kernels, compiled with these options."""
-    out = folder() / ("kernels" + "".join(options).replace("=", "") + ".so")
-    command = [compiler(), *flags(), *options, str(SOURCE), "-o", str(out), "-lm"]
+def vectors_of_512() -> bool:
+    """Whether these flags allow AVX-512, for the form that is written with it."""
+    command = [compiler(), *flags(), "-dM", "-E", "-x", "c", "-"]
+    return "__AVX512F__ " in subprocess.run(command, input="", capture_output=True, text=True).stdout
+
+
+@functools.cache
+def library(source: Path, *options: str) -> ctypes.CDLL:
+    """The kernels of a file, compiled with these options."""
+    out = folder() / (source.stem + "".join(options).replace("=", "") + ".so")
+    command = [compiler(), *flags(), *options, str(source), "-o", str(out), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise MissingPeerError(f"the C compiler failed: {done.stderr.strip().splitlines()[0]}")
     return ctypes.CDLL(str(out))
 
 
-def made(options: tuple[str, ...], work: Workload) -> Ready:
-    """The workload by the function of that name, in a library compiled with these options."""
-    function = getattr(library(*options), work.kind)
-    function.restype = None
-    rows = [np.ascontiguousarray(row) for row in work.data.values()]
-    pointers = (numbers * len(rows))(*(row.ctypes.data_as(numbers) for row in rows))
+@dataclass(frozen=True)
+class Form:
+    """One of the ways to compile: the file, what the remarks say of it, and what they do not."""
 
-    def call():
-        v, y = np.empty_like(rows[0]), np.empty_like(rows[1])
-        out = v.ctypes.data_as(numbers), y.ctypes.data_as(numbers)
-        function(ctypes.c_long(v.size), ctypes.c_long(work.steps), ctypes.c_double(work.dt), pointers, *out)
-        return v, y
+    source: Path
+    told: tuple[str, ...]
+    options: tuple[str, ...]
+    more: int = 0
 
-    defined = [o[2:].lower().replace("=", " ") for o in options if o.startswith("-D")]
-    return Ready(call, ", ".join(defined))
+    def made(self, work: Workload) -> Ready:
+        """The workload by the function of that name."""
+        defines = [f"-D{each.upper().replace(' ', '=')}" for each in self.told]
+        function = getattr(library(self.source, *defines, *self.options), work.kind)
+        function.restype = None
+        rows = [np.ascontiguousarray(row) for row in work.data.values()]
+        pointers = (numbers * len(rows))(*(row.ctypes.data_as(numbers) for row in rows))
 
+        def call():
+            v, y = np.empty_like(rows[0]), np.empty_like(rows[1])
+            out = v.ctypes.data_as(numbers), y.ctypes.data_as(numbers)
+            function(ctypes.c_long(work.members), ctypes.c_long(work.steps), ctypes.c_double(work.dt), pointers, *out)
+            return v, y
 
-def best(*options: str):
-    """The fastest block size; of two sines where there is one."""
-
-    def ready(work: Workload, quick: bool) -> Ready:
-        blocks = FEW if work.members == 1 else BLOCKS[1:3] if quick else BLOCKS
-        variants = [(f"-DBLOCK={block}", *options) for block in blocks]
-        if "forced" in work.kind:
-            variants.append(("-DBLOCK=1", "-DLIBM", *options))
-        return fastest([functools.partial(made, variant) for variant in variants], work)
-
-    return ready
+        return Ready(call, ", ".join(self.told), self.more)
 
 
-def contestant(name: str, *options: str) -> Contestant:
-    """C with these options."""
-    return Contestant(name, {kind: best(*options) for kind in ("free_false_euler", "forced_standard_heun")})
+def oscillators(work: Workload, quick: bool, exact: bool) -> list[Form]:
+    """Block sizes; and two sines where there is one."""
+    blocks = FEW if work.members == 1 else BLOCKS[1:3] if quick else BLOCKS
+    told = [(f"block {block}",) for block in blocks] + [("block 1", "libm")] * ("forced" in work.kind)
+    return [Form(OSCILLATORS, each, EXACT if exact else ()) for each in told]
 
 
-CONTESTANTS = [contestant("C"), contestant("C, exact", "-ffp-contract=off")]
+def body_blocks(quick: bool, exact: bool) -> list[tuple[str, ...]]:
+    """Vectors side by side; with square root and division, or with an approximation that is made better."""
+    blocks = [(f"block {block}",) for block in (BODY_BLOCKS[:1] if quick else BODY_BLOCKS)]
+    return blocks + [(*each, "rsqrt") for each in blocks] * (not exact and vectors_of_512())
+
+
+def bodies(work: Workload, quick: bool, exact: bool) -> list[Form]:
+    """Members side by side; or the pairs of one member, if there are three."""
+    told = body_blocks(quick, exact)
+    if work.members == 1:
+        told = [("block 1",)] + [("block 1", "packed")] * (work.bodies == 3)
+    sizes = "-DFEW", f"-DBODIES={work.bodies}", f"-DDIM={work.dim}"
+    hows = [EXACT] if exact else [FAST] if quick else [FAST, ()]
+    return [Form(BODIES, each, (*sizes, *how), int(work.method == "leapfrog")) for each in told for how in hows]
+
+
+def cluster(work: Workload, quick: bool, exact: bool) -> list[Form]:
+    """Each pair once, or all directed pairs."""
+    shared = work.family == "shared_cluster"
+    told = [(form, *block) for form in ("once", "all") for block in body_blocks(quick, exact)]
+    told += [("once", "block 8", "plain")] * (not exact)  # its sums are vectors only for a compiler that may reorder
+    told = [(*each, f"threads {threads()}") for each in told] if shared else told
+    options = f"-DBODIES={work.bodies}", f"-DDIM={work.dim}", *["-fopenmp"] * shared, *(EXACT if exact else FAST)
+    return [Form(BODIES, each, options, 1) for each in told]
+
+
+FORMS = {
+    "free_false_euler": oscillators,
+    "forced_standard_heun": oscillators,
+    "bodies_false_euler": bodies,
+    "bodies_leapfrog": bodies,
+    "cluster_leapfrog": cluster,
+    "shared_cluster_leapfrog": cluster,
+}
+
+
+def contestant(name: str, exact: bool) -> Contestant:
+    """C in its fastest form."""
+
+    def ready(forms, work: Workload, quick: bool) -> Ready:
+        return fastest([form.made for form in forms(work, quick, exact)], work)
+
+    return Contestant(name, {kind: functools.partial(ready, forms) for kind, forms in FORMS.items()})
+
+
+CONTESTANTS = [contestant("C", exact=False), contestant("C, exact", exact=True)]

@@ -10,16 +10,22 @@ from itertools import product
 
 import numpy as np
 
-from . import Contestant, MissingPeerError, Ready, Workload, fastest
+from .. import unrolled
+from . import Contestant, MissingPeerError, Ready, Workload, fastest, threads
 
 
-def njit(function, **more):
-    """Compiled when first called."""
+def module():
+    """numba, if there."""
     try:
         import numba
     except ImportError:
         raise MissingPeerError("numba is not installed") from None
-    return numba.njit(fastmath=True, error_model="numpy", **more)(function)
+    return numba
+
+
+def njit(function, **more):
+    """Compiled when first called."""
+    return module().njit(fastmath=True, error_model="numpy", **more)(function)
 
 
 def polynomial_sine(x):
@@ -95,39 +101,152 @@ def forced_standard_heun(lanes: int, together: int, sine: str = "polynomial"):
     return njit(run)
 
 
+def few_bodies(bodies: int, dim: int, method: str, lanes: int):
+    """Members side by side, or one by one."""
+    given = {"sqrt": math.sqrt, "empty": np.empty}
+    if lanes == 1:
+        return njit(unrolled.one_by_one(bodies, dim, method, given))
+    return njit(unrolled.side_by_side(bodies, dim, method, lanes, given))
+
+
+def each_pair_once(bodies: int, workers: int):
+    """Adds w·a to v; every thread has sums of its own, and every so manyth body."""
+    prange = module().prange
+
+    def kick(w, v, y, m, e):
+        part = np.zeros((workers, 3, bodies))
+        for t in prange(workers):
+            ax, ay, az, x, y_, z = part[t, 0], part[t, 1], part[t, 2], y[0], y[1], y[2]
+            for i in range(t, bodies, workers):
+                xi, yi, zi, mi = x[i], y_[i], z[i], m[i]
+                sx = sy = sz = 0.0
+                for j in range(i + 1, bodies):
+                    dx, dy, dz = x[j] - xi, y_[j] - yi, z[j] - zi
+                    r = dx * dx + dy * dy + dz * dz + e
+                    f = 1.0 / (r * math.sqrt(r))
+                    to, back = f * m[j], f * mi
+                    sx += to * dx
+                    sy += to * dy
+                    sz += to * dz
+                    ax[j] -= back * dx
+                    ay[j] -= back * dy
+                    az[j] -= back * dz
+                ax[i] += sx
+                ay[i] += sy
+                az[i] += sz
+        for c in range(3):
+            for i in range(bodies):
+                for t in range(workers):
+                    v[c, i] += w * part[t, c, i]
+
+    return kick
+
+
+def all_directed_pairs(bodies: int, workers: int):
+    """Adds w·a to v; a body does not pull itself, as its distance is 0."""
+    prange = module().prange
+
+    def kick(w, v, y, m, e):
+        x, y_, z = y[0], y[1], y[2]
+        for i in prange(bodies):
+            xi, yi, zi = x[i], y_[i], z[i]
+            sx = sy = sz = 0.0
+            for j in range(bodies):
+                dx, dy, dz = x[j] - xi, y_[j] - yi, z[j] - zi
+                r = dx * dx + dy * dy + dz * dz + e
+                f = m[j] / (r * math.sqrt(r))
+                sx += f * dx
+                sy += f * dy
+                sz += f * dz
+            v[0, i] += w * sx
+            v[1, i] += w * sy
+            v[2, i] += w * sz
+
+    return kick
+
+
+def cluster(bodies: int, form: str, workers: int):
+    """One large system in space by leapfrog."""
+    compile_ = functools.partial(njit, parallel=True) if workers > 1 else njit
+    kick = compile_((each_pair_once if form == "once" else all_directed_pairs)(bodies, workers))
+
+    def run(h, steps, v_in, y_in, masses, softening):
+        v, y, m = np.empty((3, bodies)), np.empty((3, bodies)), h * masses[:, 0]
+        e = softening[0] * softening[0]
+        for i in range(bodies):
+            for c in range(3):
+                v[c, i], y[c, i] = v_in[i, c, 0], y_in[i, c, 0]
+        kick(0.5, v, y, m, e)
+        for step in range(steps):
+            for c in range(3):
+                for i in range(bodies):
+                    y[c, i] += h * v[c, i]
+            kick(0.5 if step == steps - 1 else 1.0, v, y, m, e)
+        return v.T.copy(), y.T.copy()
+
+    return njit(run)
+
+
 @functools.cache
-def compiled(kernel, shape):
-    """A kernel, and the seconds that it took to compile."""
-    run = kernel(*shape)
-    rows = [np.ones(1)] * (run.py_func.__code__.co_argcount - 2)
+def compiled(kernel, shape, axes):
+    """A kernel for arrays of so many axes, and the seconds that it took to compile."""
+    numba, run = module(), kernel(*shape)
     start = time.perf_counter()
-    run(0.01, 1, *rows)
+    run.compile((numba.float64, numba.int64, *(numba.types.Array(numba.float64, n, "C") for n in axes)))
     return run, time.perf_counter() - start
 
 
-def best(kernel, *shapes):
-    """The fastest of the shapes: (members, steps) at once, and what else the kernel takes."""
+def best(kernel, shapes, told, more=lambda work: 0):
+    """The fastest of the shapes that ``shapes`` finds for the work: what the kernel takes, and ``told`` puts into words."""
 
     def make(shape, work: Workload) -> Ready:
-        run, seconds = compiled(kernel, shape)
         rows = [np.ascontiguousarray(row) for row in work.data.values()]
-        note = "block {} × {} steps".format(*shape) + "".join(f", {sine} sine" for sine in shape[2:])
-        return Ready(lambda: run(work.dt, work.steps, *rows), f"{note}; JIT {seconds:.1f} s")
+        run, seconds = compiled(kernel, shape, tuple(row.ndim for row in rows))
+        return Ready(lambda: run(work.dt, work.steps, *rows), f"{told(shape)}; JIT {seconds:.1f} s", more(work))
 
     def ready(work: Workload, quick: bool) -> Ready:
-        fit = [s for s in shapes if (s[0] == 1) == (work.members == 1) and work.steps % s[1] == 0]
-        return fastest([functools.partial(make, shape) for shape in (fit[:1] if quick else fit)], work)
+        return fastest([functools.partial(make, shape) for shape in shapes(work, quick)], work)
 
     return ready
 
 
+def oscillators(kernel, *shapes):
+    """Of these, (members, steps) at once and what else the kernel takes, those that fit."""
+
+    def fit(work: Workload, quick: bool):
+        found = [s for s in shapes if (s[0] == 1) == (work.members == 1) and work.steps % s[1] == 0]
+        return found[:1] if quick else found
+
+    def told(shape) -> str:
+        return "block {} × {} steps".format(*shape) + "".join(f", {sine} sine" for sine in shape[2:])
+
+    return best(kernel, fit, told)
+
+
+def lanes(work: Workload, quick: bool):
+    """Members at once."""
+    found = (1,) if work.members == 1 else (64,) if quick else (8, 16, 32, 64, 128)
+    return [(work.bodies, work.dim, work.method, each) for each in found]
+
+
+def forms(work: Workload, quick: bool):
+    """Each pair once, or all directed pairs."""
+    return [(work.bodies, form, threads() if work.family == "shared_cluster" else 1) for form in ("once", "all")]
+
+
+BODIES = best(few_bodies, lanes, lambda shape: f"block {shape[3]}", lambda work: int(work.method == "leapfrog"))
+CLUSTER = best(cluster, forms, lambda shape: f"{shape[1]}" + f", threads {shape[2]}" * (shape[2] > 1), lambda work: 1)
 KERNELS = {
-    "free_false_euler": best(free_false_euler, *product((64, 128, 256, 512), (8, 4, 1)), *product((1,), (8, 64, 1))),
-    "forced_standard_heun": best(
+    "free_false_euler": oscillators(free_false_euler, *product((64, 128, 256, 512), (8, 4, 1)), *product((1,), (8, 64, 1))),
+    "forced_standard_heun": oscillators(
         forced_standard_heun,
         *product((64, 128, 512), (1, 2), ("polynomial",)),
         (64, 1, "libm"),
         *product((1,), (1, 8), ("polynomial", "libm")),
     ),
+    "bodies_false_euler": BODIES,
+    "bodies_leapfrog": BODIES,
+    "cluster_leapfrog": CLUSTER,
+    "shared_cluster_leapfrog": CLUSTER,
 }
 CONTESTANTS = [Contestant("numba", KERNELS)]

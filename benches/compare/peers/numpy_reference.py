@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from . import Contestant, stepwell_peer
 
-CONTESTANTS = [Contestant("NumPy reference", stepwell_peer.kernels(backend="numpy"), slow="steps")]
+CONTESTANTS = [Contestant("NumPy reference", stepwell_peer.kernels("shared_cluster_leapfrog", backend="numpy"), slow="steps")]

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from .. import unrolled
 from . import Contestant, Ready, Workload
 
 
@@ -48,5 +49,17 @@ def forced_standard_heun(work: Workload, quick: bool) -> Ready:
     return Ready(call)
 
 
-KERNELS = {"free_false_euler": free_false_euler, "forced_standard_heun": forced_standard_heun}
+def bodies(work: Workload, quick: bool) -> Ready:
+    """Each pair once, written out."""
+    run = unrolled.one_by_one(work.bodies, work.dim, work.method, {"sqrt": math.sqrt, "empty": np.empty})
+    rows = list(work.data.values())
+    return Ready(lambda: run(work.dt, work.steps, *rows), more=int(work.method == "leapfrog"))
+
+
+KERNELS = {
+    "free_false_euler": free_false_euler,
+    "forced_standard_heun": forced_standard_heun,
+    "bodies_false_euler": bodies,
+    "bodies_leapfrog": bodies,
+}
 CONTESTANTS = [Contestant("pure Python", KERNELS, slow="members")]

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 import functools
-import os
 
 import stepwell as sw
 
-from . import Contestant, Ready, Workload
-
-
-def threads() -> int:
-    """How many threads this process may use at once."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+from . import Contestant, Ready, Workload, threads
 
 
 def free(data) -> sw.System:
@@ -26,24 +20,43 @@ def forced(data) -> sw.System:
     return sw.Oscillator(omega=data["omega"], damping=data["damping"], a=push)
 
 
-def kernels(**how):
-    """What makes each kind of workload ready, by ``stepwell.integrate`` with these further arguments."""
-
-    def ready(system, method: str, work: Workload, quick: bool) -> Ready:
-        def call():
-            v, y = work.data["v"], work.data["y"]
-            run = sw.integrate(system(work.data), method, v=v, y=y, dt=work.dt, steps=work.steps, **how)
-            return run.v[-1], run.y[-1]
-
-        return Ready(call)
-
-    return {
-        "free_false_euler": functools.partial(ready, free, "false_euler"),
-        "forced_standard_heun": functools.partial(ready, forced, "standard_heun"),
-    }
+def bodies(data) -> sw.System:
+    """Bodies under Newton's law."""
+    return sw.NBody(data["masses"], force="newton", softening=data["softening"])
 
 
+SYSTEMS = {
+    "free_false_euler": (free, "false_euler"),
+    "forced_standard_heun": (forced, "standard_heun"),
+    "bodies_false_euler": (bodies, "false_euler"),
+    "bodies_leapfrog": (bodies, "leapfrog"),
+    "cluster_leapfrog": (bodies, "leapfrog"),
+    "shared_cluster_leapfrog": (bodies, "leapfrog"),
+}
+
+
+def made(system, method: str, how, work: Workload, quick: bool) -> Ready:
+    """A workload by ``stepwell.integrate`` with these further arguments."""
+    data = work.data
+    if work.members == 1 and data["v"].ndim > 1:  # one system has no axis of members
+        data = {name: row[..., 0] for name, row in data.items()}
+
+    def call():
+        run = sw.integrate(system(data), method, v=data["v"], y=data["y"], dt=work.dt, steps=work.steps, **how)
+        return run.v[-1], run.y[-1]
+
+    # Leapfrog goes half a kick back before the first step, and half a kick forward after the last.
+    return Ready(call, more=2 if method == "leapfrog" else 0)
+
+
+def kernels(*without: str, **how):
+    """What makes each kind of workload ready, but these, with these further arguments."""
+    return {kind: functools.partial(made, *what, how) for kind, what in SYSTEMS.items() if kind not in without}
+
+
+as_many_as_pay = kernels("cluster_leapfrog", threads=None)
+all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),
-    Contestant(f"stepwell, up to {threads()} threads", kernels(threads=None)),
+    Contestant(f"stepwell, up to {threads()} threads", as_many_as_pay | all_of_them),
 ]

@@ -16,15 +16,29 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Workload(ABC):
-    """A batch of systems, a method, a number of steps from t = 0, and the exact solution.
+class Unit:
+    """In what a speed is shown: so many pieces of work a second, or the time of a piece."""
 
-    ``data`` holds rows of one number per member: first ``v`` and ``y`` at the start, then the parameters, in the order
-    in which kernels take them. Peers look up ``kind`` to see whether they can do it.
+    name: str
+    scale: float
+    time: bool = False
+
+    def shown(self, rate: float) -> float:
+        """The number, from pieces of work a second."""
+        return self.scale / rate if self.time else rate / self.scale
+
+
+@dataclass(frozen=True)
+class Workload(ABC):
+    """A batch of systems, a method, a number of steps from t = 0, and the truth about the end.
+
+    ``data`` holds arrays whose last axis is that of the members: first ``v`` and ``y`` at the start, then the parameters, in the
+    order in which kernels take them. Peers look up ``kind`` to see whether they can do it.
     """
 
     kind: ClassVar[str]
     about: ClassVar[str]
+    unit: ClassVar[Unit] = Unit("G steps/s", 1e9)
     name: str
     data: Mapping[str, Array]
     dt: float
@@ -33,21 +47,36 @@ class Workload(ABC):
     @property
     def members(self) -> int:
         """How many members the batch has."""
-        return self.data["v"].size
+        return self.data["v"].shape[-1]
+
+    @property
+    def size(self) -> str:
+        """What the title says of the size."""
+        return f"{self.members:,} member(s)"
 
     @property
     def end(self) -> float:
         """The time at the end."""
         return self.steps * self.dt
 
+    def amount(self, evaluations: int) -> float:
+        """The pieces of work in a call that asks a member so often for its rates; here steps of members, however made."""
+        return self.members * self.steps
+
     def cut(self, *, members: int | None = None, steps: int | None = None) -> Self:
         """The same work with fewer members or fewer steps."""
-        data = {name: row[:members] for name, row in self.data.items()}
+        if (members or self.members) >= self.members and (steps or self.steps) >= self.steps:
+            return self  # which may know the truth already
+        data = {name: row[..., :members] for name, row in self.data.items()}
         return replace(self, data=data, steps=min(self.steps, steps or self.steps))
+
+    def quick(self) -> Self:
+        """A little of the work, to see that it is done right."""
+        return self.cut(members=2000, steps=2000 if self.members == 1 else 200)
 
     @abstractmethod
     def exact(self) -> tuple[Array, Array]:
-        """v and y at the end, by a formula."""
+        """v and y at the end, by a formula or by a better method."""
 
     @abstractmethod
     def bound(self) -> float:
