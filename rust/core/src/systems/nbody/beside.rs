@@ -3,6 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
 use super::{
+    SIDE,
     law::{phi, pull},
     meeting,
 };
@@ -20,55 +21,79 @@ pub(super) struct SideBySide<'a, const D: usize, const LAW: u8, const ENERGY: bo
     pub(super) out: &'a mut [[f64; L]],
 }
 
-/// What a body collects from one partner after the other.
-struct Sums<const D: usize, const L: usize> {
-    place: [[f64; L]; D],
-    strength: [f64; L],
-    pull: [[f64; L]; D],
-    well: [f64; L],
+/// One body, or what it collects from those after it and, as a partner, from those before it.
+type Row<const D: usize, const L: usize> = [[f64; L]; D];
+
+/// Body i meets its partner j; if they are the `FIRST` that both meet, the sums begin here.
+///
+/// One loop over the lanes around all of it, from memory to memory: it becomes straight vector code at every level.
+#[inline(always)]
+fn meet<const D: usize, const LAW: u8, const ENERGY: bool, const FIRST: bool, const L: usize>(
+    [y_i, y_j]: [&Row<D, L>; 2],
+    [strength_i, strength_j]: [&[f64; L]; 2],
+    soft: &[f64; L],
+    after: &mut Row<D, L>,
+    before: &mut Row<D, L>,
+    well: &mut [f64; L],
+) {
+    for l in 0..L {
+        let mut d = [0.0; D];
+        for c in 0..D {
+            d[c] = y_j[c][l] - y_i[c][l];
+        }
+        let mut r2 = d[0] * d[0];
+        for c in 1..D {
+            r2 += d[c] * d[c];
+        }
+        let r2 = r2 + soft[l];
+        let pull = pull::<LAW>(r2);
+        let (to_i, to_j) = (pull * strength_j[l], pull * strength_i[l]);
+        for c in 0..D {
+            after[c][l] = if FIRST { 0.0 } else { after[c][l] } + d[c] * to_i;
+            before[c][l] = if FIRST { 0.0 } else { before[c][l] } - d[c] * to_j;
+        }
+        if ENERGY {
+            well[l] = if FIRST { 0.0 } else { well[l] } + phi::<LAW>(r2, pull, strength_j[l], to_i);
+        }
+    }
 }
 
-impl<const D: usize, const L: usize> Sums<D, L> {
-    /// Meets one partner, whose sum of what came from before is `less`.
+impl<const D: usize, const LAW: u8, const ENERGY: bool, const L: usize> SideBySide<'_, D, LAW, ENERGY, L> {
+    /// Every body meets its partner at one distance.
+    ///
+    /// The indices are checked, and that is well: a loop over bodies without a way out would be taken several bodies at a time,
+    /// with gathers and scatters.
     #[inline(always)]
-    fn meet<const LAW: u8, const ENERGY: bool>(
-        &mut self,
-        place: &[[f64; L]; D],
-        strength: &[f64; L],
-        soft: &[f64; L],
-        less: &mut [[f64; L]; D],
-    ) {
-        let mut d = [[0.0; L]; D];
-        let mut r2 = [0.0; L];
-        for l in 0..L {
-            d[0][l] = place[0][l] - self.place[0][l];
-            r2[l] = d[0][l] * d[0][l];
+    fn round<const FIRST: bool>(&mut self, k: usize) {
+        let n = self.n;
+        let (y, strength) = (&self.y.as_chunks::<D>().0[..n], &self.strength[..n]);
+        let (after, before) = (self.after.as_chunks_mut::<D>().0, self.before.as_chunks_mut::<D>().0);
+        let (after, before) = (&mut after[..n], &mut before[..2 * n]);
+        let mut none = [0.0; L];
+        for i in 0..meeting(n, k) {
+            let well = if ENERGY { &mut self.potential[i] } else { &mut none };
+            let j = if i + k < n { i + k } else { i + k - n };
+            let (pair, strengths) = ([&y[i], &y[j]], [&strength[i], &strength[j]]);
+            meet::<D, LAW, ENERGY, FIRST, L>(pair, strengths, self.soft, &mut after[i], &mut before[i + k], well);
         }
-        for c in 1..D {
-            for l in 0..L {
-                d[c][l] = place[c][l] - self.place[c][l];
-                r2[l] += d[c][l] * d[c][l];
-            }
-        }
-        let (mut to_i, mut to_j, mut more) = ([0.0; L], [0.0; L], [0.0; L]);
-        for l in 0..L {
-            let r2 = r2[l] + soft[l];
-            let pull = pull::<LAW>(r2);
-            to_i[l] = pull * strength[l];
-            to_j[l] = pull * self.strength[l];
-            more[l] = if ENERGY { phi::<LAW>(r2, pull, strength[l], to_i[l]) } else { 0.0 };
-        }
-        let mut row = *less;
-        for c in 0..D {
-            for l in 0..L {
-                self.pull[c][l] += d[c][l] * to_i[l];
-                row[c][l] -= d[c][l] * to_j[l];
-            }
-        }
-        *less = row;
-        if ENERGY {
-            for l in 0..L {
-                self.well[l] += more[l];
+    }
+
+    /// Every body meets its partners from one distance to another, `SIDE` apart, before the next body does.
+    #[inline(always)]
+    fn rounds(&mut self, near: usize, last: usize) {
+        let n = self.n;
+        let (y, strength) = (&self.y.as_chunks::<D>().0[..n], &self.strength[..n]);
+        let (after, before) = (self.after.as_chunks_mut::<D>().0, self.before.as_chunks_mut::<D>().0);
+        let (after, before) = (&mut after[..n], &mut before[..2 * n]);
+        let mut none = [0.0; L];
+        for i in 0..meeting(n, near) {
+            let well = if ENERGY { &mut self.potential[i] } else { &mut none };
+            let mut k = near;
+            while k <= last && i < meeting(n, k) {
+                let j = if i + k < n { i + k } else { i + k - n };
+                let (pair, strengths) = ([&y[i], &y[j]], [&strength[i], &strength[j]]);
+                meet::<D, LAW, ENERGY, false, L>(pair, strengths, self.soft, &mut after[i], &mut before[i + k], well);
+                k += SIDE;
             }
         }
     }
@@ -76,44 +101,33 @@ impl<const D: usize, const L: usize> Sums<D, L> {
 
 impl<const D: usize, const LAW: u8, const ENERGY: bool, const L: usize> Task for SideBySide<'_, D, LAW, ENERGY, L> {
     #[inline(always)]
-    fn run(self) {
-        let Self { n, groups, y, strength, soft, after, before, potential, out } = self;
-        let (y, _) = y.as_chunks::<D>();
-        let (after, _) = after.as_chunks_mut::<D>();
-        let (before, _) = before.as_chunks_mut::<D>();
-        after.fill([[0.0; L]; D]);
-        before.fill([[0.0; L]; D]);
+    fn run(mut self) {
+        // A first round with one partner each writes most sums; only the others have to be cleared. It matters to few bodies.
+        let (one, groups) = match self.groups {
+            [(1, None), groups @ ..] => (true, groups),
+            groups => (false, groups),
+        };
+        let written = if one { meeting(self.n, 1) } else { 0 };
+        self.after[written * D..].fill([0.0; L]);
+        self.before[..D].fill([0.0; L]);
+        self.before[(written + 1) * D..].fill([0.0; L]);
         if ENERGY {
-            potential.fill([0.0; L]);
+            self.potential[written..].fill([0.0; L]);
         }
-        for &(first, second) in groups {
-            let count = meeting(n, first);
-            let (far, other) = second.map_or((0, 0), |k| (k, meeting(n, k)));
-            for i in 0..count {
-                let well = if ENERGY { potential[i] } else { [0.0; L] };
-                let mut sums = Sums { place: y[i], strength: strength[i], pull: after[i], well };
-                let j = if i + first < n { i + first } else { i + first - n };
-                sums.meet::<LAW, ENERGY>(&y[j], &strength[j], soft, &mut before[i + first]);
-                if i < other {
-                    let j = if i + far < n { i + far } else { i + far - n };
-                    sums.meet::<LAW, ENERGY>(&y[j], &strength[j], soft, &mut before[i + far]);
-                }
-                after[i] = sums.pull;
-                if ENERGY {
-                    potential[i] = sums.well;
-                }
+        if one {
+            self.round::<true>(1);
+        }
+        for &(near, last) in groups {
+            match last {
+                None => self.round::<false>(near),
+                Some(last) => self.rounds(near, last),
             }
         }
-        let (out, _) = out.as_chunks_mut::<D>();
-        let (low, high) = before.split_at(n);
-        for (((out, after), low), high) in out.iter_mut().zip(after).zip(low).zip(high) {
-            let mut row = [[0.0; L]; D];
-            for c in 0..D {
-                for l in 0..L {
-                    row[c][l] = after[c][l] + (low[c][l] + high[c][l]);
-                }
-            }
-            *out = row;
+        // Flat, or the loop would be taken over bodies, with one gather and one scatter for each number of a body.
+        let (low, high) = self.before.as_flattened().split_at(self.n * D * L);
+        let sums = self.after.as_flattened().iter().zip(low).zip(high);
+        for (out, ((after, low), high)) in self.out.as_flattened_mut().iter_mut().zip(sums) {
+            *out = after + (low + high);
         }
     }
 }
