@@ -9,7 +9,7 @@ use std::marker::PhantomData;
 use nalgebra::{Const, Dyn, OMatrix};
 
 use crate::{
-    block::{Block, Work},
+    block::{Block, Work, at_a_line},
     group::{Clock, Group, Spec, Width},
     isa::{Isa, Task, with_isa},
     stepper::Stepper,
@@ -24,7 +24,7 @@ pub const LANES: usize = 8;
 
 /// `n` rows of `L` lanes, all zero.
 pub fn zeros<const L: usize>(n: usize) -> Rows<L> {
-    Rows::<L>::zeros_generic(Const::<L>, Dyn(n))
+    at_a_line(|| Rows::<L>::zeros_generic(Const::<L>, Dyn(n)), |rows| rows.as_slice())
 }
 
 /// The rows as arrays of lanes.

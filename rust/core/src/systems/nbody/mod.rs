@@ -32,6 +32,7 @@ use self::{
     three::Three,
 };
 use crate::{
+    block::at_a_line,
     control::{EnergyControl, Projection, Way},
     error::Error,
     group::{Clock, Group, Spec, Width},
@@ -311,8 +312,10 @@ impl<const L: usize> Bodies<L> {
             Some(&"printed") => PRINTED,
             _ => LOGARITHMIC,
         };
+        let cleared = |n: usize| at_a_line(|| vec![[0.0; L]; n], |rows| rows.as_flattened());
         let row = |at: usize, scale: &dyn Fn(f64) -> f64| -> [f64; L] { std::array::from_fn(|l| scale(spec.at(at, member(l)))) };
-        let strength: Vec<[f64; L]> = (0..n).map(|i| row(i, &|m| h * m)).collect();
+        let mut strength = cleared(n);
+        strength.iter_mut().enumerate().for_each(|(i, strength)| *strength = row(i, &|m| h * m));
         // One system: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
         let (rounds, chunks) = if L == 1 { (2 * n + 4 * SIDE, n.next_multiple_of(SIDE)) } else { (2 * n, n) };
         let along = |i: usize| strength.get(i).map_or(0.0, |row| row[0]);
@@ -329,9 +332,9 @@ impl<const L: usize> Bodies<L> {
             mass: (0..n).map(|i| row(n + i, &|m| m)).collect(),
             half: (0..n).map(|i| row(n + i, &|m| (0.5 * h) * m)).collect(),
             soft: row(2 * n, &|e| e * e),
-            after: vec![[0.0; L]; dim * chunks],
-            before: vec![[0.0; L]; dim * rounds],
-            potential: vec![[0.0; L]; chunks],
+            after: cleared(dim * chunks),
+            before: cleared(dim * rounds),
+            potential: cleared(chunks),
             places: vec![vec![0.0; rounds]; dim],
             partners: (0..rounds).map(|i| along(i % n)).collect(),
             bodies: (0..chunks).map(along).collect(),
