@@ -6,18 +6,29 @@ from ..control import EnergyControl, Projection
 from ..log import log
 from ..types import Array, Blocks
 
-#: Sums over bodies are kept in this many parts, body i in part i mod LANES; partners are taken two at a time, so far apart.
+#: Sums over bodies are kept in this many parts, body i in part i mod LANES; distances that are taken together are so far apart.
 LANES = 8
 
 
-def partners(n: int) -> list[tuple[int, ...]]:
-    """The distances k at which body i meets body i + k, in the order in which they are summed: every pair once for k ≤ n/2."""
-    groups: list[tuple[int, ...]] = []
-    k = 1
-    while n // 2 - k + 1 >= 2 * LANES:
-        groups += [(k + q, k + q + LANES) for q in range(LANES)]
-        k += 2 * LANES
-    return groups + [(k,) for k in range(k, n // 2 + 1)]
+def partners(n: int) -> list[list[range]]:
+    """The distances k at which body i meets body i + k, every pair once for k ≤ n/2, in the order in which they are summed.
+
+    Distances that are LANES apart form a group, groups form slabs, and a slab has sums of its own.
+    """
+    if n < 64:
+        pairs = n // 2 // (2 * LANES) * (2 * LANES)
+        groups = [range(k, k + 2 * LANES, LANES) for first in range(1, pairs + 1, 2 * LANES) for k in range(first, first + LANES)]
+        return [groups + [range(k, k + 1) for k in range(pairs + 1, n // 2 + 1)]]
+    last = (n - 1) // 2
+    count = min(max(1, n // 256), 16)
+    length = -(-last // (count * LANES)) * LANES  # a whole number of LANES
+    slabs = [
+        [range(k, min(first + length, last + 1), LANES) for k in range(first, min(first + LANES, last + 1))]
+        for first in range(1, last + 1, length)
+    ]
+    if n % 2 == 0:
+        slabs[-1].append(range(n // 2, n // 2 + 1))  # opposite bodies
+    return slabs
 
 
 def total(values: Array) -> Array:
@@ -89,22 +100,26 @@ class NBody:
         them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps.
         """
         n = len(y)
-        after, before = np.zeros_like(y), np.zeros_like(np.concatenate([y, y]))
+        dv = np.zeros_like(y)
         twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
-        for group in partners(n):
-            pushes = []
-            for k in group:
-                m = k if 2 * k == n else n  # opposite bodies meet once
-                d = twice[k : k + m] - y[:m]
-                r2 = square(d) + self.soft
-                pull = 1.0 / (r2 * np.sqrt(r2)) if self.force == "newton" else 1.0 / r2
-                after[:m] = after[:m] + d * (pull * strength[k : k + m])[:, np.newaxis]
-                pushes.append((k, m, d * (pull * self.strength[:m])[:, np.newaxis]))
-                if potential is not None:
-                    potential[:m] = potential[:m] + self.phi(r2, pull, strength[k : k + m])
-            for k, m, push in reversed(pushes):
-                before[k : k + m] = before[k : k + m] - push
-        dv: Array = after + (before[:n] + before[n:])
+        for slab in partners(n):
+            after, before, wells = np.zeros_like(y), np.zeros_like(twice), np.zeros_like(y[:, 0])
+            for group in slab:
+                pushes = []
+                for k in group:
+                    m = k if 2 * k == n else n  # opposite bodies meet once
+                    d = twice[k : k + m] - y[:m]
+                    r2 = square(d) + self.soft
+                    pull = 1.0 / (r2 * np.sqrt(r2)) if self.force == "newton" else 1.0 / r2
+                    after[:m] = after[:m] + d * (pull * strength[k : k + m])[:, np.newaxis]
+                    pushes.append((k, m, d * (pull * self.strength[:m])[:, np.newaxis]))
+                    if potential is not None:
+                        wells[:m] = wells[:m] + self.phi(r2, pull, strength[k : k + m])
+                for k, m, push in reversed(pushes):
+                    before[k : k + m] = before[k : k + m] - push
+            dv = dv + (after + (before[:n] + before[n:]))
+            if potential is not None:
+                potential += wells
         return dv
 
     def phi(self, r2: Array, pull: Array, strength: Array) -> Array:

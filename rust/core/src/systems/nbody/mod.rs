@@ -24,7 +24,7 @@ mod record;
 mod three;
 
 use self::{
-    along::Along,
+    along::{Along, Round, Sums},
     beside::SideBySide,
     energy::{Back, Push},
     law::{LOGARITHMIC, NEWTON, PRINTED},
@@ -45,15 +45,33 @@ use crate::{
 
 /// Bodies that are taken side by side in a large system, and parts in which sums over bodies are kept.
 const SIDE: usize = 8;
-/// The distances k, in the order in which they are summed; two of them `SIDE` apart are taken together while both are there.
-fn partners(n: usize) -> Vec<(usize, Option<usize>)> {
-    let (mut groups, mut k) = (Vec::new(), 1);
-    while n / 2 + 1 >= 2 * SIDE + k {
-        groups.extend((k..k + SIDE).map(|k| (k, Some(k + SIDE))));
-        k += 2 * SIDE;
+/// Distances k from one to another, `SIDE` apart, or one alone. Each chunk of bodies meets all of a group before the next does.
+type Distances = (usize, Option<usize>);
+/// Bodies from which on a chunk meets all of a slab's distances that are `SIDE` apart, instead of two.
+const LONG: usize = 64;
+/// Bodies for each slab, and how many slabs there are at most.
+const SLAB: usize = 256;
+const SLABS: usize = 16;
+
+/// The distances k in groups, and the groups in slabs with sums of their own, in the order in which they are summed. It depends on
+/// the number of bodies alone, so that any number of threads may share the slabs.
+fn partners(n: usize) -> Vec<Vec<Distances>> {
+    if n < LONG {
+        let pairs = n / 2 / (2 * SIDE) * (2 * SIDE);
+        let long = (1..pairs + 1).step_by(2 * SIDE).flat_map(|k| (k..k + SIDE).map(|k| (k, Some(k + SIDE))));
+        return vec![long.chain((pairs + 1..n / 2 + 1).map(|k| (k, None))).collect()];
     }
-    groups.extend((k..n / 2 + 1).map(|k| (k, None)));
-    groups
+    let all = (n - 1) / 2;
+    let length = all.div_ceil((n / SLAB).clamp(1, SLABS)).next_multiple_of(SIDE);
+    let slab = |first: usize| {
+        let last = all.min(first + length - 1);
+        (first..last.min(first + SIDE - 1) + 1).map(|k| (k, Some(last - (last - k) % SIDE))).collect()
+    };
+    let mut slabs: Vec<Vec<Distances>> = (1..all + 1).step_by(length).map(slab).collect();
+    if let (Some(last), 0) = (slabs.last_mut(), n % 2) {
+        last.push((n / 2, None));
+    }
+    slabs
 }
 
 /// How many bodies meet a partner at this distance: all, but opposite ones meet once.
@@ -101,7 +119,7 @@ pub struct Bodies<const L: usize> {
     n: usize,
     kind: Kind,
     h: f64,
-    groups: Vec<(usize, Option<usize>)>,
+    slabs: Vec<Vec<Distances>>,
     /// h·G·m, m and ½·h·m of each body.
     strength: Vec<[f64; L]>,
     mass: Vec<[f64; L]>,
@@ -110,10 +128,11 @@ pub struct Bodies<const L: usize> {
     after: Vec<[f64; L]>,
     before: Vec<[f64; L]>,
     potential: Vec<[f64; L]>,
-    /// For one system: places, h·G·m of partners, and h·G·m of bodies, along the bodies, for two rounds and more.
-    places: Vec<Vec<f64>>,
-    partners: Vec<f64>,
-    bodies: Vec<f64>,
+    /// What a slab after the first brings.
+    slab: (Rows<L>, Vec<[f64; L]>),
+    /// For one system: the bodies along the lanes, and what they collect.
+    round: Round,
+    sums: Sums,
     control: Option<EnergyControl<L>>,
     projection: Option<Projection<L>>,
     /// What to record of a state.
@@ -270,17 +289,27 @@ impl Bodies<{ rows::LANES }> {
     // Never inlined: the kernels stand once in the core, not once in every stage of every method.
     #[inline(never)]
     fn meet(&mut self, energy: bool, y: &Rows<{ rows::LANES }>, out: &mut Rows<{ rows::LANES }>) {
-        meet!(self.kind, energy, SideBySide {
-            n: self.n,
-            groups: &self.groups,
-            y: lanes(y),
-            strength: &self.strength,
-            soft: &self.soft,
-            after: &mut self.after,
-            before: &mut self.before,
-            potential: &mut self.potential,
-            out: lanes_mut(out),
-        });
+        for (i, groups) in self.slabs.iter().enumerate() {
+            let (force, potential) = if i == 0 { (&mut *out, &mut self.potential) } else { (&mut self.slab.0, &mut self.slab.1) };
+            meet!(self.kind, energy, SideBySide {
+                n: self.n,
+                groups,
+                y: lanes(y),
+                strength: &self.strength,
+                soft: &self.soft,
+                after: &mut self.after,
+                before: &mut self.before,
+                potential,
+                out: lanes_mut(force),
+            });
+            if i > 0 {
+                *out += &self.slab.0;
+            }
+            if i > 0 && energy {
+                let (whole, slab) = (self.potential.as_flattened_mut(), self.slab.1.as_flattened());
+                whole.iter_mut().zip(slab).for_each(|(whole, slab)| *whole += slab);
+            }
+        }
     }
 }
 
@@ -288,19 +317,21 @@ impl Bodies<1> {
     // Never inlined: the kernels stand once in the core, not once in every stage of every method.
     #[inline(never)]
     fn meet(&mut self, energy: bool, y: &Rows<1>, out: &mut Rows<1>) {
-        meet!(self.kind, energy, Along {
-            n: self.n,
-            groups: &self.groups,
-            y: y.as_slice(),
-            places: &mut self.places,
-            partners: &self.partners,
-            bodies: &self.bodies,
-            soft: self.soft[0],
-            after: self.after.as_flattened_mut(),
-            before: self.before.as_flattened_mut(),
-            potential: self.potential.as_flattened_mut(),
-            out: out.as_mut_slice(),
-        });
+        match self.kind.dim {
+            2 => self.round.fill::<2>(y.as_slice()),
+            _ => self.round.fill::<3>(y.as_slice()),
+        }
+        for (i, groups) in self.slabs.iter().enumerate() {
+            meet!(self.kind, energy, Along {
+                n: self.n,
+                groups,
+                round: &self.round,
+                sums: &mut self.sums,
+                more: i > 0,
+                potential: self.potential.as_flattened_mut(),
+                out: out.as_mut_slice(),
+            });
+        }
     }
 }
 
@@ -316,9 +347,19 @@ impl<const L: usize> Bodies<L> {
         let row = |at: usize, scale: &dyn Fn(f64) -> f64| -> [f64; L] { std::array::from_fn(|l| scale(spec.at(at, member(l)))) };
         let mut strength = cleared(n);
         strength.iter_mut().enumerate().for_each(|(i, strength)| *strength = row(i, &|m| h * m));
+        let slabs = partners(n);
         // One system: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
-        let (rounds, chunks) = if L == 1 { (2 * n + 4 * SIDE, n.next_multiple_of(SIDE)) } else { (2 * n, n) };
+        let (rounds, chunks) = if L == 1 { (2 * n + 4 * SIDE, n.next_multiple_of(SIDE)) } else { (0, 0) };
         let along = |i: usize| strength.get(i).map_or(0.0, |row| row[0]);
+        let round = Round {
+            places: vec![vec![0.0; rounds]; dim],
+            partners: (0..rounds).map(|i| along(i % n)).collect(),
+            bodies: (0..chunks).map(along).collect(),
+            soft: row(2 * n, &|e| e * e)[0],
+        };
+        let sums = Sums::new(&round);
+        let beside = if L == 1 { 0 } else { n };
+        let again = if slabs.len() > 1 { beside } else { 0 };
         let keeps = spec.options.get(1).copied().unwrap_or_default();
         let control = keeps.starts_with("control:").then(|| EnergyControl::new(spec, keeps == "control:limited", 2 * n + 1, h, &member));
         let way = if keeps == "project:nacozy" { Way::Nacozy } else { Way::Scaling };
@@ -328,16 +369,16 @@ impl<const L: usize> Bodies<L> {
             n,
             kind: Kind { law, dim, level: clock.level },
             h,
-            groups: partners(n),
+            slabs,
             mass: (0..n).map(|i| row(n + i, &|m| m)).collect(),
             half: (0..n).map(|i| row(n + i, &|m| (0.5 * h) * m)).collect(),
             soft: row(2 * n, &|e| e * e),
-            after: cleared(dim * chunks),
-            before: cleared(dim * rounds),
-            potential: cleared(chunks),
-            places: vec![vec![0.0; rounds]; dim],
-            partners: (0..rounds).map(|i| along(i % n)).collect(),
-            bodies: (0..chunks).map(along).collect(),
+            after: cleared(dim * beside),
+            before: cleared(2 * dim * beside),
+            potential: cleared(n),
+            slab: (zeros(dim * again), cleared(again)),
+            round,
+            sums,
             record: quantities(spec).collect(),
             work: [0.0; L],
             at_hand: false,
