@@ -147,10 +147,16 @@ pub struct Bodies<const L: usize> {
 }
 impl<const L: usize> Bodies<L> {
     fn push(&mut self, v: &Rows<L>, out: &mut Rows<L>) {
+        match self.kind.dim {
+            2 => self.push_in::<2>(v, out),
+            _ => self.push_in::<3>(v, out),
+        }
+    }
+
+    fn push_in<const D: usize>(&mut self, v: &Rows<L>, out: &mut Rows<L>) {
         let Some(control) = &self.control else { return };
-        let task = Push {
+        let task = Push::<D, L> {
             n: self.n,
-            dim: self.kind.dim,
             control,
             mass: &self.mass,
             half: &self.half,
@@ -168,10 +174,16 @@ impl<const L: usize> Bodies<L> {
     }
 
     fn back(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
+        match self.kind.dim {
+            2 => self.back_in::<2>(v, y),
+            _ => self.back_in::<3>(v, y),
+        }
+    }
+
+    fn back_in<const D: usize>(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
         let Some(projection) = &self.projection else { return };
-        let task = Back {
+        let task = Back::<D, L> {
             n: self.n,
-            dim: self.kind.dim,
             h: self.h,
             projection,
             mass: &self.mass,

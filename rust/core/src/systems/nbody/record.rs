@@ -68,7 +68,11 @@ impl<const L: usize> Task for Record<'_, L> {
             at += rows.len();
             match quantity {
                 Quantity::Energy => {
-                    let (_, energy) = energies(n, dim, mass, half, potential, v);
+                    let (_, energy) = if dim == 2 {
+                        energies::<L, 2>(n, mass, half, potential, v)
+                    } else {
+                        energies::<L, 3>(n, mass, half, potential, v)
+                    };
                     rows[0] = energy.map(|e| e / h);
                 }
                 Quantity::Momentum => {
