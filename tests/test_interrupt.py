@@ -17,6 +17,7 @@ RUNS = {
     "threads": "sw.integrate(sw.Oscillator(np.ones(10**5)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**7, threads=2)",
     "one member": "sw.integrate(sw.Oscillator(1.0), 'false_euler', v=0.0, y=1.0, dt=0.1, steps=10**11)",
     "one large member": "sw.integrate(sw.Chain(2 * 10**5), 'rk4', v=0.0, y=np.ones(2 * 10**5), dt=0.1, steps=10**6)",
+    "many bodies": "sw.integrate(sw.NBody(np.ones(1500)), 'leapfrog', v=0.0, y=np.random.rand(1500, 2), dt=1e-6, steps=10**6)",
     "a matrix": "sw.integrate(sw.Oscillator(np.ones(10**4)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, form='matrix')",
     "a world": "sw.World(sw.Oscillator(1.0), 'rk4', v=np.zeros(1), y=np.ones(1), dt=0.1).step(10**11)",
     "with a bar": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**11, progress=True)",

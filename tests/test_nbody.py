@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from cases import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepwell.reference.systems.nbody import partners
 
 EPS = float(np.finfo(float).eps)
 METHODS = [m.name for m in sw.methods()]
@@ -162,3 +164,55 @@ def test_threads_share_systems_and_change_no_bit() -> None:
     runs = [sw.integrate(system, "leapfrog", v=v, y=y, dt=0.01, steps=20, threads=k) for k in (1, 2, 3)]
     for run in runs[1:]:
         np.testing.assert_array_equal(run.y, runs[0].y)
+
+
+#: Bodies around every border: of chunks of eight, of the groups from 64 on, and of the slabs.
+BORDERS = [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 48, 63, 64, 65, 66, 72, 127, 128, 130, 511, 512, 513, 514, 768]
+
+
+@pytest.mark.parametrize("n", BORDERS)
+def test_one_system_equals_the_reference(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(n)
+    v, y = rng.normal(size=(2, n, 3))
+    for force, dim in (("newton", 3), ("logarithmic", 2), ("printed", 3)):
+        system = sw.NBody(rng.uniform(0.5, 2.0, n) / n, force=force, softening=0.1, dim=dim)
+        for control in (None, sw.EnergyControl(0.7, "limited", target=0.1), sw.Projection("nacozy"), sw.Projection()):
+            arguments: dict[str, Any] = {"v": v[:, :dim], "y": y[:, :dim], "dt": 0.01, "steps": 2, "control": control}
+            reference = sw.integrate(system, "false_euler", **arguments, backend="numpy")
+            for level in sw.isa_levels():
+                monkeypatch.setenv("STEPWELL_ISA", level)
+                assert_same(sw.integrate(system, "false_euler", **arguments), reference)
+
+
+@pytest.mark.parametrize("n", [1023, 1024, 1100, 2050])
+@pytest.mark.parametrize("control", [None, sw.EnergyControl(0.7, "limited", target=0.1), sw.Projection("nacozy")])
+def test_threads_share_the_distances_of_one_system(n: int, control: sw.EnergyControl | sw.Projection | None) -> None:
+    rng = np.random.default_rng(n)
+    system = sw.NBody(rng.uniform(0.5, 2.0, n) / n, force="newton", softening=0.1, dim=3)
+    v, y = rng.normal(size=(2, n, 3))
+    arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 2, "control": control}
+    reference = sw.integrate(system, "false_euler", **arguments, backend="numpy")
+    for threads in (None, 1, 2, 3, 40):
+        assert_same(sw.integrate(system, "false_euler", **arguments, threads=threads), reference)
+    world = sw.World(system, "false_euler", v=v.copy(), y=y.copy(), dt=0.01) if control is None else None
+    if world is not None:
+        world.step(2)
+        np.testing.assert_array_equal(world.y, reference.y[-1])
+
+
+@pytest.mark.parametrize("n", [40, 65, 513])
+def test_several_large_systems_equal_the_reference(n: int) -> None:
+    rng = np.random.default_rng(n)
+    system = sw.NBody(rng.uniform(0.5, 2.0, n) / n, force="newton", softening=0.1)
+    v, y = rng.normal(size=(2, n, 2, 9))
+    for control in (None, sw.EnergyControl(0.7, "limited", target=0.1)):
+        arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 2, "control": control}
+        runs = [sw.integrate(system, "false_euler", **arguments, backend=name) for name in ("rust", "numpy")]
+        assert_same(*runs)
+
+
+def test_every_pair_meets_once() -> None:
+    for n in [*range(1, 1300), 4096, 8191, 8192, 70001]:
+        distances = [k for slab in partners(n) for group in slab for k in group]
+        assert sorted(distances) == list(range(1, n // 2 + 1))
+        assert len(partners(n)) <= 16

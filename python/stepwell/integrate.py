@@ -74,7 +74,7 @@ def integrate(
         control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
-        threads: how many threads share the members; None for as many as pay.
+        threads: how many threads share the members, or the pairs of many bodies; None for as many as pay.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
         progress: show a progress bar (needs rich).
 

@@ -191,7 +191,7 @@ impl Kernel {
             "" => Model::Matrix { spec, nodes, v_rows: v.len() },
             method => Model::Direct { spec, method },
         };
-        let clock = Clock { t0: 0.0, h: H, start: 0, level };
+        let clock = Clock { t0: 0.0, h: H, start: 0, level, threads: 1 };
         let mut group = match model.group(&clock, width) {
             Err(Error::VelocityDependent { .. }) => return Ok(None),
             made => made?,

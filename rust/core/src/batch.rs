@@ -143,6 +143,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         n => n,
     };
     let threads = threads.min(groups).max(1);
+    // A group alone may have all threads for itself; it knows whether they pay.
+    let clock = Clock { threads: if groups == 1 { plan.threads } else { 1 }, ..plan.clock };
     // Several shares a thread, so that one that is late does not keep the others waiting.
     let shares = if threads == 1 { 1 } else { groups.min(threads * 4) };
     let shares: Vec<usize> = (0..shares)
@@ -179,7 +181,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
             .map(|_| {
                 scope.spawn(|| {
                     let _leave = Leave(&busy, &caller);
-                    let mut worker = Worker::new(plan, None)?;
+                    let mut worker = Worker::new(plan, &clock, None)?;
                     while let Some(part) = take() {
                         worker.part(part, &mut |n| {
                             done.fetch_add(n, Relaxed);
@@ -202,7 +204,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
             !stop.load(Relaxed)
         };
         let mine = || {
-            let mut worker = Worker::new(plan, Some(wide))?;
+            let mut worker = Worker::new(plan, &clock, Some(wide))?;
             while let Some(part) = take() {
                 worker.part(part, &mut go_on)?;
             }
@@ -247,12 +249,12 @@ struct Worker<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(plan: &'a Plan<'a>, wide: Option<Box<dyn Group>>) -> Result<Self, Error> {
+    fn new(plan: &'a Plan<'a>, clock: &Clock, wide: Option<Box<dyn Group>>) -> Result<Self, Error> {
         let wide = match wide {
             Some(group) => group,
-            None => plan.model.group(&plan.clock, Width::Wide)?,
+            None => plan.model.group(clock, Width::Wide)?,
         };
-        let narrow = plan.model.group(&plan.clock, Width::Narrow)?;
+        let narrow = plan.model.group(clock, Width::Narrow)?;
         Ok(Worker { plan, wide, narrow, good: Default::default() })
     }
 
@@ -308,28 +310,35 @@ impl Job<'_, '_> {
         }
         self.remember();
 
-        let (mut k, mut looked) = (plan.first, plan.first);
+        let (mut k, mut looked, mut told) = (plan.first, plan.first, plan.first);
+        // A step of many bodies costs more than their numbers tell: whoever is large begins with one and shows how long it takes.
+        let mut piece = if at_once < LOOK { 1 } else { at_once };
         for (i, save) in saves(plan.steps, plan.every).enumerate() {
             let until = plan.first + save;
             while k < until {
-                let n = (until - k).min(looked + at_once - k);
+                let n = (until - k).min(looked + at_once - k).min(piece);
+                let began = Instant::now();
                 self.group.advance(k, n);
                 k += n;
+                piece = if began.elapsed() > POLL { (n / 2).max(1) } else { at_once.min(2 * piece) };
                 if k - looked == at_once {
                     self.look(looked, k);
                     looked = k;
-                    if !go_on((at_once * self.count as i64) as u64) {
+                }
+                if k == looked || piece < LOOK {
+                    if !go_on(((k - told) * self.count as i64) as u64) {
                         return false;
                     }
+                    told = k;
                 }
             }
             self.save(i, k);
         }
         if k > looked {
             self.look(looked, k);
-            if !go_on(((k - looked) * self.count as i64) as u64) {
-                return false;
-            }
+        }
+        if k > told && !go_on(((k - told) * self.count as i64) as u64) {
+            return false;
         }
         put(&mut self.part.carry, self.from, self.count, self.group.slots().0, lanes);
         put(&mut self.part.tally, self.from, self.count, self.group.tally(), lanes);

@@ -88,6 +88,8 @@ pub struct Clock {
     pub start: usize,
     /// What the hot loop may use.
     pub level: Level,
+    /// How many threads one force of one large system may use; zero for as many as there are.
+    pub threads: usize,
 }
 
 impl Clock {

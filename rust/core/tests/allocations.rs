@@ -25,7 +25,7 @@ fn a_step_allocates_nothing() {
         linear.rows = (0..6 * 7 + 3).map(|_| Row(&one)).collect();
         for (spec, size) in [(free, 1), (chain, 4), (linear, 3)] {
             let model = Model::Direct { spec, method: record.name };
-            let clock = Clock { t0: 0.0, h: 0.1, start: 0, level: Level::choose().unwrap() };
+            let clock = Clock { t0: 0.0, h: 0.1, start: 0, level: Level::choose().unwrap(), threads: 1 };
             let mut world = World::new(&model, clock, 100, record.carry.is_some(), 0).unwrap();
             let (mut v, mut y) = (vec![0.0; 100 * size], vec![1.0; 100 * size]);
             world.step(1, &mut v, &mut y); // what a carry needs is made at the first step

@@ -13,7 +13,7 @@ use stepwell_core::{
 };
 
 fn clock(h: f64) -> Clock {
-    Clock { t0: 0.0, h, start: 0, level: Level::choose().unwrap() }
+    Clock { t0: 0.0, h, start: 0, level: Level::choose().unwrap(), threads: 1 }
 }
 
 fn oscillators<'a>(omega: &'a [f64], method: &'a str) -> Model<'a> {

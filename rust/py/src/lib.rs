@@ -93,7 +93,7 @@ fn run(
     mut first_bad: PyReadwriteArray1<'_, i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<()> {
-    let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)? };
+    let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)?, threads };
     let arrays = Arrays {
         saved_v: saved_v.as_slice_mut()?,
         saved_y: saved_y.as_slice_mut()?,

@@ -53,7 +53,7 @@ impl World {
         v: Py<PyArrayDyn<f64>>,
         y: Py<PyArrayDyn<f64>>,
     ) -> PyResult<Self> {
-        let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)? };
+        let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)?, threads: 1 };
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
         let world =

@@ -8,39 +8,38 @@ use crate::{
     isa::Task,
 };
 
-/// Σ over the bodies, body i in part i mod `SIDE`, then part after part.
+/// Σ of values of the bodies' weights and something of theirs: body i in part i mod `SIDE`, then part after part.
 ///
 /// `SIDE` bodies are taken at once, so that one system has a vector of them, as several have one of lanes.
 #[inline(always)]
-pub(super) fn total<const L: usize>(n: usize, value: impl Fn(usize, usize) -> f64) -> [f64; L] {
+pub(super) fn total<const L: usize, B>(
+    weights: &[[f64; L]],
+    bodies: &[B],
+    value: impl Fn(usize, &[f64; L], &B, usize) -> f64,
+) -> [f64; L] {
     let mut parts = [[0.0; L]; SIDE];
-    let used = n.min(SIDE);
-    for (i, part) in parts[..used].iter_mut().enumerate() {
-        for l in 0..L {
-            part[l] = value(i, l);
-        }
-    }
-    let whole = n - n % SIDE;
-    for first in (SIDE..whole).step_by(SIDE) {
-        let mut more = [[0.0; L]; SIDE];
+    let ((chunks, some), (of, more)) = (weights.as_chunks::<SIDE>(), bodies.as_chunks::<SIDE>());
+    for (chunk, (weights, bodies)) in chunks.iter().zip(of).enumerate() {
+        let mut values = [[0.0; L]; SIDE];
         for i in 0..SIDE {
             for l in 0..L {
-                more[i][l] = value(first + i, l);
+                values[i][l] = value(SIDE * chunk + i, &weights[i], &bodies[i], l);
             }
         }
         for i in 0..SIDE {
             for l in 0..L {
-                parts[i][l] += more[i][l];
+                parts[i][l] = if chunk == 0 { values[i][l] } else { parts[i][l] + values[i][l] };
             }
         }
     }
-    for i in whole.max(SIDE)..n {
+    for (i, (weight, body)) in some.iter().zip(more).enumerate() {
         for l in 0..L {
-            parts[i - whole][l] += value(i, l);
+            let value = value(SIDE * chunks.len() + i, weight, body, l);
+            parts[i][l] = if chunks.is_empty() { value } else { parts[i][l] + value };
         }
     }
     let mut sum = parts[0];
-    for part in &parts[1..used] {
+    for part in &parts[1..weights.len().clamp(1, SIDE)] {
         for l in 0..L {
             sum[l] += part[l];
         }
@@ -50,10 +49,10 @@ pub(super) fn total<const L: usize>(n: usize, value: impl Fn(usize, usize) -> f6
 
 /// |v|² of a body in a lane.
 #[inline(always)]
-fn square<const L: usize, const D: usize>(v: &[[[f64; L]; D]], i: usize, l: usize) -> f64 {
-    let mut square = v[i][0][l] * v[i][0][l];
+fn square<const L: usize, const D: usize>(v: &[[f64; L]; D], l: usize) -> f64 {
+    let mut square = v[0][l] * v[0][l];
     for c in 1..D {
-        square += v[i][c][l] * v[i][c][l];
+        square += v[c][l] * v[c][l];
     }
     square
 }
@@ -61,16 +60,13 @@ fn square<const L: usize, const D: usize>(v: &[[[f64; L]; D]], i: usize, l: usiz
 /// h times the kinetic and h times the whole energy.
 #[inline(always)]
 pub(super) fn energies<const L: usize, const D: usize>(
-    n: usize,
     mass: &[[f64; L]],
     half: &[[f64; L]],
     potential: &[[f64; L]],
     v: &[[f64; L]],
 ) -> ([f64; L], [f64; L]) {
-    // Of one length each: the loops need not ask.
-    let (mass, half, potential, v) = (&mass[..n], &half[..n], &potential[..n], &v.as_chunks::<D>().0[..n]);
-    let kinetic = total(n, |i, l| half[i][l] * square(v, i, l));
-    let potential = total::<L>(n, |i, l| mass[i][l] * potential[i][l]);
+    let kinetic = total::<L, [[f64; L]; D]>(half, v.as_chunks().0, |_, half, v, l| half[l] * square(v, l));
+    let potential = total(mass, potential, |_, mass, potential, l| mass[l] * potential[l]);
     let mut energy = kinetic;
     for l in 0..L {
         energy[l] += potential[l];
@@ -80,7 +76,6 @@ pub(super) fn energies<const L: usize, const D: usize>(
 
 /// Sets a state back onto its energy.
 pub(super) struct Back<'a, const D: usize, const L: usize> {
-    pub(super) n: usize,
     pub(super) h: f64,
     pub(super) projection: &'a Projection<L>,
     pub(super) mass: &'a [[f64; L]],
@@ -96,8 +91,8 @@ pub(super) struct Back<'a, const D: usize, const L: usize> {
 impl<const D: usize, const L: usize> Task for Back<'_, D, L> {
     #[inline(always)]
     fn run(self) {
-        let Self { n, h, projection, mass, half, potential, dv, v, y, work } = self;
-        let (kinetic, energy) = energies::<L, D>(n, mass, half, potential, v);
+        let Self { h, projection, mass, half, potential, dv, v, y, work } = self;
+        let (kinetic, energy) = energies::<L, D>(mass, half, potential, v);
         let off = projection.off(&energy);
         if projection.way == Way::Scaling {
             let factor = projection.factor(&kinetic, &off);
@@ -120,13 +115,13 @@ impl<const D: usize, const L: usize> Task for Back<'_, D, L> {
             }
             square
         };
-        let norm = total::<L>(n, |i, l| length(v, 1.0, i, l) + length(dv, h, i, l));
+        let norm = total(mass, mass, |i, _, _, l| length(v, 1.0, i, l) + length(dv, h, i, l));
         let mut step = [0.0; L];
         for l in 0..L {
             step[l] = (off[l] / h) / norm[l];
             work[l] -= off[l];
         }
-        for r in 0..n * D {
+        for r in 0..v.len() {
             for l in 0..L {
                 y[r][l] += step[l] * along(dv, h, r, l);
                 v[r][l] -= step[l] * along(v, 1.0, r, l);
@@ -137,7 +132,6 @@ impl<const D: usize, const L: usize> Task for Back<'_, D, L> {
 
 /// Adds −g·v to an increment, of the energy that was found beside the force.
 pub(super) struct Push<'a, const D: usize, const L: usize> {
-    pub(super) n: usize,
     pub(super) control: &'a EnergyControl<L>,
     pub(super) mass: &'a [[f64; L]],
     pub(super) half: &'a [[f64; L]],
@@ -151,7 +145,7 @@ pub(super) struct Push<'a, const D: usize, const L: usize> {
 impl<const D: usize, const L: usize> Task for Push<'_, D, L> {
     #[inline(always)]
     fn run(self) {
-        let (kinetic, energy) = energies::<L, D>(self.n, self.mass, self.half, self.potential, self.v);
+        let (kinetic, energy) = energies::<L, D>(self.mass, self.half, self.potential, self.v);
         let g = self.control.push(&kinetic, &energy);
         for l in 0..L {
             self.work[l] -= (g[l] * (2.0 - g[l])) * kinetic[l];

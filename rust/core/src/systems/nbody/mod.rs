@@ -21,10 +21,14 @@ mod beside;
 mod energy;
 mod law;
 mod record;
+mod share;
 mod three;
+
+use std::thread;
 
 use self::{
     along::{Along, Round, Sums},
+    share::{Share, add, share},
     beside::SideBySide,
     energy::{Back, Push},
     law::{LOGARITHMIC, NEWTON, PRINTED},
@@ -52,6 +56,8 @@ const LONG: usize = 64;
 /// Bodies for each slab, and how many slabs there are at most.
 const SLAB: usize = 256;
 const SLABS: usize = 16;
+/// Bodies from which on threads pay, which are started anew for each force: that takes some hundredths of a millisecond.
+const THREADED: usize = 1024;
 
 /// The distances k in groups, and the groups in slabs with sums of their own, in the order in which they are summed. It depends on
 /// the number of bodies alone, so that any number of threads may share the slabs.
@@ -132,7 +138,10 @@ pub struct Bodies<const L: usize> {
     slab: (Rows<L>, Vec<[f64; L]>),
     /// For one system: the bodies along the lanes, and what they collect.
     round: Round,
-    sums: Sums,
+    /// One for each thread.
+    sums: Vec<Sums>,
+    /// One for each slab, if there are several threads.
+    shares: Vec<Share>,
     control: Option<EnergyControl<L>>,
     projection: Option<Projection<L>>,
     /// What to record of a state.
@@ -156,7 +165,6 @@ impl<const L: usize> Bodies<L> {
     fn push_in<const D: usize>(&mut self, v: &Rows<L>, out: &mut Rows<L>) {
         let Some(control) = &self.control else { return };
         let task = Push::<D, L> {
-            n: self.n,
             control,
             mass: &self.mass,
             half: &self.half,
@@ -173,6 +181,20 @@ impl<const L: usize> Bodies<L> {
         self.at_hand && y.as_slice().iter().zip(self.y.as_slice()).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
+    fn record_in<const D: usize>(&self, v: &Rows<L>, y: &Rows<L>, rows: &mut [f64]) {
+        let task = Record::<D, L> {
+            h: self.h,
+            what: &self.record,
+            mass: &self.mass,
+            half: &self.half,
+            potential: &self.potential,
+            v: lanes(v),
+            y: lanes(y),
+            rows: rows.as_chunks_mut().0,
+        };
+        with_isa!(self.kind.level, |isa| isa.run(task));
+    }
+
     fn back(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
         match self.kind.dim {
             2 => self.back_in::<2>(v, y),
@@ -183,7 +205,6 @@ impl<const L: usize> Bodies<L> {
     fn back_in<const D: usize>(&mut self, v: &mut Rows<L>, y: &mut Rows<L>) {
         let Some(projection) = &self.projection else { return };
         let task = Back::<D, L> {
-            n: self.n,
             h: self.h,
             projection,
             mass: &self.mass,
@@ -249,19 +270,10 @@ macro_rules! bodies {
         }
 
         fn record(&mut self, v: &Self::V, y: &Self::Y, rows: &mut [f64]) {
-            let task = Record {
-                n: self.n,
-                dim: self.kind.dim,
-                h: self.h,
-                what: &self.record,
-                mass: &self.mass,
-                half: &self.half,
-                potential: &self.potential,
-                v: lanes(v),
-                y: lanes(y),
-                rows: rows.as_chunks_mut().0,
-            };
-            with_isa!(self.kind.level, |isa| isa.run(task));
+            match self.kind.dim {
+                2 => self.record_in::<2>(v, y, rows),
+                _ => self.record_in::<3>(v, y, rows),
+            }
         }
 
         fn tally(&self) -> &[f64] {
@@ -315,11 +327,10 @@ impl Bodies<{ rows::LANES }> {
                 out: lanes_mut(force),
             });
             if i > 0 {
-                *out += &self.slab.0;
+                add(out.as_mut_slice(), self.slab.0.as_slice(), true);
             }
             if i > 0 && energy {
-                let (whole, slab) = (self.potential.as_flattened_mut(), self.slab.1.as_flattened());
-                whole.iter_mut().zip(slab).for_each(|(whole, slab)| *whole += slab);
+                add(self.potential.as_flattened_mut(), self.slab.1.as_flattened(), true);
             }
         }
     }
@@ -333,16 +344,24 @@ impl Bodies<1> {
             2 => self.round.fill::<2>(y.as_slice()),
             _ => self.round.fill::<3>(y.as_slice()),
         }
-        for (i, groups) in self.slabs.iter().enumerate() {
-            meet!(self.kind, energy, Along {
-                n: self.n,
-                groups,
-                round: &self.round,
-                sums: &mut self.sums,
-                more: i > 0,
-                potential: self.potential.as_flattened_mut(),
-                out: out.as_mut_slice(),
-            });
+        let (n, kind, round) = (self.n, self.kind, &self.round);
+        let (out, potential) = (out.as_mut_slice(), self.potential.as_flattened_mut());
+        if let [sums] = &mut self.sums[..] {
+            for (i, groups) in self.slabs.iter().enumerate() {
+                meet!(kind, energy, Along { n, groups, round, sums, more: i > 0, potential, out });
+            }
+            return;
+        }
+        share(&self.slabs, &mut self.shares, &mut self.sums, |groups, share, sums| {
+            let (potential, out) = (&mut share.potential[..], &mut share.force[..]);
+            meet!(kind, energy, Along { n, groups, round, sums, more: false, potential, out });
+        });
+        // Slab after slab, whichever was ready first.
+        for (i, share) in self.shares.iter().enumerate() {
+            add(out, &share.force, i > 0);
+            if energy {
+                add(potential, &share.potential, i > 0);
+            }
         }
     }
 }
@@ -369,7 +388,14 @@ impl<const L: usize> Bodies<L> {
             bodies: (0..chunks).map(along).collect(),
             soft: row(2 * n, &|e| e * e)[0],
         };
-        let sums = Sums::new(&round);
+        let threads = match clock.threads {
+            _ if L > 1 || n < THREADED => 1,
+            0 => thread::available_parallelism().map_or(1, usize::from),
+            given => given,
+        };
+        let threads = threads.min(slabs.len());
+        let sums = (0..threads).map(|_| Sums::new(&round)).collect();
+        let shares = if threads > 1 { slabs.iter().map(|_| Share::new(n, dim)).collect() } else { Vec::new() };
         let beside = if L == 1 { 0 } else { n };
         let again = if slabs.len() > 1 { beside } else { 0 };
         let keeps = spec.options.get(1).copied().unwrap_or_default();
@@ -396,6 +422,7 @@ impl<const L: usize> Bodies<L> {
             at_hand: false,
             y: zeros(kept),
             dv: zeros(kept),
+            shares,
             control,
             projection,
             strength,

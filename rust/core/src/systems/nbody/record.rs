@@ -44,9 +44,7 @@ impl Quantity {
 }
 
 /// Fills rows with quantities, one after the other.
-pub(super) struct Record<'a, const L: usize> {
-    pub(super) n: usize,
-    pub(super) dim: usize,
+pub(super) struct Record<'a, const D: usize, const L: usize> {
     pub(super) h: f64,
     pub(super) what: &'a [Quantity],
     pub(super) mass: &'a [[f64; L]],
@@ -58,36 +56,32 @@ pub(super) struct Record<'a, const L: usize> {
     pub(super) rows: &'a mut [[f64; L]],
 }
 
-impl<const L: usize> Task for Record<'_, L> {
+impl<const D: usize, const L: usize> Task for Record<'_, D, L> {
     #[inline(always)]
     fn run(self) {
-        let Self { n, dim, h, what, mass, half, potential, v, y, rows } = self;
+        let Self { h, what, mass, half, potential, v, y, rows } = self;
+        let ((places, _), (speeds, _)) = (y.as_chunks::<D>(), v.as_chunks::<D>());
         let mut at = 0;
         for quantity in what {
-            let rows = &mut rows[at..at + quantity.size(dim)];
+            let rows = &mut rows[at..at + quantity.size(D)];
             at += rows.len();
             match quantity {
                 Quantity::Energy => {
-                    let (_, energy) = if dim == 2 {
-                        energies::<L, 2>(n, mass, half, potential, v)
-                    } else {
-                        energies::<L, 3>(n, mass, half, potential, v)
-                    };
+                    let (_, energy) = energies::<L, D>(mass, half, potential, v);
                     rows[0] = energy.map(|e| e / h);
                 }
                 Quantity::Momentum => {
                     for (c, row) in rows.iter_mut().enumerate() {
-                        *row = total(n, |i, l| mass[i][l] * v[dim * i + c][l]);
+                        *row = total(mass, speeds, |_, m, v, l| m[l] * v[c][l]);
                     }
                 }
                 Quantity::Spin => {
                     for (c, row) in rows.iter_mut().enumerate() {
-                        let (a, b) = if dim == 2 { (0, 1) } else { ((c + 1) % 3, (c + 2) % 3) };
-                        let cross = |i: usize, l: usize| y[dim * i + a][l] * v[dim * i + b][l] - y[dim * i + b][l] * v[dim * i + a][l];
-                        *row = total(n, |i, l| mass[i][l] * cross(i, l));
+                        let (a, b) = if D == 2 { (0, 1) } else { ((c + 1) % 3, (c + 2) % 3) };
+                        *row = total(mass, speeds, |i, m, v, l| m[l] * (places[i][a][l] * v[b][l] - places[i][b][l] * v[a][l]));
                     }
                 }
-                Quantity::Closest => rows[0] = closest(n, dim, y),
+                Quantity::Closest => rows[0] = closest(mass.len(), D, y),
             }
         }
     }
