@@ -18,6 +18,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
     parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
     parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
+    parser.add_argument("--only", default="", metavar="W4", help="only the works whose names begin so")
     given = parser.parse_args()
     repeats = 3 if given.quick else given.repeats
     warnings.simplefilter("error")
@@ -27,6 +28,8 @@ def main() -> None:
     parts = ["## How to read", reading]
     contestants = peers.catalogue()
     for work in workloads.catalogue():
+        if not work.name.startswith(given.only):
+            continue
         if given.quick:
             work = work.quick()
         rows = runner.measure(contestants, work, repeats, given.quick)
