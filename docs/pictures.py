@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and docs/*.md anew into docs/images. Takes a minute or two.
+"""Draws the pictures of README.md and docs/*.md anew into docs/images. Takes some minutes.
 
 Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and look at what it drew.
 """
@@ -35,6 +35,8 @@ def write(name: str, figure: Figure) -> None:
 if __name__ == "__main__":
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
+    panel = sw.charts.panel(["oscillator", "clover", "kepler", "figure_eight", "chain", "energy_control"])
+    write("work-precision.png", panel.plot())
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))

@@ -59,6 +59,17 @@ SYSTEMS: dict[str, Make] = {
         _omega(r, b), 0.2, x=_sine(r, b), a=sw.Sampled(r.normal(size=7), interval=0.11)
     ),
     "sampled x and a, physical": lambda r, b: sw.Oscillator(_omega(r, b), x=_held(r, b), a=_held(r, b), form="physical"),
+    "pendulum": lambda r, b: sw.Pendulum(_omega(r, b)),
+    "pendulum, damped": lambda r, b: sw.Pendulum(_omega(r, b), r.uniform(0.0, 0.5, b)),
+    "pendulum, constant a": lambda r, b: sw.Pendulum(1.1, a=r.normal(size=b)),
+    "pendulum, sampled a, damped": lambda r, b: sw.Pendulum(_omega(r, b), 0.1, a=_held(r, b)),
+    "pendulum, sinusoid a": lambda r, b: sw.Pendulum(_omega(r, b), a=_sine(r, b)),
+    "pendulum, sinusoid a, damped": lambda r, b: sw.Pendulum(_omega(r, b), 0.2, a=_sine(r, b)),
+    "pendulum, sinusoids a of one frequency": lambda r, b: sw.Pendulum(
+        _omega(r, b), 0.2, a=sw.Sinusoid(r.normal(size=b), 2.0, 0.3)
+    ),
+    "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
+    "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
     "three bodies": lambda r, b: sw.NBody(G=r.uniform(0.5, 2.0, b)),
     "three bodies in space, newton": lambda r, b: sw.NBody(
         [1.0, 0.0, 2.0], force="newton", softening=r.uniform(0.1, 0.2, b), dim=3

@@ -31,7 +31,8 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, text in added:
         (tree / name).write_text(text, encoding="utf-8")
     # A target folder of its own: in the project's, the copy's core would take the place of the project's.
-    environment = os.environ | {"CARGO_TARGET_DIR": str(ROOT / "target" / "adding")}
+    # Hardly optimised, which takes a third of the time: the bits are the same, and only the canary is about speed.
+    environment = os.environ | {"CARGO_TARGET_DIR": str(ROOT / "target" / "adding"), "CARGO_PROFILE_RELEASE_OPT_LEVEL": "1"}
     build = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", "dist"]
     subprocess.run(build, cwd=tree, env=environment, check=True)
     (wheel,) = (tree / "dist").glob("*.whl")
@@ -50,7 +51,17 @@ def run(tree: Path, *arguments: str) -> str:
 def test_the_suite_tests_it(tree: Path) -> None:
     """Bits, order, stage times by its record, matrix form, world, charts: all by iterating over the catalogue."""
     printed = run(
-        tree, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests", "--ignore=tests/test_adding.py", "-k", "midpoint"
+        tree,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "tests",
+        "--ignore=tests/test_adding.py",
+        "--ignore=tests/test_canary.py",
+        "-k",
+        "midpoint",
     )
     passed = re.search(r"(\d+) passed", printed)
     assert passed is not None

@@ -171,6 +171,10 @@ def _member(system: sw.System, i: int) -> sw.System:
 
     if isinstance(system, sw.Oscillator):
         return sw.Oscillator(one(system.omega), one(system.damping), x=one(system.x), a=one(system.a), form=system.form)
+    if isinstance(system, sw.Pendulum):
+        return sw.Pendulum(one(system.omega), one(system.damping), a=one(system.a))
+    if isinstance(system, sw.RestrictedThreeBody):
+        return sw.RestrictedThreeBody(one(system.mu))
     if isinstance(system, sw.NBody):
         return sw.NBody(
             system.masses[..., i] if system.masses.ndim > 1 else system.masses,

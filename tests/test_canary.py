@@ -63,6 +63,21 @@ KINDS = [
         {"avx2": 1.15, "avx512": 1.15},  # [1.9, 3.9]
     ),
     Kind(
+        {
+            "pendulum": sw.Pendulum(1.3),
+            "damped pendulum": sw.Pendulum(1.3, 0.1),
+            "pendulum held": sw.Pendulum(1.3, 0.1, a=HELD),
+            "pendulum sine": sw.Pendulum(1.3, 0.1, a=SINE),
+        },
+        {"baseline": 1.0, "avx2": 1.0, "avx512": 1.0},
+        {"avx2": 1.0, "avx512": 1.15},
+    ),
+    Kind(
+        {"restricted three bodies": sw.RestrictedThreeBody()},
+        {"baseline": 0.5, "avx2": 0.9, "avx512": 1.1},
+        {"avx2": 0.88, "avx512": 1.15},
+    ),
+    Kind(
         # A lone system of three bodies is stepped in one lane and does not pay for eight, so a batch brings less over it: least
         # values of all methods.
         {"three bodies": sw.NBody()},
@@ -117,6 +132,8 @@ def start(system: sw.System) -> tuple[Any, Any]:
     if isinstance(system, sw.NBody):
         x, y = np.sqrt(0.75), 0.5  # the clover's triangle, which no method brings to a collision in this time
         return np.array([[-y, x], [-y, -x], [1.0, 0.0]]), np.array([[-x, -y], [x, -y], [0.0, 1.0]])
+    if isinstance(system, sw.RestrictedThreeBody):
+        return np.array([0.0, -0.5]), np.array([0.5, 0.0])  # around the heavy body, and far from the light one
     return np.zeros(system.v_shape), np.ones(system.y_shape)
 
 

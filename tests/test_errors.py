@@ -129,7 +129,11 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: run(dt=np.nan), E.NotFiniteError, "dt: expected finite numbers in units of time, got nan"),
     (lambda: run(dt=[0.1, 0.2]), E.ShapeError, "dt: expected one number in units of time, got an array of shape (2,)"),
     (lambda: run(dt="fast"), E.DTypeError, "dt: expected real numbers in units of time, got 'fast'"),
-    (lambda: run(dt=None), E.DTypeError, "dt: expected real numbers in units of time, got None"),
+    (
+        lambda: run(dt=None),
+        E.ArgumentError,
+        "dt: expected with fixed steps; or give tolerance= and at= for steps of chosen length",
+    ),
     (lambda: run(steps=0), E.ArgumentError, "steps: expected 1 or more, got 0"),
     (lambda: run(steps=-5), E.ArgumentError, "steps: expected 1 or more, got -5"),
     (lambda: run(steps=2.5), E.DTypeError, "steps: expected a whole number, got 2.5 (float)"),

@@ -141,8 +141,9 @@ def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     """100 000 angles at D = 0, where the stable ones of the symplectic methods are on the circle itself."""
     chart = sw.charts.stability_map(method, damping=None, size=(100_000, 1))
     observation = chart.observe(1000)
-    # What grows like Φ⁶ or more, or leaves the circle at a flat angle, has a wide band; half of the map is outside at least.
-    agree(observation, 0.5)
+    # What grows like Φ⁶ or more, or leaves the circle at a flat angle, has a wide band: Fehlberg's fifth-order result, whose
+    # radius is 1 + 0.0009·Φ⁶, is inside it up to Φ = 1.2 and again round each end of the window in which it damps.
+    agree(observation, 0.55)
     below = np.count_nonzero(chart.phi < method.limit * (1 - 1e-12))
     assert observation.bounded[0, :below].all()
     # A growth like Φ⁶ is lost in rounding where it begins; a limit is not.

@@ -39,6 +39,15 @@ MUTANTS = [
     ("leapfrog", "v_half = v_half + s.dv(t, v_half, y)", "v_half = v_half + 0.5 * s.dv(t, v_half, y)", "a half too much"),
     ("leapfrog", "v + -0.5 * s.dv(t, v, y)", "v - s.dv(t, v, y)", "a lost half at the start"),
     ("leapfrog", "v_half + 0.5 * s.dv(t, v_half, y)\n", "v_half\n", "a lost half kick at the end"),
+    ("merson", "NODES = (0.0, 1 / 3, 1 / 3,", "NODES = (0.0, 1 / 3, 0.5,", "wrong stage time"),
+    ("merson", "    (1 / 6, 1 / 6),", "    (1 / 3, 0.0),", "an increment not used"),
+    ("merson", "WEIGHTS = (1 / 6, 0.0, 0.0, 2 / 3, 1 / 6)", "WEIGHTS = (1 / 6, 0.0, 2 / 3, 0.0, 1 / 6)", "the wrong increment"),
+    ("fehlberg", "0.375, 12 / 13, 1.0", "0.375, 1.0, 1.0", "wrong stage time"),
+    ("fehlberg", "-845 / 4104", "845 / 4104", "a wrong sign"),
+    ("fehlberg", "2197 / 4104, -1 / 5, 0.0)", "2197 / 4104, 0.0, -1 / 5)", "the wrong increment"),
+    ("fehlberg_5", "-9 / 50, 2 / 55)", "2 / 55, -9 / 50)", "two weights exchanged"),
+    ("pefrl", "v = v + LAMBDA * s.dv(t + (XI + CHI) * h, v, y)", "v = v + LAMBDA * s.dv(t, v, y)", "wrong stage time"),
+    ("pefrl", "(1.0 - 2.0 * (CHI + XI))", "(1.0 - 2.0 * CHI)", "a drift too long"),
     ("verlet", "y_prev = y - s.dy(t, v, y)", "y_prev = y + s.dy(t, v, y)", "a wrong sign at the start"),
 ]
 IDS = [f"{method}: {mistake} #{i}" for i, (method, _, _, mistake) in enumerate(MUTANTS)]

@@ -29,7 +29,7 @@ def test_every_record_is_complete(method: sw.Method) -> None:
     assert method.order >= 1
     assert method.evaluations >= 1
     assert method.limit >= 0
-    assert method.section.startswith("§")
+    assert method.section.startswith("§") or method.section == "not in the document"
     assert method.nodes
     assert list(method.nodes) == sorted(set(method.nodes))
     assert all(0 <= c <= 1 for c in method.nodes)
@@ -61,11 +61,12 @@ def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
 
     counting = Counting()
     method.steps.step(counting, 0.0, 0.25, 0.0, 1.0)
-    assert (counting.v, counting.y) == (method.evaluations, method.evaluations)
+    # PEFRL begins and ends with a drift: one more of the rate that costs nothing.
+    assert (counting.v, counting.y) == (method.evaluations, method.evaluations + (method.name == "pefrl"))
 
 
 def test_methods_are_in_the_documents_order() -> None:
-    sections = [int(m.section.strip("§")) for m in sw.methods()]
+    sections = [int(m.section.strip("§")) if m.section.startswith("§") else 99 for m in sw.methods()]
     assert sections == sorted(sections)
 
 

@@ -13,7 +13,7 @@ from stepwell.errors import ArgumentError, NotFiniteError, UnknownNameError
 from stepwell.scenes import builtin
 from stepwell.scenes.builtin.kepler import eccentric_anomaly
 from stepwell.scenes.builtin.plummer import _drawn
-from stepwell.scenes.taylor import Orbit
+from stepwell.scenes.taylor import Orbit, TurningOrbit
 
 SCENES = sw.scenes.scenes()
 
@@ -26,11 +26,13 @@ VARIED = (
     sw.scenes.chain(5, {1: 0.3, 3: -1.0, 4: 0.2}),
     sw.scenes.kepler(e=0.0, share=0.1),
     sw.scenes.kepler(e=0.3),
+    sw.scenes.pendulum(10.0, 3.0),
+    sw.scenes.pendulum(170.0),
 )
 
 #: Those whose solution is known, and of them those that a fixed step does well.
 SOLVED = tuple(scene for scene in SCENES if scene.exact is not None)
-HARD = ("figure_eight", "kepler", "pythagorean")
+HARD = ("arenstorf", "figure_eight", "kepler", "pythagorean")
 GENTLE = tuple(scene for scene in SOLVED if scene.name not in HARD)
 
 every_scene = pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
@@ -298,6 +300,56 @@ def test_what_the_reference_does_not_know_is_nan():
         assert np.isnan(error).tolist() == [False, False, False, True]
 
 
+@pytest.mark.parametrize(
+    ("amplitude", "period"), [(10.0, 6.2951685236990721787), (90.0, 7.4162987092054876737), (170.0, 15.326967999136584745)]
+)
+def test_the_pendulum_has_the_periods_of_the_facts(amplitude, period):
+    scene = sw.scenes.pendulum(amplitude)
+    assert scene.period == pytest.approx(period, rel=4e-16)
+    assert sw.scenes.pendulum(amplitude, 4.0).period == pytest.approx(period / 4.0, rel=4e-16)
+    t = np.linspace(0.0, scene.horizon, 1001)
+    v, y = scene.exact(t)
+    np.testing.assert_allclose(scene.system.energy(v, y), scene.system.energy(scene.v, scene.y), rtol=1e-14)
+    quarters = scene.exact(0.25 * scene.period * np.arange(5.0))
+    np.testing.assert_allclose(quarters[1], scene.y * np.array([1.0, 0.0, -1.0, 0.0, 1.0]), rtol=0, atol=1e-14)
+    fastest = 2.0 * math.sin(math.radians(0.5 * amplitude))
+    np.testing.assert_allclose(quarters[0], fastest * np.array([0.0, -1.0, 0.0, 1.0, 0.0]), rtol=0, atol=1e-14)
+
+
+def test_a_small_swing_is_an_oscillation():
+    scene, t = sw.scenes.pendulum(1e-6), np.linspace(0.0, 18.0, 50)
+    v, y = scene.exact(t)
+    np.testing.assert_allclose(y / scene.y, np.cos(t), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(v / scene.y, -np.sin(t), rtol=0, atol=1e-14)
+
+
+def test_a_swing_from_nearly_the_top_stays_there_for_long():
+    """K goes as ln(4/k'), and k' as a quarter of a turn less half the amplitude."""
+    scene = sw.scenes.pendulum(180.0 - 1e-9)
+    assert scene.period == pytest.approx(4.0 * math.log(4.0 / math.radians(0.5e-9)), rel=1e-6)
+
+
+def test_arenstorfs_orbit_is_that_of_the_facts():
+    """It closes but for the rounding of the start, which the orbit makes a hundred thousand times as large."""
+    scene = sw.scenes.arenstorf()
+    assert scene.period == 17.0652165601579625588917206249
+    t = np.linspace(0.0, scene.period, 201)
+    v, y = scene.exact(t)
+    np.testing.assert_allclose(y[-1], [0.994, 0.0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(v[-1], [0.0, -2.00158510637908252240537862224], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(scene.system.energy(v.T, y.T), scene.system.energy(scene.v, scene.y), rtol=1e-13)
+    loose = TurningOrbit(float(scene.system.mu), scene.v, scene.y, tolerance=1e-22)
+    for found, wanted in zip(loose(t), (v, y), strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-13)
+
+
+def test_runge_kutta_follows_arenstorfs_orbit_to_its_order():
+    scene = sw.scenes.arenstorf()
+    coarse, fine = (scene.state_error(scene.run("rk4", scene.dt / n, every=100 * n)).max() for n in (8, 16))
+    assert coarse / fine == pytest.approx(16, rel=0.2)
+    assert fine < 1e-5
+
+
 def test_the_pythagorean_bodies_nearly_meet():
     """Masses 4 and 5, at the times of the docstring."""
     scene = sw.scenes.pythagorean()
@@ -448,6 +500,9 @@ def test_options_go_to_integrate():
         (lambda: sw.scenes.chain(3, {}), "modes: expected the amplitude of at least one mode"),
         (lambda: sw.scenes.kepler(e=1.0), "e: expected an eccentricity of 0 or more and below 1, got 1"),
         (lambda: sw.scenes.kepler(share=0.0), "share: expected a share of the mass above 0 and below 1, got 0"),
+        (lambda: sw.scenes.pendulum(0.0), "amplitude: expected degrees above 0 and below 180, got 0"),
+        (lambda: sw.scenes.pendulum(180.0), "amplitude: expected degrees above 0 and below 180, got 180"),
+        (lambda: sw.scenes.pendulum(90.0, -1.0), "omega: expected numbers above zero"),
         (lambda: sw.scenes.plummer(1), "n: expected 2 or more"),
         (lambda: sw.scenes.plummer(seed=-1), "seed: expected 0 or more"),
         (lambda: sw.scenes.plummer(softening=-1.0), "softening: expected a length of zero or more"),

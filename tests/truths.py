@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,24 @@ def _rk4(f: float) -> Matrix:
     return np.array([[c, -s], [s, c]])
 
 
+def _taylor(f: float, *beyond: Fraction) -> Matrix:
+    """1 + z + z²/2 + z³/6 + z⁴/24 + c₅·z⁵ + …, z = iΦ: its real part twice on the diagonal, its imaginary part beside it."""
+    terms = [c * f**k for k, c in enumerate((Fraction(1), Fraction(1), Fraction(1, 2), Fraction(1, 6), Fraction(1, 24), *beyond))]
+    real, imaginary = (sum(term * (-1) ** m for m, term in enumerate(terms[first::2])) for first in (0, 1))
+    return np.array([[real, -imaginary], [imaginary, real]], dtype=object if isinstance(f, Fraction) else None)
+
+
+def _pefrl(f: float) -> Matrix:
+    """Drifts and kicks as matrices, one after the other."""
+    exact: Any = Fraction if isinstance(f, Fraction) else float
+    xi, lam, chi = 0.1786178958448091, -0.2123418310626054, -0.06626458266981849
+    whole: Any = np.array([[exact(1), exact(0)], [exact(0), exact(1)]])
+    for drift, kick in ((xi, 0.5 - lam), (chi, lam), (1.0 - 2.0 * (chi + xi), lam), (chi, 0.5 - lam), (xi, 0.0)):
+        d, k = exact(drift) * f, exact(kick) * f
+        whole = np.array([[1, -k], [0, 1]]) @ np.array([[1, 0], [d, 1]]) @ whole
+    return np.asarray(whole)
+
+
 #: Transition matrices of (v, y) on v̇ = −ω₀y, ẏ = ω₀v, as functions of Φ. Verlet's is that of its synchronised velocity.
 CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
     "standard_euler": lambda f: np.array([[1, -f], [f, 1]]),
@@ -32,6 +51,11 @@ CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
     "false_heun": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 2)], [f * (1 - f**2 / 2), 1 - f**2 + f**4 / 2]]),
     "semi_false_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f * (1 - f**2 / 2), 1 - f**2 / 2]]),
     "rk4": _rk4,
+    # Polynomials of z = iΦ: the exponential's to the order, then what the tableau leaves.
+    "merson": lambda f: _taylor(f, Fraction(1, 144)),
+    "fehlberg": lambda f: _taylor(f, Fraction(1, 104)),
+    "fehlberg_5": lambda f: _taylor(f, Fraction(1, 120), Fraction(1, 2080)),
+    "pefrl": _pefrl,
 }
 
 
@@ -57,6 +81,15 @@ WEIGHTS: dict[str, dict[float, float]] = {
     "false_heun": _HEUN,
     "semi_false_heun": _HEUN,
     "rk4": {0.0: 1 / 6, 0.5: 2 / 3, 1.0: 1 / 6},
+    "merson": {0.0: 1 / 6, 0.5: 2 / 3, 1.0: 1 / 6},
+    "fehlberg": {0.0: 25 / 216, 3 / 8: 1408 / 2565, 12 / 13: 2197 / 4104, 1.0: -1 / 5},
+    "fehlberg_5": {0.0: 16 / 135, 3 / 8: 6656 / 12825, 12 / 13: 28561 / 56430, 1.0: -9 / 50, 0.5: 2 / 55},
+    "pefrl": {
+        0.1786178958448091: 0.7123418310626054,
+        0.11235331317499061: -0.2123418310626054,
+        0.8876466868250094: -0.2123418310626054,
+        0.8213821041551909: 0.7123418310626054,
+    },
 }
 
 
@@ -179,6 +212,9 @@ def forced_error(method: str, dt: float, block: str, backend: str = "rust", star
 
 def slope(error: Callable[[float], float]) -> float:
     """The order that two halvings show, extrapolated: each halving leaves about half of what is wrong with the slope."""
-    e = [error(dt) for dt in (1 / 50, 1 / 100, 1 / 200)]
+    for coarse in (1 / 50, 1 / 25, 1 / 10, 1 / 5):
+        e = [error(dt) for dt in (coarse, coarse / 2, coarse / 4)]
+        if e[2] > 1e-13:  # well above rounding
+            break
     first, second = np.log2(e[0] / e[1]), np.log2(e[1] / e[2])
     return float(2 * second - first)

@@ -2,7 +2,7 @@
 
 ``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
 there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system; ``scenes`` and
-``charts`` show what each method costs, how wrong it is and where it blows up.
+``charts`` show what each method costs, how wrong it is and where it blows up, and ``advise`` says which to take.
 """
 
 from __future__ import annotations
@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
 from .control import EnergyControl, Projection
-from .errors import ControlWarning, DivergenceWarning, StepwellError
+from .errors import ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Sampled, Sinusoid, System
+from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
 from .world import World
 
 if TYPE_CHECKING:
-    from . import charts, scenes, stability
+    from . import advice, charts, scenes, stability
+    from .advice import advise
     from .stability import analyse, criteria, stability_limit
 
 __version__: str = _core.__version__
@@ -33,14 +34,19 @@ __all__ = [
     "Method",
     "NBody",
     "Oscillator",
+    "Pendulum",
     "Projection",
+    "RestrictedThreeBody",
     "Run",
     "Sampled",
     "Sinusoid",
     "Status",
     "StepwellError",
     "System",
+    "ToleranceWarning",
     "World",
+    "advice",
+    "advise",
     "analyse",
     "charts",
     "criteria",
@@ -68,6 +74,8 @@ def isa_levels() -> list[str]:
 
 #: What is imported when it is first used, so that importing stepwell stays quick, and where it is.
 _LATER = {
+    "advice": "advice",
+    "advise": "advice.advise",
     "charts": "charts",
     "scenes": "scenes",
     "stability": "stability",

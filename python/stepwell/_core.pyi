@@ -6,7 +6,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ModelSpec", "World", "__version__", "catalogue", "isa", "isa_levels", "run", "saves", "systems"]
+__all__ = ["ModelSpec", "World", "__version__", "adapt", "catalogue", "isa", "isa_levels", "run", "saves", "systems"]
 __version__: str
 
 @final
@@ -67,5 +67,23 @@ def run(
     tally: NDArray[np.float64],
     carry: NDArray[np.float64],
     first_bad: NDArray[np.int64],
+    progress: Callable[[float], object] | None,
+) -> None: ...
+def adapt(
+    model: ModelSpec,
+    *,
+    t0: float,
+    at: list[float],
+    first: NDArray[np.float64],
+    relative: NDArray[np.float64],
+    absolute: NDArray[np.float64],
+    budget: int,
+    threads: int,
+    v: NDArray[np.float64],
+    y: NDArray[np.float64],
+    saved_v: NDArray[np.float64],
+    saved_y: NDArray[np.float64],
+    reached: NDArray[np.float64],
+    counts: NDArray[np.int64],
     progress: Callable[[float], object] | None,
 ) -> None: ...

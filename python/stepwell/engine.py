@@ -7,7 +7,8 @@ above this file speaks of states, everything below of slots.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import lcm, prod
+from itertools import count
+from math import floor, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -222,18 +223,29 @@ def transition(plan: Plan) -> Array:
 
 def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     """Q of shape (nodes, inputs, n, *batch), from one step from rest with a unit pulse of one input at one node."""
-    from fractions import Fraction  # only this form needs it
-
-    grid = lcm(*(Fraction(c).limit_denominator(1000).denominator for c in plan.method.nodes))
+    grid = _grid(plan.method.nodes)
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
     inputs = list(inputs)
     q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
     for i, node in enumerate(plan.method.nodes):
         pulse = np.zeros(grid + 1)
-        pulse[round(node * grid)] = 1.0
+        pulse[_bin(node, grid)] = 1.0
         for j, name in enumerate(inputs):
             q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)))
     return q
+
+
+def _bin(node: float, grid: int) -> int:
+    """Which of so many parts of a step holds a node."""
+    return floor(node * grid + 1e-6)
+
+
+def _grid(nodes: Iterable[float]) -> int:
+    """The least number of parts of a step that hold its nodes apart, none of them near the end of its part."""
+    nodes = list(nodes)
+    return next(
+        n for n in count(1) if len({_bin(c, n) for c in nodes}) == len(nodes) and all(c * n - _bin(c, n) < 0.9 for c in nodes)
+    )
 
 
 def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Array:
@@ -304,3 +316,68 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
             if plan.progress is not None:
                 plan.progress(i / len(plan.saves))
     return _finished(plan, kept[-1][0], kept, before)
+
+
+# ---- steps of chosen length
+
+
+class Pacing(NamedTuple):
+    """Where to be when, and how exactly. ``first``, ``relative`` and ``absolute`` broadcast over the batch."""
+
+    at: list[float]
+    first: Array
+    relative: Array
+    absolute: Array
+    budget: int
+
+
+class Adapted(NamedTuple):
+    """States at the asked times, and for each member the time it reached, its next step, its attempts and its status."""
+
+    v: Array
+    y: Array
+    t: Array
+    h: Array
+    accepted: Whole
+    rejected: Whole
+    status: Whole
+
+
+def adapt(plan: Plan, pacing: Pacing, v: Array, y: Array) -> Adapted:
+    """Make the run."""
+    if plan.backend == "numpy":
+        from .reference import adaptive, tableau  # only such runs need it
+
+        pairs, s = plan.method.steps, plan.system.scaled(1.0, plan.batch)
+        steps: Any = pairs
+
+        def attempt(s: Any, t: Any, h: Any, v: Array, y: Array) -> tuple[Blocks, Blocks]:
+            increments = steps.stages(s, t, h, v, y)
+            return tableau.plus(v, y, steps.WEIGHTS, increments), tableau.combined(steps.ERROR, increments)
+
+        wide = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in ("first", "relative", "absolute")}
+        whole = adaptive.run(attempt, s, v, y, plan.block_axes, t0=plan.t0, at=pacing.at, budget=pacing.budget, **wide)
+        return Adapted(*whole)
+    kept, members = len(pacing.at), prod(plan.batch)
+    saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
+    reached, counts = np.empty((2, members)), np.empty((3, members), dtype=np.int64)
+    _core.adapt(
+        _model(plan),
+        t0=plan.t0,
+        at=pacing.at,
+        first=rows(pacing.first[np.newaxis], plan.batch),
+        relative=rows(pacing.relative[np.newaxis], plan.batch),
+        absolute=rows(pacing.absolute[np.newaxis], plan.batch),
+        budget=pacing.budget,
+        threads=plan.threads,
+        v=_flat(plan, v),
+        y=_flat(plan, y),
+        saved_v=saved_v,
+        saved_y=saved_y,
+        reached=reached,
+        counts=counts,
+        progress=plan.progress,
+    )
+    t, h = (row.reshape(plan.batch) for row in reached)
+    accepted, rejected, status = (row.reshape(plan.batch) for row in counts)
+    return Adapted(saved_v, saved_y, t, h, accepted, rejected, status)

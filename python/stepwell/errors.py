@@ -42,5 +42,9 @@ class DivergenceWarning(UserWarning):
     """Some members left the range of finite numbers. Their rows say when; their neighbours are not touched."""
 
 
+class ToleranceWarning(UserWarning):
+    """Some members stopped before the last asked time: out of steps, or their steps became too small to move the time."""
+
+
 class ControlWarning(UserWarning):
     """A control is so strong that it overshoots."""

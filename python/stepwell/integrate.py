@@ -14,11 +14,12 @@ import numpy as np
 from . import _checks, engine
 from ._checks import Array
 from .control import EnergyControl, Projection
-from .errors import ArgumentError, DivergenceWarning, DTypeError, UnsupportedError
+from .errors import ArgumentError, DivergenceWarning, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
 from .methods import Method
 from .methods import method as find_method
+from .methods import methods as every_method
 from .reference.types import Whole
-from .result import Collision, Run
+from .result import Collision, Paces, Run, Status
 from .systems import NBody, Sampled, System
 
 BACKENDS = ("rust", "numpy")
@@ -35,8 +36,11 @@ def integrate(
     *,
     v: Any,
     y: Any,
-    dt: float,
-    steps: int,
+    dt: float | None = None,
+    steps: int | None = None,
+    tolerance: Any = None,
+    at: Any = None,
+    max_steps: int = 1_000_000,
     every: int | None = None,
     record: Sequence[str] = (),
     t0: float = 0.0,
@@ -61,8 +65,13 @@ def integrate(
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero.
+        dt: the step, in units of time, above zero. With a tolerance, the step to try first; a thousandth of the time if None.
         steps: how many steps, one or more.
+        tolerance: in place of ``steps``: every member chooses its own steps so that the estimated error of each stays below this,
+            relative to the length of each block and beside it (error ≤ tolerance·(1 + length)); or a pair (relative,
+            absolute). Each broadcasts over the batch. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5.
+        at: with a tolerance, the times at which to keep the state, ascending, from t0 on. They are reached exactly.
+        max_steps: with a tolerance, the most steps of a member, rejected ones counted.
         every: keep the state every so many steps, with the first and the last; None keeps the last alone.
         record: quantities to record of every kept state, ``run.recorded``: "energy", and for ``NBody`` also "momentum",
             "angular_momentum" and "closest". Bodies find them beside the force of the next step, at little cost.
@@ -94,6 +103,21 @@ def integrate(
     how = find_method(method)
     system = system.sized(v, y)
     fits_together(system, how)
+    if tolerance is not None or at is not None:
+        fixed = {
+            "steps": steps,
+            "every": every,
+            "start": start,
+            "carry": carry,
+            "first_bad_step": first_bad_step,
+            "control": control,
+        }
+        fixed |= {"start_step": start_step or None, "form": None if form == "direct" else form}
+        _only_fixed(fixed)
+        return _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, threads, backend, progress)
+    if dt is None or steps is None:
+        missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)
+        raise ArgumentError(f"{missing}: expected with fixed steps; or give tolerance= and at= for steps of chosen length")
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
     if form != "direct" and not system.linear:
@@ -160,6 +184,110 @@ def integrate(
         run.recorded["energy"] = run.energy
     _warn(run, before)
     return run
+
+
+def _only_fixed(given: dict[str, Any]) -> None:
+    """Raise if something was given that goes with fixed steps only."""
+    if wrong := [name for name, value in given.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
+
+
+def _adapt(
+    system: System,
+    how: Method,
+    v: Any,
+    y: Any,
+    dt: Any,
+    tolerance: Any,
+    at: Any,
+    max_steps: Any,
+    record: Sequence[str],
+    t0: Any,
+    threads: int | None,
+    backend: str,
+    progress: bool,
+) -> Run:
+    """The run with a tolerance."""
+    if how.error_order is None:
+        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
+        raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if tolerance is None or at is None:
+        raise ArgumentError(f"{'tolerance' if tolerance is None else 'at'}: expected too, since the other was given")
+    t0 = _checks.number("t0", t0, unit="units of time")
+    times = _checks.numbers("at", at, unit="units of time")
+    if times.ndim != 1 or len(times) == 0:
+        raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
+    if times[0] < t0 or (np.diff(times) <= 0).any():
+        raise ArgumentError(
+            f"at: expected times that ascend from t0 = {t0:g} on, got {times[:5].tolist()}{'…' * (len(times) > 5)}"
+        )
+    system.check_time(max(abs(t0), abs(float(times[-1]))))
+    backend = _checks.known("backend", backend, BACKENDS)
+    budget = _checks.count("max_steps", max_steps, 1)
+    pair = tolerance if isinstance(tolerance, tuple) else (tolerance, tolerance)
+    if len(pair) != 2:
+        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(pair)} of them")
+    relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in pair)
+    if dt is None:
+        dt = 1e-3 * (float(times[-1]) - t0) or 1.0
+    first = _checks.numbers("dt", dt, positive=True, unit="units of time")
+    v = _checks.block("v", v, system.v_shape, system.axes)
+    y = _checks.block("y", y, system.y_shape, system.axes)
+    batch = _checks.batch_shape(
+        {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+        | {"tolerance": np.broadcast_shapes(relative.shape, absolute.shape), "dt": first.shape}
+    )
+    record = _quantities(system, record)
+    workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
+    numbers = prod(system.v_shape) + prod(system.y_shape)
+    _checks.fits("the kept states", numbers * (len(times) + 1), batch, "ask for fewer times or split the batch")
+    v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+    with _bar(f"{how.title} to t = {times[-1]:g}") if progress else nullcontext(None) as told:
+        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told)
+        out = engine.adapt(plan, engine.Pacing(times.tolist(), first, relative, absolute, budget), v, y)
+    run = Run(
+        t=times,
+        v=out.v,
+        y=out.y,
+        status=out.status.astype(np.int8),
+        first_bad_step=np.where(out.status == 0, -1, out.accepted + 1),
+        carry=None,
+        system=system,
+        method=how,
+        dt=1.0,
+        t0=t0,
+        start_step=0,
+        steps=0,
+        start=None,
+        paces=Paces(out.t, out.h, out.accepted, out.rejected, how.evaluations * (out.accepted + out.rejected)),
+    )
+    for name in record:
+        run.recorded[name] = run.quantity(name)
+    _warn_of_stops(run)
+    return run
+
+
+#: Why a member of a run with a tolerance stopped, in words.
+_WHY = {
+    Status.BUDGET: "out of max_steps",
+    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time",
+    Status.NOT_FINITE: "no step, however small, gives finite numbers",
+}
+
+
+def _warn_of_stops(run: Run) -> None:
+    if not run.status.any() or run.paces is None:
+        return
+    stopped = run.status != 0
+    time = float(run.paces.t[stopped].min())
+    first = tuple(int(i) for i in np.argwhere(stopped & (run.paces.t == time))[0])
+    who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
+    warnings.warn(
+        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {who} at t = {time:g}: "
+        f"{_WHY[Status(int(run.status[first]))]}",
+        ToleranceWarning,
+        stacklevel=4,
+    )
 
 
 def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:

@@ -41,6 +41,7 @@ class Method:
         needs_acceleration: whether it asks for a second-order system whose forces do not depend on the velocity.
         carry: what it carries between steps in the place of v, or None.
         starts: ways to start it, the default first.
+        error_order: order of h in which it estimates the error of a step, or None; with one it takes ``tolerance=``.
         section: section of the document.
         reference: where it comes from.
         about: what it does.
@@ -58,6 +59,7 @@ class Method:
     needs_acceleration: bool
     carry: str | None
     starts: tuple[str, ...]
+    error_order: int | None
     section: str
     reference: str
     about: str
@@ -92,7 +94,10 @@ class Method:
             lines.append(f"Also called: {', '.join(self.other_names)}.")
         if self.false_friends:
             lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
-        lines += [f"Undamped oscillator stable: {limit}.", f"Source: the document's {self.section}; {self.reference}."]
+        lines += [
+            f"Undamped oscillator stable: {limit}.",
+            f"Source: {'the document’s ' if self.section.startswith('§') else ''}{self.section}; {self.reference}.",
+        ]
         return "\n".join(lines)
 
     def __repr__(self) -> str:

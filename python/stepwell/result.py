@@ -19,7 +19,14 @@ class Status(IntEnum):
     """How a member ended."""
 
     OK = 0
+    #: It left the range of finite numbers.
     DIVERGED = 1
+    #: With a tolerance: it was out of ``max_steps``.
+    BUDGET = 2
+    #: With a tolerance: the step that its error asks for no longer moves the time.
+    UNDERFLOW = 3
+    #: With a tolerance: nothing finite came of any step, however small.
+    NOT_FINITE = 4
 
 
 class Collision(NamedTuple):
@@ -38,6 +45,24 @@ class Collision(NamedTuple):
     distance: float
 
 
+class Paces(NamedTuple):
+    """What a run with a tolerance did, per member, shape (*batch).
+
+    Attributes:
+        t: the time that was reached.
+        h: the step that would be tried next.
+        accepted: steps that the state went on with.
+        rejected: steps whose error was above the tolerance.
+        evaluations: rate evaluations of both.
+    """
+
+    t: Array
+    h: Array
+    accepted: Whole
+    rejected: Whole
+    evaluations: Whole
+
+
 class Run:
     """A run, with what was asked for kept along the first axis.
 
@@ -45,7 +70,7 @@ class Run:
         t: times of the kept states, shape (saved,).
         v: velocities, shape (saved, *block, *batch).
         y: coordinates, likewise.
-        status: per member, ``Status.OK`` or ``Status.DIVERGED``, shape (*batch).
+        status: per member, ``Status.OK`` or why it ended, shape (*batch).
         first_bad_step: per member, the number of the first step that was not finite, or −1.
         carry: what the method carries in the place of v (Verlet: ``y_prev``), or None.
         system: what was stepped.
@@ -56,6 +81,7 @@ class Run:
         steps: how many steps were made.
         start: how the method was started, or None.
         recorded: what was asked for by ``record=``, by name, shapes (saved, *shape of it, *batch).
+        paces: what a run with a tolerance did, or None; ``dt`` and ``steps`` mean nothing then.
         work: the energy that a control or a projection gave to each member in this run, or None, shape (*batch). Of a control it
             is the sum over the steps of ((1 − g)² − 1)·K, what its push −g·v alone would change, averaged over the evaluations.
     """
@@ -79,6 +105,7 @@ class Run:
         collision: Callable[[tuple[int, ...], int], Collision] | None = None,
         recorded: dict[str, Array] | None = None,
         work: Array | None = None,
+        paces: Paces | None = None,
     ) -> None:
         self.t = t
         self.v = v
@@ -97,15 +124,21 @@ class Run:
         self.collision = collision
         self.recorded = recorded or {}
         self.work = work
+        self.paces = paces
+
+    def quantity(self, name: str) -> Array:
+        """A quantity that could have been recorded, of every kept state, shape (saved, *shape of it, *batch)."""
+        v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
+        with np.errstate(all="ignore"):
+            values = self.system.recordable(name, v, y, self.dt)
+        return np.moveaxis(values, values.ndim - (v.ndim - len(self.system.v_shape)), 0)
 
     @property
     def energy(self) -> Array:
         """Energy of every kept state, shape (saved, *batch): what was recorded, or computed now by the system's ``energy``."""
         if "energy" in self.recorded:
             return self.recorded["energy"]
-        v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
-        with np.errstate(all="ignore"):
-            return self.system.recordable("energy", v, y, self.dt)
+        return self.quantity("energy")
 
     @property
     def z(self) -> Array:
@@ -135,7 +168,12 @@ class Run:
         """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
 
         System, method, dt and form are yours to give again. Members that diverged go on as they are and are not named again.
+
+        Raises:
+            UnsupportedError: of a run with a tolerance, whose steps depend on where it was asked to be.
         """
+        if self.paces is not None:
+            raise UnsupportedError("resume: a run with a tolerance goes on from its last state, run.v[-1], run.y[-1], run.t[-1]")
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         if self.start is not None:
             state["start"] = self.start
@@ -147,6 +185,12 @@ class Run:
 
     def __repr__(self) -> str:
         bad = int(np.count_nonzero(self.status))
+        if self.paces is not None:
+            steps, rejected = int(self.paces.accepted.sum()), int(self.paces.rejected.sum())
+            return (
+                f"<run of {self.system!r} by {self.method.name} with a tolerance: {len(self.t)} kept from t = {self.t[0]:g} to "
+                f"{self.t[-1]:g}, {self.status.size} member(s), {steps} steps, {rejected} rejected, {bad} stopped early>"
+            )
         return (
             f"<run of {self.system!r} by {self.method.name}: {self.steps} steps of {self.dt:g} from t = {self.t[0]:g}, "
             f"{len(self.t)} kept, {self.status.size} member(s), {bad} diverged>"

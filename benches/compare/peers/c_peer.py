@@ -61,10 +61,16 @@ def vectors_of_512() -> bool:
 def library(source: Path, *options: str) -> ctypes.CDLL:
     """The kernels of a file, compiled with these options."""
     out = folder() / (source.stem + "".join(options).replace("=", "") + ".so")
-    command = [compiler(), *flags(), *options, str(source), "-o", str(out), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        raise MissingPeerError(f"the C compiler failed: {done.stderr.strip().splitlines()[0]}")
+    compiled = out.with_suffix(".o")
+    # Linked apart: a library linked with -ffast-math makes whoever loads it flush subnormal numbers to zero, us too.
+    linked = [option for option in options if option == "-fopenmp"]
+    for command in (
+        [compiler(), *flags(), *options, "-c", str(source), "-o", str(compiled)],
+        [compiler(), "-shared", *linked, str(compiled), "-o", str(out), "-lm"],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise MissingPeerError(f"the C compiler failed: {done.stderr.strip().splitlines()[0]}")
     return ctypes.CDLL(str(out))
 
 
@@ -101,6 +107,13 @@ def oscillators(work: Workload, quick: bool, exact: bool) -> list[Form]:
     return [Form(OSCILLATORS, each, EXACT if exact else ()) for each in told]
 
 
+def pendulums(work: Workload, quick: bool, exact: bool) -> list[Form]:
+    """Block sizes; with the sine of the core, or the vector sine of the C library, for which the compiler wants fast-math."""
+    told = [(f"block {block}",) for block in (BLOCKS[:1] if quick else (8, 16, *BLOCKS))]
+    forms = [Form(OSCILLATORS, each, EXACT if exact else ()) for each in told]
+    return forms + [Form(OSCILLATORS, (*each, "libm"), (*FAST, "-fopenmp-simd")) for each in told if not exact]
+
+
 def body_blocks(quick: bool, exact: bool) -> list[tuple[str, ...]]:
     """Vectors side by side; with square root and division, or with an approximation that is made better."""
     blocks = [(f"block {block}",) for block in (BODY_BLOCKS[:1] if quick else BODY_BLOCKS)]
@@ -130,6 +143,8 @@ def cluster(work: Workload, quick: bool, exact: bool) -> list[Form]:
 FORMS = {
     "free_false_euler": oscillators,
     "forced_standard_heun": oscillators,
+    "pendulums_standard_heun": pendulums,
+    "pendulums_rk4": pendulums,
     "bodies_false_euler": bodies,
     "bodies_leapfrog": bodies,
     "cluster_leapfrog": cluster,

@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from .. import unrolled
+from ..workloads import w2_pendulums
 from . import Contestant, MissingPeerError, Ready, Workload, fastest, threads
 
 
@@ -94,6 +95,69 @@ def forced_standard_heun(lanes: int, together: int, sine: str = "polynomial"):
                         vi += 0.5 * (dv1 + dv2)
                         yi += 0.5 * (dy1 + wi * v1)
                     v[i], y[i] = vi, yi
+            for i in range(min(lanes, n - b)):
+                v_out[b + i], y_out[b + i] = v[i], y[i]
+        return v_out, y_out
+
+    return njit(run)
+
+
+def pendulums_standard_heun(lanes: int, together: int, sine: str = "polynomial"):
+    """A kernel of this shape and this sine; the drive is the same for all members, so its sine is taken once in a step."""
+    sin = math.sin if sine == "libm" else njit(polynomial_sine, inline="always")
+    frequency, damping = w2_pendulums.FREQUENCY, w2_pendulums.DAMPING
+
+    def run(h, steps, v0, y0, amplitude):
+        n, drag = v0.size, 2.0 * damping * h
+        v_out, y_out = np.empty(n), np.empty(n)
+        v, y, force = np.empty(lanes), np.empty(lanes), np.empty(lanes)
+        for b in range(0, n, lanes):
+            for i in range(lanes):
+                m = min(b + i, n - 1)
+                v[i], y[i], force[i] = v0[m], y0[m], h * amplitude[m]
+            for k in range(steps):
+                now, later = math.sin(frequency * (k * h)), math.sin(frequency * (k * h + h))
+                for i in range(lanes):
+                    vi, yi, fi = v[i], y[i], force[i]
+                    dv1 = fi * now - h * sin(yi) - drag * vi
+                    v1 = vi + dv1
+                    dv2 = fi * later - h * sin(yi + h * vi) - drag * v1
+                    v[i] = vi + 0.5 * (dv1 + dv2)
+                    y[i] = yi + 0.5 * (h * vi + h * v1)
+            for i in range(min(lanes, n - b)):
+                v_out[b + i], y_out[b + i] = v[i], y[i]
+        return v_out, y_out
+
+    return njit(run)
+
+
+def pendulums_rk4(lanes: int, together: int, sine: str = "polynomial"):
+    """Likewise."""
+    sin = math.sin if sine == "libm" else njit(polynomial_sine, inline="always")
+    frequency, damping = w2_pendulums.FREQUENCY, w2_pendulums.DAMPING
+
+    def run(h, steps, v0, y0, amplitude):
+        n, drag = v0.size, 2.0 * damping * h
+        v_out, y_out = np.empty(n), np.empty(n)
+        v, y, force = np.empty(lanes), np.empty(lanes), np.empty(lanes)
+        for b in range(0, n, lanes):
+            for i in range(lanes):
+                m = min(b + i, n - 1)
+                v[i], y[i], force[i] = v0[m], y0[m], h * amplitude[m]
+            for k in range(steps):
+                t = k * h
+                now, half, later = math.sin(frequency * t), math.sin(frequency * (t + 0.5 * h)), math.sin(frequency * (t + h))
+                for i in range(lanes):
+                    vi, yi, fi = v[i], y[i], force[i]
+                    dv1 = fi * now - h * sin(yi) - drag * vi
+                    v2 = vi + 0.5 * dv1
+                    dv2 = fi * half - h * sin(yi + 0.5 * h * vi) - drag * v2
+                    v3 = vi + 0.5 * dv2
+                    dv3 = fi * half - h * sin(yi + 0.5 * h * v2) - drag * v3
+                    v4 = vi + dv3
+                    dv4 = fi * later - h * sin(yi + h * v3) - drag * v4
+                    v[i] = vi + (dv1 + 2.0 * (dv2 + dv3) + dv4) / 6.0
+                    y[i] = yi + h * (vi + 2.0 * (v2 + v3) + v4) / 6.0
             for i in range(min(lanes, n - b)):
                 v_out[b + i], y_out[b + i] = v[i], y[i]
         return v_out, y_out
@@ -234,6 +298,7 @@ def forms(work: Workload, quick: bool):
     return [(work.bodies, form, threads() if work.family == "shared_cluster" else 1) for form in ("once", "all")]
 
 
+PENDULUMS = [*product((16, 64, 128), (1,), ("polynomial",)), (64, 1, "libm")]
 BODIES = best(few_bodies, lanes, lambda shape: f"block {shape[3]}", lambda work: int(work.method == "leapfrog"))
 CLUSTER = best(cluster, forms, lambda shape: f"{shape[1]}" + f", threads {shape[2]}" * (shape[2] > 1), lambda work: 1)
 KERNELS = {
@@ -244,6 +309,8 @@ KERNELS = {
         (64, 1, "libm"),
         *product((1,), (1, 8), ("polynomial", "libm")),
     ),
+    "pendulums_standard_heun": oscillators(pendulums_standard_heun, *PENDULUMS),
+    "pendulums_rk4": oscillators(pendulums_rk4, *PENDULUMS),
     "bodies_false_euler": BODIES,
     "bodies_leapfrog": BODIES,
     "cluster_leapfrog": CLUSTER,

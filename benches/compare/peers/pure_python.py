@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .. import unrolled
+from ..workloads import w2_pendulums
 from . import Contestant, Ready, Workload
 
 
@@ -49,6 +50,25 @@ def forced_standard_heun(work: Workload, quick: bool) -> Ready:
     return Ready(call)
 
 
+def pendulums_standard_heun(work: Workload, quick: bool) -> Ready:
+    """A predictor, then the mean of the increments at both ends."""
+    rows, drag, f = [row.tolist() for row in work.data.values()], 2.0 * w2_pendulums.DAMPING, w2_pendulums.FREQUENCY
+
+    def call():
+        out, h, sin = [], work.dt, math.sin
+        for v, y, amplitude in zip(*rows, strict=True):
+            for k in range(work.steps):
+                t = k * h
+                a1 = amplitude * sin(f * t) - sin(y) - drag * v
+                v1, y1 = v + h * a1, y + h * v
+                a2 = amplitude * sin(f * (t + h)) - sin(y1) - drag * v1
+                v, y = v + 0.5 * h * (a1 + a2), y + 0.5 * h * (v + v1)
+            out.append((v, y))
+        return tuple(np.array(out).T)
+
+    return Ready(call)
+
+
 def bodies(work: Workload, quick: bool) -> Ready:
     """Each pair once, written out."""
     run = unrolled.one_by_one(work.bodies, work.dim, work.method, {"sqrt": math.sqrt, "empty": np.empty})
@@ -59,6 +79,7 @@ def bodies(work: Workload, quick: bool) -> Ready:
 KERNELS = {
     "free_false_euler": free_false_euler,
     "forced_standard_heun": forced_standard_heun,
+    "pendulums_standard_heun": pendulums_standard_heun,
     "bodies_false_euler": bodies,
     "bodies_leapfrog": bodies,
 }

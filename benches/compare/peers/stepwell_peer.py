@@ -6,6 +6,7 @@ import functools
 
 import stepwell as sw
 
+from ..workloads import w2_pendulums
 from . import Contestant, Ready, Workload, threads
 
 
@@ -20,6 +21,12 @@ def forced(data) -> sw.System:
     return sw.Oscillator(omega=data["omega"], damping=data["damping"], a=push)
 
 
+def pendulums(data) -> sw.System:
+    """Damped pendulums under one drive."""
+    drive = sw.Sinusoid(data["amplitude"], w2_pendulums.FREQUENCY)
+    return sw.Pendulum(1.0, w2_pendulums.DAMPING, a=drive)
+
+
 def bodies(data) -> sw.System:
     """Bodies under Newton's law."""
     return sw.NBody(data["masses"], force="newton", softening=data["softening"])
@@ -28,6 +35,8 @@ def bodies(data) -> sw.System:
 SYSTEMS = {
     "free_false_euler": (free, "false_euler"),
     "forced_standard_heun": (forced, "standard_heun"),
+    "pendulums_standard_heun": (pendulums, "standard_heun"),
+    "pendulums_rk4": (pendulums, "rk4"),
     "bodies_false_euler": (bodies, "false_euler"),
     "bodies_leapfrog": (bodies, "leapfrog"),
     "cluster_leapfrog": (bodies, "leapfrog"),

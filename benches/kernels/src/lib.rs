@@ -142,6 +142,23 @@ pub fn variants() -> Vec<Variant> {
         y: (0..n).map(|i| 1.0 / (i + 1) as f64).collect(),
         ..Variant::default()
     }));
+    let drives: [&[&'static str]; 4] = [&[], &["damped"], &["damped", "held"], &["damped", "sine"]];
+    all.extend(drives.map(|options| Variant {
+        system: "pendulum",
+        options: options.to_vec(),
+        parameters: vec![1.3, 0.1, 0.5, 1.1, 0.3],
+        tables: usize::from(options.contains(&"held")),
+        v: vec![0.0],
+        y: vec![1.0],
+        ..Variant::default()
+    }));
+    all.push(Variant {
+        system: "restricted_three_body",
+        parameters: vec![0.1],
+        v: vec![0.1, 0.9],
+        y: vec![0.7, 0.3],
+        ..Variant::default()
+    });
     all.push(linear(1, &["acceleration"]));
     all.push(linear(1, &["sine"]));
     all.push(linear(2, &["held", "sine"]));

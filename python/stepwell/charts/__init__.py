@@ -1,9 +1,12 @@
 """Charts: data objects with ``.plot()``, ``.to_csv()``, ``.to_json()`` and ``.summary()``."""
 
+from . import peers
 from .control import ControlSweep, Held, control
 from .data import Curve, Point, Timing, WorkPrecision
 from .figures import Figures, Samples, figures
 from .maps import Observation, StabilityMap, stability_map
+from .panel import Panel, panel
+from .peers import Peer, Solved
 from .powers import Powers, powers
 from .runs import RunPicture, run_picture
 from .work_precision import work_precision
@@ -16,16 +19,21 @@ __all__ = [
     "Held",
     "Locus",
     "Observation",
+    "Panel",
+    "Peer",
     "Point",
     "Powers",
     "RunPicture",
     "Samples",
+    "Solved",
     "Stability",
     "StabilityMap",
     "Timing",
     "WorkPrecision",
     "control",
     "figures",
+    "panel",
+    "peers",
     "powers",
     "run_picture",
     "stability",

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._checks import known
 from ..methods import Method
 from ..scenes import Scene
+from .peers import Peer
 from .style import Drawn
 
 if TYPE_CHECKING:
@@ -19,10 +21,14 @@ if TYPE_CHECKING:
 #: State errors for which the summary gives the cheapest cost.
 TARGETS = (1e-1, 1e-2, 1e-4)
 
+#: Errors of a point, and costs: counted, or measured in a batch or alone.
+ERRORS = ("state_error", "end_error", "phase_error", "energy_error")
+COSTS = ("evaluations", "batch", "single")
+
 
 @dataclass(frozen=True)
 class Timing:
-    """Measured nanoseconds per step of one member of a batch: not repeatable.
+    """Measured nanoseconds, per step or per unit of time of one member: not repeatable.
 
     Attributes:
         median: of the repeats.
@@ -34,28 +40,49 @@ class Timing:
     low: float
     high: float
 
+    def over(self, dt: float) -> Timing:
+        """Per unit of time, of a time per step."""
+        return Timing(self.median / dt, self.low / dt, self.high / dt)
+
+    @classmethod
+    def unknown(cls) -> Timing:
+        """What was not measured."""
+        return cls(math.nan, math.nan, math.nan)
+
 
 @dataclass(frozen=True)
 class Point:
-    """One method with one step.
+    """One method with one step, or one tolerance.
 
     Attributes:
-        steps: how many steps were made over the horizon.
-        dt: the step, in units of time.
-        cost: rate evaluations per unit of simulated time.
-        state_error: the largest of ``Scene.state_error`` over the run.
-        energy_error: the largest of ``Scene.energy_error`` over the run.
+        steps: how many steps were made over the horizon; with a tolerance all that were tried. None if a peer does not tell.
+        dt: the step, in units of time; with a tolerance the mean of all that were tried.
+        cost: rate evaluations per unit of simulated time; NaN if a peer does not tell.
+        state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the times that are asked for.
+        energy_error: the largest of ``Scene.energy_error`` over the run, likewise; NaN if the system has no energy.
         unstable: the state left the finite numbers, or is wrong altogether (an error above 1) and grew: its largest
             amplitude in the second half of the run is more than a tenth above that in the first half, and above the
-            exact one.
+            exact one. With a tolerance: the run stopped early.
+        end_error: the state error at the end of the run.
+        phase_error: how far the end is ahead of the exact motion, in periods, behind is negative; None of a scene without a
+            period, and of a state without a digit right.
+        tolerance: with which the steps were chosen, or None.
     """
 
-    steps: int
-    dt: float
+    steps: int | None
+    dt: float | None
     cost: float
     state_error: float
     energy_error: float
     unstable: bool
+    end_error: float = math.nan
+    phase_error: float | None = None
+    tolerance: float | None = None
+
+    def error(self, kind: str = "state_error") -> float:
+        """One of ``ERRORS``, without its sign; NaN if it is not known."""
+        value: float | None = getattr(self, kind)
+        return math.nan if value is None else abs(value)
 
     @property
     def usable(self) -> bool:
@@ -65,20 +92,54 @@ class Point:
 
 @dataclass(frozen=True)
 class Curve:
-    """One method on the whole ladder of steps.
+    """One method on the whole ladder of steps, or of tolerances; or a peer.
 
     Attributes:
         method: which.
-        points: from the largest step to the smallest.
+        points: from the largest step, or tolerance, to the smallest.
         largest_stable_step: below it the method is stable over the horizon, to 0.1 %; infinite if no step of the ladder
-            is unstable, 0 if all are.
-        step_time: measured.
+            is unstable, 0 if all are. With a tolerance infinite.
+        step_time: measured, of a step of one member of a batch.
+        single_time: measured, of a step of a single run.
+        by: ``"step"`` or ``"tolerance"``, what goes down the ladder.
+        times: of a peer, measured per unit of simulated time at each point, in a single run.
     """
 
-    method: Method
+    method: Method | Peer
     points: tuple[Point, ...]
     largest_stable_step: float
     step_time: Timing
+    single_time: Timing = field(default_factory=Timing.unknown)
+    by: str = "step"
+    times: tuple[Timing, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
+        return f"{self.method.name}{self._tolerance}"
+
+    @property
+    def title(self) -> str:
+        """As ``name``, for pictures."""
+        return f"{self.method.title}{self._tolerance}"
+
+    @property
+    def _tolerance(self) -> str:
+        return ", tolerance" if self.by == "tolerance" and isinstance(self.method, Method) else ""
+
+    def time(self, i: int, cost: str) -> Timing:
+        """Measured nanoseconds per unit of simulated time at point ``i``, with a ``cost`` of ``"batch"`` or ``"single"``."""
+        if self.times:
+            return self.times[i] if cost == "single" else Timing.unknown()
+        dt = self.points[i].dt
+        assert dt is not None
+        return (self.step_time if cost == "batch" else self.single_time).over(dt)
+
+    def costs(self, cost: str = "evaluations") -> list[float]:
+        """The cost of each point, per unit of simulated time: one of ``COSTS``; NaN if it is not known."""
+        if cost == "evaluations":
+            return [point.cost for point in self.points]
+        return [self.time(i, cost).median for i in range(len(self.points))]
 
     @property
     def usable(self) -> tuple[Point, ...]:
@@ -95,12 +156,14 @@ class WorkPrecision(Drawn):
     """Error against cost of several methods on one scene.
 
     Attributes:
-        scene: which.
-        curves: one for each method that can do the scene.
+        scene: which; if it has no exact solution of its own, with that of a tight run, up to where that is known.
+        curves: one for each method that can do the scene, then one for each that can go by tolerance, then the peers'.
         refused: why the others cannot, by name.
         members: members of the batch whose time was measured, on one thread.
         repeats: how often each method was timed.
         isa: the CPU level at which it was measured.
+        floor: errors below this mean nothing, for the true motion is not known better.
+        cut: whether the scene's horizon is longer, and its true motion not known so far.
     """
 
     scene: Scene
@@ -109,61 +172,130 @@ class WorkPrecision(Drawn):
     members: int
     repeats: int
     isa: str
+    floor: float = 0.0
+    cut: bool = False
 
-    def draw(self) -> Figure:
+    def draw(self, error: str = "state_error", time: str = "batch") -> Figure:
         """The picture, on a new figure."""
         from .picture import draw
 
-        return draw(self)
+        return draw(self, known("error", error, ERRORS), known("time", time, COSTS[1:]))
+
+    def plot(self, path: str | Path | None = None, *, error: str = "state_error", time: str = "batch") -> Figure:
+        """Draw it, and write it to ``path`` if given; the ending says in which format.
+
+        Args:
+            path: where to.
+            error: which one is shown: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
+            time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
+
+        Raises:
+            ArgumentError: if there is no such error, time or format.
+            UnsupportedError: if matplotlib is missing.
+        """
+        return self.write(self.draw(error, time), path)
+
+    def front(self, error: str = "state_error", cost: str = "evaluations") -> list[dict[str, Any]]:
+        """The Pareto front: the points than which none is both as cheap and as right, from the cheapest to the most right.
+
+        Of points that are usable, with an error not below ``floor``.
+
+        Args:
+            error: one of ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
+            cost: ``"evaluations"``, which is repeatable, or measured, ``"batch"`` or ``"single"``, which is not.
+
+        Returns:
+            A row for each: scene, method, steps, dt, tolerance, cost per unit of simulated time, error.
+
+        Raises:
+            ArgumentError: if there is no such error or cost.
+        """
+        known("error", error, ERRORS)
+        known("cost", cost, COSTS)
+        found = [
+            (spent, point.error(error), i, curve, point)
+            for i, curve in enumerate(self.curves)
+            for spent, point in zip(curve.costs(cost), curve.points, strict=True)
+            if point.usable and math.isfinite(spent) and math.isfinite(point.error(error)) and point.error(error) >= self.floor
+        ]
+        rows: list[dict[str, Any]] = []
+        least = math.inf
+        for spent, wrong, _, curve, point in sorted(found, key=lambda each: each[:3]):
+            if wrong < least:
+                least = wrong
+                which = {"steps": point.steps, "dt": point.dt, "tolerance": point.tolerance}
+                rows.append({"scene": self.scene.name, "method": curve.name} | which | {"cost": spent, "error": wrong})
+        return rows
+
+    def best(self, error: float, cost: str = "evaluations") -> dict[str, Any] | None:
+        """The row of the front that is the cheapest with at most that state error, or None."""
+        return next((row for row in self.front(cost=cost) if row["error"] <= error), None)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each point, and one for each refused method. Columns named ``measured_…`` are not repeatable."""
         rows: list[dict[str, Any]] = []
+        front = {(row["method"], row["steps"], row["tolerance"]) for row in self.front()}
         for curve in self.curves:
-            head = {"scene": self.scene.name, "method": curve.method.name, "order": curve.method.order}
-            for point in curve.points:
-                times = {f"measured_ns_per_time_{k}": ns / point.dt for k, ns in asdict(curve.step_time).items()}
-                rows.append(head | asdict(point) | times | {"refused": ""})
+            head = {"scene": self.scene.name, "method": curve.name, "order": curve.method.order, "by": curve.by}
+            for i, point in enumerate(curve.points):
+                times = {f"measured_ns_per_time_{k}": ns for k, ns in asdict(curve.time(i, "batch")).items()}
+                times |= {f"measured_ns_per_time_single_{k}": ns for k, ns in asdict(curve.time(i, "single")).items()}
+                on = {"front": (curve.name, point.steps, point.tolerance) in front}
+                rows.append(head | asdict(point) | on | times | {"refused": ""})
         empty = dict.fromkeys(rows[0], "") if rows else {}
         return rows + [
             empty | {"scene": self.scene.name, "method": name, "refused": reason} for name, reason in self.refused.items()
         ]
 
     def summary(self) -> list[dict[str, Any]]:
-        """A row for each method: its cheapest cost for each of three errors, its limits, its time per step."""
+        """A row for each curve: its cheapest cost for each of three errors, its limits, its time per step."""
         rows: list[dict[str, Any]] = []
         for curve in self.curves:
             costs = {f"cost_at_error_{error:g}": curve.cheapest(error) for error in TARGETS}
             best = {"least_error": min((point.state_error for point in curve.usable), default=math.inf)}
             rows.append(
-                {"scene": self.scene.name, "method": curve.method.name, "title": curve.method.title}
+                {"scene": self.scene.name, "method": curve.name, "title": curve.title}
                 | costs
                 | best
                 | {"largest_stable_step": curve.largest_stable_step}
                 | {f"measured_ns_per_step_{k}": ns for k, ns in asdict(curve.step_time).items()}
+                | {f"measured_ns_per_step_single_{k}": ns for k, ns in asdict(curve.single_time).items()}
             )
         return rows
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write ``rows()``, one line each; every number reads back as itself."""
-        rows = self.rows()
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-
-    def to_json(self, path: str | Path) -> None:
-        """Write scene, rows, summary and refusals; what is infinite is null."""
-        scene = {k: getattr(self.scene, k) for k in ("name", "title", "section", "description", "error", "dt", "horizon")}
+    def as_dict(self) -> dict[str, Any]:
+        """Scene, rows, front, summary and refusals."""
+        scene = {
+            k: getattr(self.scene, k) for k in ("name", "title", "section", "description", "error", "dt", "horizon", "period")
+        }
         measured = {"members": self.members, "threads": 1, "repeats": self.repeats, "isa": self.isa}
-        whole = {
+        return {
             "scene": scene,
+            "floor": self.floor,
+            "cut": self.cut,
             "measured_on": measured,
             "rows": self.rows(),
+            "front": self.front(),
             "summary": self.summary(),
             "refused": self.refused,
         }
-        Path(path).write_text(json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write ``rows()``, one line each; every number reads back as itself, and what is None is empty."""
+        rows_to_csv(self.rows(), path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write ``as_dict()``; what is not finite is null."""
+        Path(path).write_text(json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+
+
+def rows_to_csv(rows: list[dict[str, Any]], path: str | Path) -> None:
+    """Write rows that share their columns."""
+    columns = max(rows, key=len)
+    with Path(path).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(columns), restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def finite(value: Any) -> Any:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from ..methods import method as find_method
+from ..methods import Method
+from ..methods import methods as every_method
 from .data import Curve, WorkPrecision
-from .style import FONT, GREY, look, new_figure
+from .peers import Peer
+from .style import FONT, GREY, look, new_figure, peer_look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,21 +23,43 @@ SLOPES = (1, 2, 4)
 PANELS, LEGEND = 0.717, 0.727
 
 
-def draw(chart: WorkPrecision) -> Figure:
+#: What the errors are called on an axis.
+ERRORS = {
+    "state_error": "largest state error of the run, relative",
+    "end_error": "state error at the end of the run, relative",
+    "phase_error": "phase error at the end of the run, periods",
+    "energy_error": "largest energy error of the run, relative",
+}
+TIMES = {"batch": "batch", "single": "single run"}
+
+#: Under the curves, the points than which none is both as cheap and as right.
+FRONT: dict[str, Any] = {"color": "#f2c14e", "linewidth": 9.0, "alpha": 0.75, "solid_capstyle": "round", "zorder": 1.0}
+
+
+def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
     """Draw the chart on a new figure."""
     figure = new_figure(16.0, 9.0)
     from matplotlib import rc_context
 
     with rc_context(FONT):
-        _panels(figure, chart)
+        _panels(figure, chart, error, time)
         _legend(figure, chart)
-        _text(figure, chart)
+        _text(figure, chart, time)
     return figure
 
 
-def _panels(figure: Figure, chart: WorkPrecision) -> None:
+def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
+    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted."""
+    if isinstance(curve.method, Peer):
+        others = [each.method.name for each in chart.curves if isinstance(each.method, Peer)]
+        return peer_look(others.index(curve.method.name))
+    own = look(curve.method)
+    return own | {"markerfacecolor": "white", "linestyle": "-."} if curve.by == "tolerance" else own
+
+
+def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> None:
     """Below, what has a digit right: error against cost. Above, one row for each method, what has none."""
-    strip = 0.032 * (len(chart.curves) + 1)
+    strip = 0.026 * (len(chart.curves) + 1)
     grid = figure.add_gridspec(
         2,
         2,
@@ -47,28 +70,29 @@ def _panels(figure: Figure, chart: WorkPrecision) -> None:
         bottom=0.165,
         top=0.88,
         hspace=0.0,
-        wspace=0.04,
+        wspace=0.07,
     )
     counted = figure.add_subplot(grid[1, 0])
     measured = figure.add_subplot(grid[1, 1], sharey=counted)
     above_counted = figure.add_subplot(grid[0, 0], sharex=counted)
     above_measured = figure.add_subplot(grid[0, 1], sharex=measured)
 
-    _errors(counted, chart, _evaluations)
-    _errors(measured, chart, _nanoseconds)
-    _spreads(measured, chart)
-    _wrong(above_counted, chart, _evaluations)
-    _wrong(above_measured, chart, _nanoseconds)
+    draw_errors(counted, chart, error, "evaluations")
+    draw_errors(measured, chart, error, time)
+    if error == "state_error":
+        _spreads(measured, chart, time)
+    _wrong(above_counted, chart, "evaluations")
+    _wrong(above_measured, chart, time)
     _slopes(counted)
 
     for axes in (counted, measured, above_counted, above_measured):
         axes.minorticks_off()
     counted.set_xlabel("rate evaluations per unit of simulated time")
-    counted.set_ylabel("largest state error of the run, relative")
-    measured.set_xlabel("measured ns per unit of simulated time")
+    counted.set_ylabel(ERRORS[error])
+    measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
     measured.tick_params(labelleft=False)
     for row, curve in enumerate(chart.curves):
-        style = look(curve.method) | {
+        style = look_of(chart, curve) | {
             "linestyle": "",
             "clip_on": False,
             "transform": above_counted.get_yaxis_transform(),
@@ -77,49 +101,58 @@ def _panels(figure: Figure, chart: WorkPrecision) -> None:
     above_counted.set_ylabel("no digit right:\n○ bounded\n× unstable", rotation=0, ha="right", va="center", labelpad=16, size=12)
 
 
-def _evaluations(curve: Curve, dt: float) -> float:
-    return curve.method.evaluations / dt
-
-
-def _nanoseconds(curve: Curve, dt: float) -> float:
-    return curve.step_time.median / dt
-
-
-def _errors(axes: Axes, chart: WorkPrecision, cost: Callable[[Curve, float], float]) -> None:
+def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None:
+    """The curves, and the front under them."""
     axes.set(xscale="log", yscale="log")
     for i, curve in enumerate(chart.curves):
-        x = [cost(curve, point.dt) for point in curve.points]
-        y = [point.state_error if point.usable else math.nan for point in curve.points]
+        y = [point.error(error) if point.usable else math.nan for point in curve.points]
         # Markers at different rungs, so that curves that fall together are still seen to be two.
-        axes.plot(x, y, markevery=(2 * i % 5, 5), **look(curve.method))
-    errors = [point.state_error for curve in chart.curves for point in curve.usable if point.state_error > 0.0]
-    axes.set_ylim(min(errors, default=0.1) / 3.0, 1.0)
+        axes.plot(curve.costs(cost), y, markevery=(2 * i % 5, 5), **look_of(chart, curve))
+    front = chart.front(error, cost)
+    axes.plot([row["cost"] for row in front], [row["error"] for row in front], **FRONT)
+    errors = [point.error(error) for curve in chart.curves for point in curve.usable if point.error(error) > 0.0]
+    low = min(errors, default=0.1) / 3.0
+    if chart.floor:
+        low = max(low, chart.floor / 3.0)
+        axes.axhspan(low, chart.floor, color="#dddddd", linewidth=0.0, zorder=0.5)
+    axes.set_ylim(low, 1.0)
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
 
 
-def _spreads(axes: Axes, chart: WorkPrecision) -> None:
+def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:
     """The least and the greatest measured time, at the end of each curve."""
     for curve in chart.curves:
-        for point in curve.usable[-1:]:
-            x = [ns / point.dt for ns in (curve.step_time.low, curve.step_time.high)]
-            axes.plot(x, [point.state_error] * 2, color=look(curve.method)["color"], linewidth=1.0, marker="|")
+        usable = [i for i, point in enumerate(curve.points) if point.usable]
+        for i in usable[-1:]:
+            spent = curve.time(i, time)
+            y = [curve.points[i].state_error] * 2
+            axes.plot([spent.low, spent.high], y, color=look_of(chart, curve)["color"], linewidth=1.0, marker="|")
 
 
-def _wrong(strip: Axes, chart: WorkPrecision, cost: Callable[[Curve, float], float]) -> None:
+def _wrong(strip: Axes, chart: WorkPrecision, cost: str) -> None:
     """A mark at each step that leaves no digit right, and the method's own marker where it becomes unstable."""
     for row, curve in enumerate(chart.curves):
-        style = look(curve.method) | {"linestyle": ""}
+        style = look_of(chart, curve) | {"linestyle": ""}
+        costs = list(zip(curve.costs(cost), curve.points, strict=True))
         for marker, size, unstable in (("x", 5.0, True), ("o", 3.5, False)):
-            x = [cost(curve, point.dt) for point in curve.points if not point.usable and point.unstable == unstable]
-            mark = {"marker": marker, "markersize": size, "markerfacecolor": "none"}
+            x = [spent for spent, point in costs if not point.usable and point.unstable == unstable]
+            mark = {"marker": marker, "markersize": size, "markerfacecolor": "none", "markeredgewidth": 1.0}
             strip.plot(x, [row] * len(x), **(style | mark))
         if 0.0 < curve.largest_stable_step < math.inf:
-            strip.plot([cost(curve, curve.largest_stable_step)], [row], **style)
+            strip.plot([_at_edge(curve, cost)], [row], **style)
     strip.set_ylim(len(chart.curves) - 0.2, -0.7)
     strip.set_yticks([])
     strip.tick_params(labelbottom=False, bottom=False)
     strip.grid(axis="x", color="#dddddd", linewidth=0.8)
     strip.set_facecolor("#f3f3f3")
+
+
+def _at_edge(curve: Curve, cost: str) -> float:
+    """The cost of the largest stable step."""
+    if cost == "evaluations":
+        assert isinstance(curve.method, Method)
+        return curve.method.evaluations / curve.largest_stable_step
+    return (curve.step_time if cost == "batch" else curve.single_time).median / curve.largest_stable_step
 
 
 def _slopes(axes: Axes) -> None:
@@ -137,35 +170,48 @@ def _slopes(axes: Axes) -> None:
 def _legend(figure: Figure, chart: WorkPrecision) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], **look(curve.method)) for curve in chart.curves]
-    labels = [_label(curve) for curve in chart.curves]
+    handles = [Line2D([], [], **look_of(chart, curve)) for curve in chart.curves] + [Line2D([], [], **FRONT)]
+    labels = [_label(curve) for curve in chart.curves] + ["the cheapest of all for its error"]
     place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (LEGEND, 0.89)}
-    legend = figure.legend(handles, labels, frameon=False, handlelength=3.0, labelspacing=0.7, borderpad=0.0, **place)
+    legend = figure.legend(
+        handles, labels, frameon=False, fontsize=11.0, handlelength=2.6, labelspacing=0.6, borderpad=0.0, **place
+    )
     figure.draw_without_rendering()
     bottom = legend.get_window_extent().transformed(figure.transFigure.inverted()).y0
-    refusals = [f"{find_method(name).title} is refused: {reason}." for name, reason in chart.refused.items()]
-    text = "\n\n".join(textwrap.fill(refusal, 44) for refusal in refusals)
-    figure.text(LEGEND + 0.003, bottom - 0.03, text, size=11.5, color=GREY, va="top")
+    refusals = [f"{title_of(name)} is refused: {reason}." for name, reason in chart.refused.items()]
+    text = "\n\n".join(textwrap.fill(refusal, 52) for refusal in refusals)
+    figure.text(LEGEND + 0.003, bottom - 0.02, text, size=10.0 if len(refusals) > 1 else 11.5, color=GREY, va="top")
+
+
+def title_of(name: str) -> str:
+    """The title of a method, or the name of a peer."""
+    return next((method.title for method in every_method() if method.name == name), name)
 
 
 def _label(curve: Curve) -> str:
     method, limit = curve.method, curve.largest_stable_step
-    name = f"{method.title} ({method.other_names[0]})" if method.other_names else method.title
+    if isinstance(method, Peer) or curve.by == "tolerance":
+        return curve.title
     # A method without a limit on the oscillator grows at every step; how far it gets depends on the horizon.
-    up_to = "stable up to dt" if method.limit else "grows; fails past dt"
-    stable = "stable throughout" if limit == math.inf else f"{up_to} = {limit:#.3g}" if limit else "never stable"
-    return f"{textwrap.fill(name, 41, break_on_hyphens=False)}\norder {method.order}, {stable}"
+    up_to = "stable dt <" if method.limit else "fails dt >"
+    stable = "" if limit == math.inf else f", {up_to} {limit:#.3g}" if limit else ", never stable"
+    return f"{method.title}, order {method.order}{stable}"
 
 
-def _text(figure: Figure, chart: WorkPrecision) -> None:
+def _text(figure: Figure, chart: WorkPrecision, time: str) -> None:
     scene = chart.scene
     figure.text(0.012, 0.955, f"{scene.title}: what each method costs and how wrong it is", size=20, weight="bold")
-    system = f"{scene.system!r} over {scene.horizon:.4g} units of time ({scene.section})"
+    system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)} ({scene.section})"
     figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
+    what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
     notes = (
-        f"Error 1, no digit right: {scene.error}.",
+        f"Error 1, no digit right: {scene.error}." + (" Grey: not known." if chart.floor else ""),
         "Unstable: not finite, or no digit right and a growing amplitude; a method's own marker is where that begins.",
-        f"Time: one member of a batch of {chart.members}, one thread, {chart.isa}; median of {chart.repeats} runs, "
-        "the bar at a curve's end spans them.",
+        f"Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, the bar at a curve's end spans them.",
     )
     figure.text(0.012, 0.018, "\n".join(notes), size=12, color=GREY, linespacing=1.4)
+
+
+def known_to(chart: WorkPrecision) -> str:
+    """That a chart ends where the true motion is no longer known."""
+    return ", as far as the true motion is known" if chart.cut else ""

@@ -13,7 +13,7 @@ from ..methods import methods as every_method
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARKERS = "osD^vPh*<>pd"
+MARKERS = "osD^vPh*<>pdX8H"
 COLOURS = (
     "#000000",
     "#0072b2",
@@ -27,9 +27,13 @@ COLOURS = (
     "#5f6b6d",
     "#a3003f",
     "#3b7d23",
+    "#b58900",
+    "#264653",
+    "#e07a9b",
 )
+PEERS = "1234+|"
 #: The line tells the order: the more accurate, the more solid.
-LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2))}
+LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5))}
 GREY = "#666666"
 
 #: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.
@@ -45,6 +49,18 @@ def look(method: Method) -> dict[str, Any]:
         "linestyle": LINES.get(method.order, "-"),
         "linewidth": 1.6,
         "markersize": 7.5,
+    }
+
+
+def peer_look(number: int) -> dict[str, Any]:
+    """Keywords for a line of another program, the first being 0."""
+    return {
+        "color": "#333333",
+        "marker": PEERS[number % len(PEERS)],
+        "linestyle": (0, (1, 2)),
+        "linewidth": 1.3,
+        "markersize": 9.0,
+        "markeredgewidth": 1.8,
     }
 
 
@@ -90,7 +106,11 @@ class Drawn(ABC):
             ArgumentError: if there is no such format.
             UnsupportedError: if matplotlib is missing.
         """
-        figure = self.draw()
+        return self.write(self.draw(), path)
+
+    @staticmethod
+    def write(figure: Figure, path: str | Path | None) -> Figure:
+        """Write what was drawn, if there is a path."""
         if path is not None:
             save(figure, path)
         return figure

@@ -1,4 +1,4 @@
-"""Chart error against cost: a picture and a table of numbers for each scene, and a summary."""
+"""Chart error against cost: a picture and a table of numbers for each scene, or one for all, and a summary."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import argparse
 import math
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
-from ..charts import WorkPrecision, work_precision
-from ..charts.data import TARGETS
-from ..charts.work_precision import chartable
+from ..charts import Panel, WorkPrecision, work_precision
+from ..charts.data import ERRORS, TARGETS
+from ..charts.picture import title_of
 from ..methods import method
 from ..scenes import scene
 from . import show
@@ -20,29 +21,44 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene; see stepwell scenes")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
+    parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
     show.json_option(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """Measure, draw, write, summarise."""
     # All names are looked up, and what is needed is there, before any work.
-    chosen = [chartable(scene(name)) for name in args.scenes]
+    chosen = [scene(name) for name in args.scenes]
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
     if not args.json:
         show.need_rich()
     args.output.mkdir(parents=True, exist_ok=True)
 
-    done = []
+    done: list[tuple[WorkPrecision, list[str]]] = []
     for one in chosen:
         with nullcontext(None) if args.json else show.progress(one.title) as told:
             chart = work_precision(one, methods, progress=told)
+        if args.panel:
+            done.append((chart, []))
+            continue
         files = [args.output / f"{one.name}{ending}" for ending in (".png", ".csv")]
-        chart.plot(files[0])
+        chart.plot(files[0], error=args.error)
         chart.to_csv(files[1])
         done.append((chart, [str(file) for file in files]))
+    if args.panel:
+        whole = Panel(tuple(chart for chart, _ in done))
+        files = [args.output / f"panel{ending}" for ending in (".png", ".csv", ".json")]
+        whole.plot(files[0], error=args.error)
+        whole.to_csv(files[1])
+        whole.to_json(files[2])
+        done = [(chart, [str(file) for file in files]) for chart, _ in done]
     if args.json:
         show.print_json(
-            [{"scene": c.scene.name, "files": files, "summary": c.summary(), "refused": c.refused} for c, files in done]
+            [
+                {"scene": c.scene.name, "files": files, "summary": c.summary(), "front": c.front(), "refused": c.refused}
+                for c, files in done
+            ]
         )
         return
     for chart, files in done:
@@ -52,12 +68,12 @@ def command(args: argparse.Namespace) -> None:
 def _summary(chart: WorkPrecision, files: list[str]) -> None:
     rows = [
         (
-            curve.method.title,
-            str(curve.method.order),
+            curve.title,
+            "–" if curve.method.order is None else str(curve.method.order),
             *(_number(curve.cheapest(error)) for error in TARGETS),
             _number(row["least_error"]),
             "all" if curve.largest_stable_step == math.inf else f"{curve.largest_stable_step:#.3g}",
-            f"{curve.step_time.median:.2g}",
+            _number(float(f"{curve.step_time.median:.2g}")),
         )
         for curve, row in zip(chart.curves, chart.summary(), strict=True)
     ]
@@ -72,9 +88,21 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
             "ns a step>",
         ),
         rows,
-        [f"{method(name).title} is refused: {reason}" for name, reason in chart.refused.items()]
+        _best(chart)
+        + [f"{title_of(name)} is refused: {reason}" for name, reason in chart.refused.items()]
         + [f"written: {', '.join(files)}"],
     )
+
+
+def _best(chart: WorkPrecision) -> list[str]:
+    """Which is the cheapest for each of three errors."""
+    rows = [(error, row) for error in TARGETS if (row := chart.best(error)) is not None]
+    text = "; ".join(f"for {error:g} {row['method']} ({_how(row)})" for error, row in rows)
+    return [f"cheapest: {text}"] if text else []
+
+
+def _how(row: dict[str, Any]) -> str:
+    return f"dt = {row['dt']:.3g}" if row["tolerance"] is None else f"tolerance {row['tolerance']:.3g}"
 
 
 def _number(value: float) -> str:

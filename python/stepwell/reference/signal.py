@@ -1,12 +1,18 @@
 """Inputs: what drives a system from outside, as a function of time."""
 
-import math
+import numpy as np
 
 from . import trig
 from .types import Array
 
 #: A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
 HOLD_SLACK = 1e-6
+
+
+def _aligned(values: Array, axes: int) -> tuple[int, ...]:
+    """The batch axes of samples, with ones before them until there are as many."""
+    own = values.shape[1:]
+    return (*(1,) * (axes - len(own)), *own)
 
 
 class Sine:
@@ -32,9 +38,14 @@ class Held:
 
     def at(self, t: float) -> Array:
         """The value at time t."""
-        i = math.floor((t - self.start) / self.interval + HOLD_SLACK)
-        value: Array = self.factor * self.values[max(0, min(i, len(self.values) - 1))]
-        return value
+        i = np.floor((t - self.start) / self.interval + HOLD_SLACK)
+        i = np.clip(i, 0, len(self.values) - 1).astype(np.int64)
+        if i.ndim == 0:  # one time for all members
+            return np.asarray(self.factor * self.values[i])
+        own = np.broadcast_to(
+            self.values.reshape((len(self.values), *_aligned(self.values, i.ndim))), (len(self.values), *i.shape)
+        )
+        return np.asarray(self.factor * np.take_along_axis(own, i[np.newaxis], axis=0)[0])
 
     def scaled(self, factor: Array) -> "Held":
         """The same input, times a factor."""

@@ -1,4 +1,8 @@
-"""Sine, the same to the last bit as the core's: see ``trig.rs`` for its error. The core needs no cosine."""
+"""Sine, the same to the last bit as the core's: see ``trig.rs`` for its error. The core needs no cosine.
+
+Stability analysis steps the reference on numbers that the core never sees, and these have a sine here as well: complex ones whose
+imaginary part is infinitesimal, and ones that count what is done to them.
+"""
 
 import numpy as np
 
@@ -27,6 +31,8 @@ C = (
 
 def sin(x: Array) -> Array:
     """Sin x."""
+    if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
+        return _sin(x.real, 0) + 1j * (x.imag * _sin(x.real, 1))
     return _sin(x, 0)
 
 
@@ -39,11 +45,13 @@ def _sin(x: Array, quadrants: int) -> Array:
     """Sin(x + quadrants·π/2): reduced by π/2 in three parts, then fdlibm's polynomials."""
     y = np.asarray(x * TWO_OVER_PI + MAGIC)
     n = y - MAGIC
-    quadrant = y.view(np.uint64) + np.uint64(quadrants)
     r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2]
     z = r * r
     s = r + (r * z) * (S[0] + z * (S[1] + z * (S[2] + z * (S[3] + z * (S[4] + z * S[5])))))
     c = (1.0 - 0.5 * z) + (z * z) * (C[0] + z * (C[1] + z * (C[2] + z * (C[3] + z * (C[4] + z * C[5])))))
+    if y.dtype == object:
+        return s  # numbers without bits, which count what is done to them; both branches were done
+    quadrant = y.view(np.uint64) + np.uint64(quadrants)
     a = np.asarray(np.where(quadrant & np.uint64(1) == 0, s, c))
     sign = (quadrant & np.uint64(2)) << np.uint64(62)
     signed: Array = (a.view(np.uint64) ^ sign).view(np.float64)

@@ -119,6 +119,40 @@ class Orbit:
         return v, y
 
 
+class TurningOrbit(Orbit):
+    """The orbit of a body without mass around two that circle each other, in the frame that turns with them, likewise.
+
+    Args:
+        mu: the light body's share of the mass; it stands at (1 − μ, 0), the heavy one at (−μ, 0).
+        v: velocity at t = 0, shape (2,).
+        y: place at t = 0, likewise.
+        tolerance: error of a step that is aimed at, relative to the state.
+    """
+
+    def __init__(self, mu: float, v: Array, y: Array, tolerance: float = TOLERANCE) -> None:
+        with localcontext(Context(prec=DIGITS)):
+            super().__init__([0.0], v, y, tolerance=tolerance)
+            self.masses += [1 - Decimal(mu), Decimal(mu)]
+            self._stand = [-Decimal(mu), 1 - Decimal(mu)]
+
+    def _series(self) -> tuple[list[Series], list[Series]]:
+        """The coefficients of both velocities and both coordinates around the last time."""
+        v, y = ([[x] for x in block] for block in self._state)
+        places = [*y, [self._stand[0]], [Decimal(0)], [self._stand[1]], [Decimal(0)]]
+        pairs = [_Pair(0, 1, 2), _Pair(0, 2, 2)]
+        for k in range(TERMS):
+            pull = [y[0][k] + 2 * v[1][k], y[1][k] - 2 * v[0][k]]
+            for pair in pairs:
+                for axis, p in enumerate(pair.next(k, places)):
+                    pull[axis] += self.masses[pair.j] * p
+            for series in places[2:]:
+                series.append(Decimal(0))
+            for place, speed, force in zip(y, v, pull, strict=True):
+                place.append(speed[k] / (k + 1))
+                speed.append(force / (k + 1))
+        return v, y
+
+
 class _Pair:
     """The series of the pull between two bodies, d/r³, term by term."""
 

@@ -6,5 +6,17 @@ from .inputs import Sampled, Sinusoid
 from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
+from .pendulum import Pendulum
+from .restricted_three_body import RestrictedThreeBody
 
-__all__ = ["Chain", "LinearSystem", "NBody", "Oscillator", "Sampled", "Sinusoid", "System"]
+__all__ = [
+    "Chain",
+    "LinearSystem",
+    "NBody",
+    "Oscillator",
+    "Pendulum",
+    "RestrictedThreeBody",
+    "Sampled",
+    "Sinusoid",
+    "System",
+]

@@ -127,6 +127,12 @@ class System(ABC):
         raise KeyError(name)
 
 
+def shown(given: dict[str, Any]) -> str:
+    """Arguments for a repr: those that are not None, arrays by their shape."""
+    short = {k: f"array{v.shape}" if isinstance(v, np.ndarray) and v.ndim else v for k, v in given.items() if v is not None}
+    return ", ".join(f"{k}={v}" for k, v in short.items())
+
+
 def row(values: Array, batch: Shape) -> Array:
     """One parameter as a row for the core."""
     return rows(values[np.newaxis], batch)

@@ -9,7 +9,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..reference.systems import oscillator as reference
-from .base import Parameters, System, row
+from .base import Parameters, System, row, shown
 from .inputs import Input, Sampled, Sinusoid, as_input, table
 
 FORMS = ("canonical", "physical")
@@ -49,8 +49,7 @@ class Oscillator(System):
 
     def __repr__(self) -> str:
         given = {"omega": self.omega, "damping": self.damping, "x": self.x, "a": self.a}
-        parts = [f"{k}={_short(v)}" for k, v in given.items() if v is not None]
-        return f"Oscillator({', '.join([*parts, f'form={self.form!r}'])})"
+        return f"Oscillator({shown(given)}, form={self.form!r})"
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs that it was given, by name."""
@@ -94,7 +93,3 @@ class Oscillator(System):
         """The same oscillator with these samples as its only input."""
         pulse: dict[str, Any] = {name: Sampled(values, interval)}
         return Oscillator(self.omega, self.damping, form=self.form, **pulse)
-
-
-def _short(value: Any) -> str:
-    return f"array{value.shape}" if isinstance(value, np.ndarray) and value.ndim else str(value)

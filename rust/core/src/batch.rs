@@ -1,18 +1,9 @@
 //! The driver: many members, some threads, what to keep, and who diverged.
 
-use std::{
-    sync::{
-        Mutex,
-        atomic::{
-            AtomicBool, AtomicU64, AtomicUsize,
-            Ordering::{Acquire, Relaxed, Release},
-        },
-    },
-    thread::{self, Thread},
-    time::{Duration, Instant},
-};
+use std::{thread, time::Instant};
 
 use crate::{
+    crew::{self, POLL},
     error::Error,
     group::{Clock, Group, Row, Width},
     table::Model,
@@ -74,8 +65,6 @@ pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
 const LOOK: i64 = 1024;
 /// About how many numbers to step between two looks at the clock; some milliseconds of the slowest system.
 const PATIENCE: i64 = 1 << 20;
-/// How long the caller's monitor may wait.
-const POLL: Duration = Duration::from_millis(20);
 /// Numbers × steps below which a second thread costs more than it brings.
 const WORTH_A_THREAD: f64 = 3e6;
 
@@ -91,7 +80,7 @@ struct Part<'a> {
 }
 
 /// Cuts every row of `width` numbers at the same places: one list of row slices per share.
-fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a mut [T]>> {
+pub(crate) fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a mut [T]>> {
     let rows = data.len().checked_div(width).unwrap_or(0);
     let mut parts: Vec<_> = shares.iter().map(|_| Vec::with_capacity(rows)).collect();
     for mut row in data.chunks_exact_mut(width.max(1)) {
@@ -104,7 +93,7 @@ fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a 
     parts
 }
 
-fn expect(what: &'static str, expected: usize, got: usize) -> Result<(), Error> {
+pub(crate) fn expect(what: &'static str, expected: usize, got: usize) -> Result<(), Error> {
     if expected == got { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
 }
 
@@ -169,67 +158,9 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let queue = Mutex::new(parts.into_iter());
-    let done = AtomicU64::new(0);
-    let stop = AtomicBool::new(false);
-    let total = (b as f64 * plan.steps as f64).max(1.0);
-    let take = || queue.lock().map_or(None, |mut q| q.next());
-    let busy = AtomicUsize::new(threads - 1);
-    let caller = thread::current();
-    thread::scope(|scope| {
-        let helpers: Vec<_> = (1..threads)
-            .map(|_| {
-                scope.spawn(|| {
-                    let _leave = Leave(&busy, &caller);
-                    let mut worker = Worker::new(plan, &clock, None)?;
-                    while let Some(part) = take() {
-                        worker.part(part, &mut |n| {
-                            done.fetch_add(n, Relaxed);
-                            !stop.load(Relaxed)
-                        })?;
-                    }
-                    Ok(())
-                })
-            })
-            .collect();
-        let mut asked = Instant::now();
-        let mut go_on = |n: u64| {
-            done.fetch_add(n, Relaxed);
-            if asked.elapsed() >= POLL {
-                asked = Instant::now();
-                if !monitor(done.load(Relaxed) as f64 / total) {
-                    stop.store(true, Relaxed);
-                }
-            }
-            !stop.load(Relaxed)
-        };
-        let mine = || {
-            let mut worker = Worker::new(plan, &clock, Some(wide))?;
-            while let Some(part) = take() {
-                worker.part(part, &mut go_on)?;
-            }
-            Ok(())
-        };
-        let mut result = mine();
-        while busy.load(Acquire) > 0 {
-            thread::park_timeout(POLL);
-            go_on(0);
-        }
-        for helper in helpers {
-            result = result.and(helper.join().unwrap_or(Err(Error::Interrupted)));
-        }
-        result
-    })
-}
-
-/// Tells the caller that a thread has nothing left to do, also if it panicked.
-struct Leave<'a>(&'a AtomicUsize, &'a Thread);
-
-impl Drop for Leave<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Release);
-        self.1.unpark();
-    }
+    let total = b as f64 * plan.steps as f64;
+    let mine = Worker::new(plan, &clock, Some(wide))?;
+    crew::share(parts, threads, total, monitor, mine, || Worker::new(plan, &clock, None), Worker::part)
 }
 
 /// Both slots and the tally when everybody was last looked at.

@@ -60,6 +60,36 @@ pub trait Block {
         }
     }
 
+    /// `self = a + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left
+    #[inline(always)]
+    fn sum_weighted<D: Block, const N: usize>(&mut self, a: &impl Block, terms: [(f64, &D); N]) {
+        let n = self.numbers().len();
+        let (a, terms) = (&a.numbers()[..n], terms.map(|(c, d)| (c, &d.numbers()[..n])));
+        for (i, s) in self.numbers_mut().iter_mut().enumerate() {
+            *s = a[i] + weighted(&terms, i);
+        }
+    }
+
+    /// `self = self + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left
+    #[inline(always)]
+    fn add_weighted<D: Block, const N: usize>(&mut self, terms: [(f64, &D); N]) {
+        let n = self.numbers().len();
+        let terms = terms.map(|(c, d)| (c, &d.numbers()[..n]));
+        for (i, s) in self.numbers_mut().iter_mut().enumerate() {
+            *s += weighted(&terms, i);
+        }
+    }
+
+    /// `self = c₀·d₀ + c₁·d₁ + …`, from the left
+    #[inline(always)]
+    fn set_weighted<D: Block, const N: usize>(&mut self, terms: [(f64, &D); N]) {
+        let n = self.numbers().len();
+        let terms = terms.map(|(c, d)| (c, &d.numbers()[..n]));
+        for (i, s) in self.numbers_mut().iter_mut().enumerate() {
+            *s = weighted(&terms, i);
+        }
+    }
+
     /// `self = self + (((a + 2 * b) + 2 * c) + d) * (1 / 6)`
     #[inline(always)]
     fn add_kutta(&mut self, a: &impl Block, b: &impl Block, c: &impl Block, d: &impl Block) {
@@ -121,8 +151,18 @@ pub fn at_a_line<T>(make: impl Fn() -> T, numbers: impl Fn(&T) -> &[f64]) -> T {
     }
 }
 
+/// The `i`-th number of c₀·d₀ + c₁·d₁ + …, from the left.
+#[inline(always)]
+fn weighted<const N: usize>(terms: &[(f64, &[f64]); N], i: usize) -> f64 {
+    let mut sum = terms[0].0 * terms[0].1[i];
+    for (c, d) in &terms[1..] {
+        sum += c * d[i];
+    }
+    sum
+}
+
 /// How many increments of each block a step may hold at once.
-pub const SLOTS: usize = 4;
+pub const SLOTS: usize = 6;
 
 /// Scratch for one step: the increments of the stages, and one intermediate state.
 ///

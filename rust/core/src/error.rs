@@ -3,6 +3,9 @@
 /// Why a run could not be made or did not end.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum Error {
+    /// The method has no estimate of its error.
+    #[error("the method does not estimate its error, so it cannot choose steps to a tolerance")]
+    NoEstimate,
     /// A system that there is not.
     #[error("there is no system {name:?}; known: {known}")]
     UnknownSystem {

@@ -143,6 +143,17 @@ pub trait Group: Send + Sync {
     /// Turns what the method carries into velocities, at step `k`: the inverse of `start`.
     fn finish(&mut self, k: i64);
 
+    /// Whether its lanes can go at a pace of their own, scaled to a step of 1.
+    fn adapts(&self) -> bool {
+        false
+    }
+
+    /// Takes the parameters of a member into one lane.
+    fn prepare_lane(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+
+    /// So many attempts of every lane that runs; `paces` are rows of lanes.
+    fn adapt(&mut self, _paces: &mut [f64], _budget: f64, _attempts: u32) {}
+
     /// How many numbers of a member it records.
     fn recorded(&self) -> usize {
         0

@@ -10,14 +10,17 @@
 //!
 //! [`table::group`] turns the names of a system and a method into a group.
 
+pub mod adaptive;
 pub mod batch;
 pub mod block;
 pub mod control;
+pub mod crew;
 pub mod error;
 pub mod group;
 pub mod isa;
 pub mod log;
 pub mod matrix;
+pub mod pace;
 pub mod panels;
 pub mod rows;
 pub mod signal;

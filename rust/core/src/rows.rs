@@ -12,6 +12,7 @@ use crate::{
     block::{Block, Work, at_a_line},
     group::{Clock, Group, Spec, Width},
     isa::{Isa, Task, with_isa},
+    pace::{self, NUMBERS, Pace, Stretched, Trial},
     stepper::Stepper,
     system::System,
 };
@@ -61,6 +62,7 @@ struct RowGroup<S: Large<L>, St, I, const L: usize> {
     y: Rows<L>,
     work: Work<S>,
     recorded: usize,
+    trial: Option<Trial<S>>,
     stepper: PhantomData<fn() -> St>,
 }
 
@@ -85,13 +87,36 @@ impl<S: System, St: Stepper> Task for Steps<'_, S, St> {
     }
 }
 
+/// So many attempts of a single member.
+struct Attempts<'a, S: System, St> {
+    pace: &'a mut Pace,
+    budget: f64,
+    attempts: u32,
+    system: &'a mut Stretched<S>,
+    v: &'a mut S::V,
+    y: &'a mut S::Y,
+    trial: &'a mut Trial<S>,
+    stepper: PhantomData<fn() -> St>,
+}
+
+impl<S: System, St: Stepper> Task for Attempts<'_, S, St> {
+    #[inline(always)]
+    fn run(self) {
+        for _ in 0..self.attempts {
+            if self.pace.runs(self.budget) {
+                pace::attempt::<S, St>(self.pace, self.budget, self.system, self.v, self.y, self.trial);
+            }
+        }
+    }
+}
+
 impl<S: Large<L>, St: Stepper, I: Isa, const L: usize> RowGroup<S, St, I, L> {
     fn boxed(isa: I, clock: &Clock, spec: &Spec) -> Box<dyn Group> {
         let (p, q) = S::shape(spec);
         let (v, y) = (zeros(p), zeros(q));
         let work = Work::new(St::RECORD.evaluations, &v, &y);
         let recorded = S::recorded(spec);
-        Box::new(Self { clock: *clock, isa, system: None, v, y, work, recorded, stepper: PhantomData::<fn() -> St> })
+        Box::new(Self { clock: *clock, isa, system: None, v, y, work, recorded, trial: None, stepper: PhantomData::<fn() -> St> })
     }
 }
 
@@ -104,7 +129,7 @@ where
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        self.system = Some(S::prepare(spec, &self.clock, |l| first + l.min(count - 1)));
+        self.system = Some(prepared(spec, &self.clock, first, count));
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -145,6 +170,39 @@ where
         }
     }
 
+    // Lanes of one block share the time at which a system is asked for its rates, so only a lone member has a pace of its own.
+    fn adapts(&self) -> bool {
+        L == 1 && St::RECORD.error_order.is_some()
+    }
+
+    fn prepare_lane(&mut self, spec: &Spec, _lane: usize, member: usize) {
+        self.prepare(spec, member, 1);
+    }
+
+    fn adapt(&mut self, paces: &mut [f64], budget: f64, attempts: u32) {
+        if L == 1
+            && St::RECORD.error_order.is_some()
+            && let Ok(rows) = <&mut [[f64; 1]; NUMBERS]>::try_from(paces.as_chunks_mut().0)
+            && let Some(system) = self.system.take()
+        {
+            let mut pace = Pace::load(rows, 0);
+            let mut system = Stretched::new(system);
+            let trial = self.trial.get_or_insert_with(|| Trial::new(St::RECORD.evaluations, &self.v, &self.y));
+            self.isa.run(Attempts::<S, St> {
+                pace: &mut pace,
+                budget,
+                attempts,
+                system: &mut system,
+                v: &mut self.v,
+                y: &mut self.y,
+                trial,
+                stepper: PhantomData,
+            });
+            *rows = pace.numbers().map(|n| [n]);
+            self.system = Some(system.system);
+        }
+    }
+
     fn recorded(&self) -> usize {
         self.recorded
     }
@@ -163,6 +221,12 @@ where
     fn tally_mut(&mut self) -> &mut [f64] {
         self.system.as_mut().map_or(&mut [], |s| s.tally_mut())
     }
+}
+
+/// The system of the members from a first one on: one function for each system, not one for each method and CPU level.
+#[inline(never)]
+fn prepared<S: Large<L>, const L: usize>(spec: &Spec, clock: &Clock, first: usize, count: usize) -> S {
+    S::prepare(spec, clock, |l| first + l.min(count - 1))
 }
 
 fn at_level<S: Large<L>, St: Stepper, const L: usize>(clock: &Clock, spec: &Spec) -> Box<dyn Group>

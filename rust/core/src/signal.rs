@@ -30,6 +30,22 @@ impl Signal for Sine {
     }
 }
 
+/// amplitude · sin(omega·t + phase), frequency and phase those of all lanes.
+#[derive(Clone, Copy, Debug)]
+pub struct Beat<'a, const L: usize> {
+    /// In the unit of the input.
+    pub amplitude: f64,
+    /// The sine.
+    pub sine: View<'a, L>,
+}
+
+impl<const L: usize> Signal for Beat<'_, L> {
+    #[inline(always)]
+    fn at(&self, t: f64) -> f64 {
+        self.amplitude * self.sine.beat(t)
+    }
+}
+
 /// A sampled input, held between samples. A constant is one sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Held<'a, const L: usize> {

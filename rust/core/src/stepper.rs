@@ -1,6 +1,9 @@
 //! Steppers: what users call methods.
 
-use crate::{block::Work, system::System};
+use crate::{
+    block::{Block, Work},
+    system::System,
+};
 
 /// Everything there is to say about a method. Python attributes, `__doc__`, the tables of the docs, the command line, tests,
 /// charts and benches all read it.
@@ -30,6 +33,8 @@ pub struct Record {
     pub carry: Option<&'static str>,
     /// Ways to start it, the default first; empty if there is nothing to choose.
     pub starts: &'static [&'static str],
+    /// Order of h in which the error of a step is estimated, if the method can: the step can then be chosen to a tolerance.
+    pub error_order: Option<u32>,
     /// Section of the document.
     pub section: &'static str,
     /// Where it comes from.
@@ -56,6 +61,12 @@ pub trait Stepper: 'static {
 
     /// One step of length `h` from time `t`, in place.
     fn step<S: System>(s: &mut S, t: f64, h: f64, v: &mut S::V, y: &mut S::Y, w: &mut Work<S>);
+
+    /// The estimate of the last step's error, from the increments that it left in `w`, into `w.v` and `w.y`.
+    #[inline(always)]
+    fn error<S: System>(w: &mut Work<S>) {
+        w.v.numbers_mut().fill(f64::NAN);
+    }
 
     /// Turns the velocity in the `v` slot into what the method carries there. `choice` counts [`Record::starts`].
     #[inline(always)]

@@ -12,8 +12,10 @@ use crate::{
     block::Work,
     group::{Clock, Group, Row, Spec, Table, Width},
     isa::{Isa, Task, with_isa},
+    pace::{self, NUMBERS, Pace, Stretched, Trial},
     stepper::Stepper,
     system::System,
+    trig,
 };
 
 /// A family of small systems: `P` velocities, `Q` coordinates, `C` parameters and as many constants.
@@ -29,6 +31,11 @@ pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + Sync + '
         1.0
     }
 
+    /// Frequency and phase of a sinusoid that all members have in common; it then stands after the sampled inputs.
+    fn beat(&self, _spec: &Spec) -> Option<(f64, f64)> {
+        None
+    }
+
     /// A member's system from its constants.
     fn member<'a, const L: usize>(
         h: f64,
@@ -38,7 +45,7 @@ pub trait Small<const P: usize, const Q: usize, const C: usize>: Send + Sync + '
     ) -> Self::Member<'a, L>;
 }
 
-/// A sampled input over the lanes of a group.
+/// A sampled input over the lanes of a group; or without samples, a sinusoid of the frequency `start` and the phase `interval`.
 #[derive(Clone, Debug)]
 pub struct Samples<const L: usize> {
     rows: Vec<[f64; L]>,
@@ -54,6 +61,26 @@ impl<const L: usize> Samples<L> {
     pub fn new(table: &Table, factor: impl Fn(usize) -> f64, member: impl Fn(usize) -> usize) -> Self {
         let over_lanes = |row: &Row| -> [f64; L] { from_fn(|l| factor(l) * row.at(member(l))) };
         Samples { rows: table.samples.iter().map(over_lanes).collect(), start: table.start, interval: table.interval }
+    }
+
+    /// All of a spec's, of the members from a first one on; lanes past the `count`-th repeat the last.
+    #[inline(never)]
+    fn all(spec: &Spec, factors: &[[f64; L]; INPUTS], first: usize, count: usize) -> Vec<Self> {
+        let made = spec.tables.iter().zip(factors);
+        made.map(|(table, factors)| Self::new(table, |l| factors[l], |l| first + l.min(count - 1))).collect()
+    }
+
+    /// Takes a member's samples into a lane.
+    #[inline(never)]
+    fn set(&mut self, lane: usize, table: &Table, factor: f64, member: usize) {
+        for (row, sample) in self.rows.iter_mut().zip(&table.samples) {
+            row[lane] = factor * sample.at(member);
+        }
+    }
+
+    /// A sinusoid for all lanes, of this frequency and phase.
+    fn of_beat((omega, phase): (f64, f64)) -> Self {
+        Samples { rows: Vec::new(), start: omega, interval: phase }
     }
 
     /// The same samples, to look into.
@@ -90,9 +117,15 @@ impl<'a, const L: usize> View<'a, L> {
         let i = ((t - self.start) / self.interval + HOLD_SLACK).floor() as usize;
         self.rows.get(i).or(self.rows.last()).unwrap_or(&[f64::NAN; L])
     }
+
+    /// The sine of a sinusoid that all lanes have in common, which a loop over the lanes computes once for all of them.
+    #[inline(always)]
+    pub fn beat(&self, t: f64) -> f64 {
+        trig::sin(self.start * t + self.interval)
+    }
 }
 
-struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> {
+struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> {
     clock: Clock,
     isa: I,
     family: S,
@@ -146,12 +179,60 @@ where
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> Tile<S, St, I, P, Q, C, L>
+/// The kernel of steps of chosen length: so many attempts of every lane.
+struct Attempts<'a, S, St, const P: usize, const Q: usize, const C: usize, const L: usize> {
+    paces: &'a mut [[f64; L]; NUMBERS],
+    budget: f64,
+    attempts: u32,
+    constants: &'a [[f64; L]; C],
+    inputs: &'a [Samples<L>],
+    v: &'a mut [[f64; L]; P],
+    y: &'a mut [[f64; L]; Q],
+    family: PhantomData<fn() -> (S, St)>,
+}
+
+impl<S, St, const P: usize, const Q: usize, const C: usize, const L: usize> Task for Attempts<'_, S, St, P, Q, C, L>
+where
+    S: Small<P, Q, C>,
+    St: Stepper,
+{
+    #[inline(always)]
+    fn run(self) {
+        let (constants, mut paces, mut v, mut y) = (self.constants, *self.paces, *self.v, *self.y);
+        let inputs = View::all(self.inputs);
+        for _ in 0..self.attempts {
+            for l in 0..L {
+                let mut s = Stretched::new(S::member(1.0, from_fn(|c| constants[c][l]), &inputs, l));
+                let mut vl = SVector::from_fn(|i, _| v[i][l]);
+                let mut yl = SVector::from_fn(|i, _| y[i][l]);
+                let mut trial = Trial::new(St::RECORD.evaluations, &vl, &yl);
+                let mut pace = Pace::load(&paces, l);
+                pace::attempt::<S::Member<'_, L>, St>(&mut pace, self.budget, &mut s, &mut vl, &mut yl, &mut trial);
+                for i in 0..P {
+                    v[i][l] = vl[i];
+                }
+                for i in 0..Q {
+                    y[i][l] = yl[i];
+                }
+                for (row, number) in paces.iter_mut().zip(pace.numbers()) {
+                    row[l] = number;
+                }
+            }
+        }
+        (*self.paces, *self.v, *self.y) = (paces, v, y);
+    }
+}
+
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> Tile<S, St, I, P, Q, C, L, FEW>
 where
     S: Small<P, Q, C>,
     St: Stepper,
     I: Isa,
 {
+    /// Whether it has a kernel for steps of chosen length: one width does, or the core would grow by half. An attempt is long, so a
+    /// vector or two of lanes keep the machine busy.
+    const ADAPTS: bool = St::RECORD.error_order.is_some() && L > 1 && (L <= 16 || FEW == 1);
+
     fn boxed(family: S, isa: I, clock: &Clock) -> Box<dyn Group> {
         Box::new(Self {
             clock: *clock,
@@ -185,7 +266,8 @@ where
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize> Group for Tile<S, St, I, P, Q, C, L>
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> Group
+    for Tile<S, St, I, P, Q, C, L, FEW>
 where
     S: Small<P, Q, C>,
     St: Stepper,
@@ -200,21 +282,32 @@ where
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        let h = self.clock.h;
-        let member = |l: usize| first + l.min(count - 1);
-        let mut parameters = [[0.0; L]; C];
-        for (lanes, row) in parameters.iter_mut().zip(&spec.rows) {
-            row.fill(first, count, lanes);
+        prepare(&self.family, self.clock.h, spec, (first, count), &mut self.constants, &mut self.inputs);
+    }
+
+    fn adapts(&self) -> bool {
+        Self::ADAPTS
+    }
+
+    fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
+        prepare_lane(&self.family, spec, lane, member, &mut self.constants, &mut self.inputs);
+    }
+
+    fn adapt(&mut self, paces: &mut [f64], budget: f64, attempts: u32) {
+        if const { Self::ADAPTS }
+            && let Ok(paces) = paces.as_chunks_mut().0.try_into()
+        {
+            self.isa.run(Attempts::<S, St, P, Q, C, L> {
+                paces,
+                budget,
+                attempts,
+                constants: &self.constants,
+                inputs: &self.inputs,
+                v: &mut self.v,
+                y: &mut self.y,
+                family: PhantomData,
+            });
         }
-        let of_lane = |l: usize| from_fn(|i| parameters[i][l]);
-        for l in 0..L {
-            let constants = self.family.constants(h, of_lane(l));
-            for (row, c) in self.constants.iter_mut().zip(constants) {
-                row[l] = c;
-            }
-        }
-        let samples = |(i, table)| Samples::new(table, |l| self.family.input_factor(h, of_lane(l), i), member);
-        self.inputs = spec.tables.iter().enumerate().map(samples).collect();
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -226,6 +319,9 @@ where
     }
 
     fn start(&mut self, k: i64) {
+        if const { St::RECORD.carry.is_none() } {
+            return;
+        }
         let (t, choice) = (self.clock.at(k), self.clock.start);
         self.each_v(|s, v, y, work| St::start(s, choice, t, v, y, work));
     }
@@ -244,8 +340,66 @@ where
     }
 
     fn finish(&mut self, k: i64) {
+        if const { St::RECORD.carry.is_none() } {
+            return;
+        }
         let (t, choice) = (self.clock.at(k), self.clock.start);
         self.each_v(|s, v, y, work| St::finish(s, choice, t, v, y, work));
+    }
+}
+
+// What follows is not part of a kernel. It stands apart so that there is one of it for each family and number of lanes, and not one
+// for each method and CPU level: two thirds of the core were such copies.
+
+/// Takes the constants and the inputs of the members from a first one on.
+#[inline(never)]
+fn prepare<S: Small<P, Q, C>, const P: usize, const Q: usize, const C: usize, const L: usize>(
+    family: &S,
+    h: f64,
+    spec: &Spec,
+    (first, count): (usize, usize),
+    constants: &mut [[f64; L]; C],
+    inputs: &mut Vec<Samples<L>>,
+) {
+    let mut parameters = [[0.0; L]; C];
+    for (lanes, row) in parameters.iter_mut().zip(&spec.rows) {
+        row.fill(first, count, lanes);
+    }
+    let mut factors = [[1.0; L]; INPUTS];
+    for l in 0..L {
+        let parameters = from_fn(|i| parameters[i][l]);
+        for (row, c) in constants.iter_mut().zip(family.constants(h, parameters)) {
+            row[l] = c;
+        }
+        for (i, row) in factors.iter_mut().enumerate().take(spec.tables.len()) {
+            row[l] = family.input_factor(h, parameters, i);
+        }
+    }
+    *inputs = Samples::all(spec, &factors, first, count);
+    inputs.extend(family.beat(spec).map(Samples::of_beat));
+}
+
+/// Takes the constants and the inputs of a member into a lane, scaled to a step of 1.
+#[inline(never)]
+fn prepare_lane<S: Small<P, Q, C>, const P: usize, const Q: usize, const C: usize, const L: usize>(
+    family: &S,
+    spec: &Spec,
+    lane: usize,
+    member: usize,
+    constants: &mut [[f64; L]; C],
+    inputs: &mut Vec<Samples<L>>,
+) {
+    let beat = family.beat(spec).map(Samples::of_beat);
+    if inputs.len() != spec.tables.len() + usize::from(beat.is_some()) {
+        *inputs = Samples::all(spec, &[[0.0; L]; INPUTS], member, 1);
+        inputs.extend(beat);
+    }
+    let parameters = from_fn(|i| spec.at(i, member));
+    for (row, c) in constants.iter_mut().zip(family.constants(1.0, parameters)) {
+        row[lane] = c;
+    }
+    for (i, (samples, table)) in inputs.iter_mut().zip(&spec.tables).enumerate() {
+        samples.set(lane, table, family.input_factor(1.0, parameters, i), member);
     }
 }
 
@@ -262,12 +416,12 @@ where
     with_isa!(
         clock.level,
         |isa| match width {
-            Width::Wide => Tile::<S, St, _, P, Q, C, WIDE>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW>::boxed(family, isa, clock),
+            Width::Wide => Tile::<S, St, _, P, Q, C, WIDE, FEW>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW, FEW>::boxed(family, isa, clock),
         },
         match width {
-            Width::Wide => Tile::<S, St, _, P, Q, C, HALF>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW>::boxed(family, isa, clock),
+            Width::Wide => Tile::<S, St, _, P, Q, C, HALF, FEW>::boxed(family, isa, clock),
+            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW, FEW>::boxed(family, isa, clock),
         }
     )
 }

@@ -101,7 +101,10 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(error(oscillators(&[1.0, 2.0], "rk4"), 3), "a parameter: expected 3, got 2");
     let spec = Spec { system: "spring", ..Spec::default() };
     let model = Model::Direct { spec, method: "rk4" };
-    assert_eq!(error(model, 1), "there is no system \"spring\"; known: chain, linear, nbody, oscillator");
+    assert_eq!(
+        error(model, 1),
+        "there is no system \"spring\"; known: chain, linear, nbody, oscillator, pendulum, restricted_three_body"
+    );
     let spec = Spec { system: "oscillator", options: vec!["canonical", "damped"], ..Spec::default() };
     let model = Model::Direct { spec, method: "verlet" };
     assert_eq!(error(model, 1), "verlet needs forces that do not depend on the velocity, but oscillator has damping");

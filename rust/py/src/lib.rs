@@ -3,12 +3,13 @@
 mod model;
 mod world;
 
-use numpy::{PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArrayDyn};
+use numpy::{PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
+    adaptive,
     batch::{self, Arrays, Plan},
     error::Error,
-    group::Clock,
+    group::{Clock, Row},
     isa::Level,
     stepper::{Needs, Record},
     table,
@@ -31,6 +32,7 @@ fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
     d.set_item("needs_acceleration", r.needs == Needs::Acceleration)?;
     d.set_item("carry", r.carry)?;
     d.set_item("starts", r.starts)?;
+    d.set_item("error_order", r.error_order)?;
     d.set_item("section", r.section)?;
     d.set_item("reference", r.reference)?;
     d.set_item("about", r.about)?;
@@ -118,6 +120,63 @@ fn run(
         carried,
         carries: model.carries(),
     };
+    detached(py, progress, |monitor| batch::run(&plan, arrays, monitor))
+}
+
+/// Makes a run of steps of chosen length from the rows of `v` and `y`, and fills what is kept at the times of `at`.
+#[pyfunction]
+#[pyo3(signature = (model, *, t0, at, first, relative, absolute, budget, threads, v, y, saved_v, saved_y, reached, counts, progress))]
+#[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
+fn adapt(
+    py: Python<'_>,
+    model: &ModelSpec,
+    t0: f64,
+    at: Vec<f64>,
+    first: PyReadonlyArray2<'_, f64>,
+    relative: PyReadonlyArray2<'_, f64>,
+    absolute: PyReadonlyArray2<'_, f64>,
+    budget: i64,
+    threads: usize,
+    v: PyReadonlyArray2<'_, f64>,
+    y: PyReadonlyArray2<'_, f64>,
+    mut saved_v: PyReadwriteArrayDyn<'_, f64>,
+    mut saved_y: PyReadwriteArrayDyn<'_, f64>,
+    mut reached: PyReadwriteArray2<'_, f64>,
+    mut counts: PyReadwriteArray2<'_, i64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let members = counts.as_array().ncols();
+    let arrays = adaptive::Arrays {
+        saved_v: saved_v.as_slice_mut()?,
+        saved_y: saved_y.as_slice_mut()?,
+        reached: reached.as_slice_mut()?,
+        counts: counts.as_slice_mut()?,
+    };
+    let rows = model.rows(py)?;
+    let tables = model.tables(py)?;
+    let plan = adaptive::Plan {
+        model: model.model(&rows, &tables)?,
+        level: Level::choose().map_err(core_error)?,
+        t0,
+        at: &at,
+        first: Row(first.as_slice()?),
+        relative: Row(relative.as_slice()?),
+        absolute: Row(absolute.as_slice()?),
+        budget,
+        v: by_row(&v)?,
+        y: by_row(&y)?,
+        members,
+        threads,
+    };
+    detached(py, progress, |monitor| adaptive::run(&plan, arrays, monitor))
+}
+
+/// Runs without the GIL, tells how far it is and hears Ctrl-C.
+fn detached(
+    py: Python<'_>,
+    progress: Option<Py<PyAny>>,
+    run: impl FnOnce(&mut dyn FnMut(f64) -> bool) -> Result<(), Error> + Send,
+) -> PyResult<()> {
     let mut raised = None;
     let mut monitor = |share: f64| {
         Python::attach(|py| {
@@ -131,7 +190,7 @@ fn run(
             }
         })
     };
-    let result = py.detach(|| batch::run(&plan, arrays, &mut monitor));
+    let result = py.detach(|| run(&mut monitor));
     match (result, raised) {
         (_, Some(error)) => Err(error),
         (Err(Error::Interrupted), None) => Err(PyKeyboardInterrupt::new_err(())),
@@ -149,6 +208,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
     m.add_function(wrap_pyfunction!(saves, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
+    m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<world::World>()?;
     Ok(())

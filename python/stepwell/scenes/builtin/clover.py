@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..._checks import Array
@@ -37,4 +39,5 @@ def clover() -> Scene:
         dt=0.3,
         horizon=30.0,
         exact=exact,
+        period=2.0 * math.pi,
     )

@@ -40,4 +40,5 @@ def oscillator(omega: Any = 1.0) -> Scene:
         dt=0.3 / omega,
         horizon=20.0 * np.pi / omega,
         exact=exact,
+        period=2.0 * np.pi / omega,
     )

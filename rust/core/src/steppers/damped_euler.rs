@@ -20,6 +20,7 @@ impl Stepper for DampedEuler {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§6",
         reference: "G. Hoffmann, Simple Integration Algorithms, 2002, §6",
         about: "Standard Euler, stabilised on the oscillator by an artificial damping D = Φ/2. That damping turns the new v \

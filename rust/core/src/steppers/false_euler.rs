@@ -20,6 +20,7 @@ impl Stepper for FalseEuler {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§7",
         reference: "A. Cromer, Stable solutions using the Euler approximation, Am. J. Phys. 49 (1981) 455",
         about: "The new v is used at once in the equation for y; that is all that is false about it. An undamped oscillator \

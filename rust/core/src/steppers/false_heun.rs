@@ -20,6 +20,7 @@ impl Stepper for FalseHeun {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§10",
         reference: "G. Hoffmann, Simple Integration Algorithms, 2002, §10",
         about: "Heun with the new v used at once in both equations for y. It damps an undamped oscillator, r₁² = 1 − Φ²/2, \

@@ -20,6 +20,7 @@ impl Stepper for Leapfrog {
         needs: Needs::Acceleration,
         carry: Some("v_half"),
         starts: &[],
+        error_order: None,
         section: "§7",
         reference: "L. Verlet, Phys. Rev. 159 (1967) 98; E. Hairer, C. Lubich, G. Wanner, Acta Numerica 12 (2003) 399",
         about: "False Euler with a half kick at the start: between steps it carries the velocity of half a step ago, v − ½h·a. v and \

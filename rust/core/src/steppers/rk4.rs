@@ -20,6 +20,7 @@ impl Stepper for Rk4 {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§12",
         reference: "W. Kutta, Beitrag zur näherungsweisen Integration totaler Differentialgleichungen, Z. Math. Phys. 46 (1901) 435",
         about: "Four evaluations, fourth order. It damps an undamped oscillator slightly, r₁² = 1 − Φ⁶/72 + Φ⁸/576, up to \
@@ -28,7 +29,7 @@ impl Stepper for Rk4 {
 
     #[inline(always)]
     fn step<S: System>(s: &mut S, t: f64, h: f64, v: &mut S::V, y: &mut S::Y, w: &mut Work<S>) {
-        let ([dv1, dv2, dv3, dv4], [dy1, dy2, dy3, dy4]) = (&mut w.dv, &mut w.dy);
+        let ([dv1, dv2, dv3, dv4, ..], [dy1, dy2, dy3, dy4, ..]) = (&mut w.dv, &mut w.dy);
         let half = t + 0.5 * h;
         s.dv(t, v, y, dv1);
         s.dy(t, v, y, dy1);

@@ -21,6 +21,7 @@ impl Stepper for SemiFalseHeun {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§11",
         reference: "G. Hoffmann, Simple Integration Algorithms, 2002, §11",
         about: "Heun with the new v used in the second equation for y only. It damps an undamped oscillator slowly, \

@@ -20,6 +20,7 @@ impl Stepper for StandardEuler {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§5",
         reference: "L. Euler, Institutionum calculi integralis, vol. 1, 1768",
         about: "Both blocks move by the rates at the start of the step. An undamped oscillator gains energy at every step, \

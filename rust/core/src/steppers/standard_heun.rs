@@ -20,6 +20,7 @@ impl Stepper for StandardHeun {
         needs: Needs::Rates,
         carry: None,
         starts: &[],
+        error_order: None,
         section: "§9",
         reference: "K. Heun, Neue Methoden zur approximativen Integration, Z. Math. Phys. 45 (1900) 23",
         about: "A predictor by Standard Euler, then the mean of the increments at both ends. An undamped oscillator gains \

@@ -20,6 +20,7 @@ impl Stepper for Verlet {
         needs: Needs::Acceleration,
         carry: Some("y_prev"),
         starts: &["second_order", "first_order"],
+        error_order: None,
         section: "§8",
         reference: "L. Verlet, Computer experiments on classical fluids, Phys. Rev. 159 (1967) 98",
         about: "y is advanced from its last two values: y + (y − y_prev) + h²·a. There is no v between steps. With the start \

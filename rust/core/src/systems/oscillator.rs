@@ -15,18 +15,23 @@ use nalgebra::SVector;
 use crate::{
     error::Error,
     group::{Clock, Group, NARROW, Spec, Width},
-    signal::{Both, Held, Signal, Sine},
+    signal::{Beat, Both, Held, Signal, Sine},
     stepper::{Needs, Stepper},
     system::System,
     tile::{self, INPUTS, Small, View},
 };
 
-/// The choice of state variables.
+/// The choice of state variables, and of what pulls back.
 pub trait Form: Send + 'static {
-    /// Factor of v in h·ẏ, from Φ = h·ω₀ and h.
-    fn speed(phi: f64, h: f64) -> f64;
-    /// Factors of y, x and a in h·v̇.
+    /// Factor of v in h·ẏ, from the factor of the pull and h.
+    fn speed(stiffness: f64, h: f64) -> f64;
+    /// Factors of the pull and of the inputs in h·v̇.
     fn factors(h: f64, omega: f64) -> [f64; 3];
+    /// The pull at y: that of a spring, if nothing else is said.
+    #[inline(always)]
+    fn pull(y: f64) -> f64 {
+        y
+    }
 }
 
 /// v is the velocity divided by ω₀: the phase diagram is a circle.
@@ -94,19 +99,20 @@ impl<X: Signal> Force for Driven<X> {
 }
 
 /// The oscillator of one member, scaled to the step.
-pub struct Oscillator<F> {
+pub struct Oscillator<F, W> {
     stiffness: f64,
     speed: f64,
-    force: F,
+    force: W,
+    form: PhantomData<F>,
 }
 
-impl<F: Force> System for Oscillator<F> {
+impl<F: Form, W: Force> System for Oscillator<F, W> {
     type V = SVector<f64, 1>;
     type Y = SVector<f64, 1>;
 
     #[inline(always)]
     fn dv(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
-        out[0] = self.force.total(self.stiffness * y[0], t, v[0]);
+        out[0] = self.force.total(self.stiffness * F::pull(y[0]), t, v[0]);
     }
 
     #[inline(always)]
@@ -125,7 +131,8 @@ pub trait Drive: Send + 'static {
     /// What it makes.
     type Force<'a, const L: usize>: Force;
     /// From the scaled constants and the sampled inputs.
-    fn force<'a, const L: usize>(constants: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Force<'a, L>;
+    fn force<'a, const L: usize>(constants: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize)
+    -> Self::Force<'a, L>;
 }
 
 /// Spring, drag, and two inputs of amplitude, frequency and phase.
@@ -154,11 +161,19 @@ pub trait Source: Send + 'static {
     /// How many slots of constants it takes, and how many tables.
     const SLOTS: usize;
     /// From the constants of `slot` or the table of that number.
-    fn signal<'a, const L: usize>(c: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], slot: usize, table: usize, lane: usize) -> Self::Signal<'a, L>;
+    fn signal<'a, const L: usize>(
+        c: &[f64; CONSTANTS],
+        inputs: &[View<'a, L>; INPUTS],
+        slot: usize,
+        table: usize,
+        lane: usize,
+    ) -> Self::Signal<'a, L>;
 }
 
 /// A sinusoid.
 pub struct FromSine;
+/// A sinusoid of the same frequency and phase for all members, the only input.
+pub struct FromBeat;
 /// A table.
 pub struct FromTable;
 
@@ -171,11 +186,32 @@ impl Source for FromSine {
     }
 }
 
+impl Source for FromBeat {
+    type Signal<'a, const L: usize> = Beat<'a, L>;
+    const SLOTS: usize = 1;
+    #[inline(always)]
+    fn signal<'a, const L: usize>(
+        c: &[f64; CONSTANTS],
+        inputs: &[View<'a, L>; INPUTS],
+        slot: usize,
+        table: usize,
+        _: usize,
+    ) -> Beat<'a, L> {
+        Beat { amplitude: c[2 + 3 * slot], sine: inputs[table] }
+    }
+}
+
 impl Source for FromTable {
     type Signal<'a, const L: usize> = Held<'a, L>;
     const SLOTS: usize = 0;
     #[inline(always)]
-    fn signal<'a, const L: usize>(_: &[f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], _: usize, table: usize, lane: usize) -> Held<'a, L> {
+    fn signal<'a, const L: usize>(
+        _: &[f64; CONSTANTS],
+        inputs: &[View<'a, L>; INPUTS],
+        _: usize,
+        table: usize,
+        lane: usize,
+    ) -> Held<'a, L> {
         Held { samples: inputs[table], lane }
     }
 }
@@ -199,19 +235,29 @@ impl<A: Source, B: Source> Drive for Driven<(A, B)> {
 }
 
 struct Family<F, D> {
-    /// For x and a: whether it is a sinusoid, held, or not there.
+    /// For x and a, or the only input: whether it is a sinusoid, held, or not there.
     inputs: [Option<Kind>; 2],
     form: PhantomData<fn() -> (F, D)>,
 }
 
+/// What an input is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+pub(super) enum Kind {
+    /// A table.
     Held,
+    /// A sinusoid of the same frequency and phase for all members.
+    Beat,
+    /// A sinusoid.
     Sine,
 }
 
+/// The kind of an input by the options that would name it.
+pub(super) fn kind(spec: &Spec, held: &str, sine: &str) -> Option<Kind> {
+    if spec.has(held) { Some(Kind::Held) } else { spec.has(sine).then_some(Kind::Sine) }
+}
+
 impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
-    type Member<'a, const L: usize> = Oscillator<D::Force<'a, L>>;
+    type Member<'a, const L: usize> = Oscillator<F, D::Force<'a, L>>;
 
     fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
         let [stiffness, by_x, by_a] = F::factors(h, p[0]);
@@ -220,7 +266,7 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
         c[1] = (2.0 * p[1]) * (h * p[0]);
         let mut slot = 2;
         for (kind, factor, of) in [(self.inputs[0], by_x, 2), (self.inputs[1], by_a, 5)] {
-            if kind == Some(Kind::Sine) {
+            if matches!(kind, Some(Kind::Sine | Kind::Beat)) {
                 c[slot..slot + 3].copy_from_slice(&[factor * p[of], p[of + 1], p[of + 2]]);
                 slot += 3;
             }
@@ -233,27 +279,42 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
         if i == 0 && self.inputs[0] == Some(Kind::Held) { by_x } else { by_a }
     }
 
+    fn beat(&self, spec: &Spec) -> Option<(f64, f64)> {
+        (self.inputs[0] == Some(Kind::Beat)).then(|| (spec.at(3, 0), spec.at(4, 0)))
+    }
+
     #[inline(always)]
-    fn member<'a, const L: usize>(h: f64, c: [f64; CONSTANTS], inputs: &[View<'a, L>; INPUTS], lane: usize) -> Self::Member<'a, L> {
-        Oscillator { stiffness: c[0], speed: F::speed(c[0], h), force: D::force(&c, inputs, lane) }
+    fn member<'a, const L: usize>(
+        h: f64,
+        c: [f64; CONSTANTS],
+        inputs: &[View<'a, L>; INPUTS],
+        lane: usize,
+    ) -> Self::Member<'a, L> {
+        Oscillator { stiffness: c[0], speed: F::speed(c[0], h), force: D::force(&c, inputs, lane), form: PhantomData }
     }
 }
 
-fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize>(
+/// A group of this form and this force.
+pub(super) fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize>(
     inputs: [Option<Kind>; 2],
     clock: &Clock,
     width: Width,
 ) -> Box<dyn Group> {
     let family = Family::<F, D> { inputs, form: PhantomData };
-    tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW>(family, clock, width)
+    // Many stages are long enough for two vectors of lanes to keep the machine busy; more kernels of them would only make the core
+    // larger, by half.
+    if const { St::RECORD.evaluations > 4 } {
+        tile::group::<_, St, 1, 1, CONSTANTS, 16, 16, 16>(family, clock, width)
+    } else {
+        tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW>(family, clock, width)
+    }
 }
 
 fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
     if St::RECORD.needs == Needs::Acceleration && spec.has("damped") {
         return Err(Error::VelocityDependent { method: St::RECORD.name, system: "oscillator", term: "damping" });
     }
-    let kind = |held, sine| if spec.has(held) { Some(Kind::Held) } else { spec.has(sine).then_some(Kind::Sine) };
-    let inputs = [kind("x:held", "x:sine"), kind("a:held", "a:sine")];
+    let inputs = [kind(spec, "x:held", "x:sine"), kind(spec, "a:held", "a:sine")];
     let mut kinds: Vec<Kind> = inputs.into_iter().flatten().collect();
     // Lanes: what was fastest when tried. The free oscillator's v and y fill the registers of AVX-512 and Φ comes from memory.
     kinds.sort(); // a sum of two does not care for their order, and this saves kernels

@@ -8,7 +8,7 @@
 //!
 //! Body i meets body i + k for k = 1 … n/2, counted round the circle, so every pair comes once and a run of bodies meets a run of
 //! partners. What a body gets from partners after it and before it is summed apart, the latter over two rounds, so that no index
-//! wraps. The order of these sums is the reference's (`partners`), whatever the kernel: three bodies in a lane tile, several systems
+//! wraps. The order of these sums is the reference's (`partners`), whatever the kernel: two or three bodies in a lane tile, several systems
 //! side by side, or one large system with eight bodies at a time.
 //!
 //! Sizes: bodies, dimensions (2 or 3). Options: the force; then `control:printed`, `control:limited`, `project:scaling` or
@@ -19,10 +19,10 @@
 mod along;
 mod beside;
 mod energy;
+mod few;
 mod law;
 mod record;
 mod share;
-mod three;
 
 use std::thread;
 
@@ -31,9 +31,9 @@ use self::{
     share::{Share, add, share},
     beside::SideBySide,
     energy::{Back, Push},
+    few::Few,
     law::{LOGARITHMIC, NEWTON, PRINTED},
     record::{Quantity, Record},
-    three::Three,
 };
 use crate::{
     block::at_a_line,
@@ -295,7 +295,7 @@ macro_rules! bodies {
             }
 
             fn recorded(spec: &Spec) -> usize {
-                quantities(spec).map(|q| q.size(spec.size(1))).sum()
+                quantities(spec).fold(0, |numbers, q| numbers + q.size(spec.size(1)))
             }
         }
     };
@@ -457,9 +457,11 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     }
     // Lanes: what was fastest when tried.
     Ok(match (n, dim, *law, control.len() + spec.record.len()) {
-        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1>(Three::<2, NEWTON>, clock, width),
-        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1>(Three::<2, LOGARITHMIC>, clock, width),
-        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 8, 8, 1>(Three::<3, NEWTON>, clock, width),
+        (2, 2, "newton", 0) => tile::group::<_, St, 4, 4, 5, 16, 8, 1>(Few::<2, 2, NEWTON>, clock, width),
+        (2, 3, "newton", 0) => tile::group::<_, St, 6, 6, 5, 16, 8, 1>(Few::<2, 3, NEWTON>, clock, width),
+        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1>(Few::<3, 2, NEWTON>, clock, width),
+        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1>(Few::<3, 2, LOGARITHMIC>, clock, width),
+        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 8, 8, 1>(Few::<3, 3, NEWTON>, clock, width),
         _ => rows::group::<Bodies<{ rows::LANES }>, Bodies<1>, St>(spec, clock, width),
     })
 }

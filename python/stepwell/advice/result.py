@@ -1,0 +1,297 @@
+"""What advice holds, and how it is told."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ..charts.data import finite
+from ..methods import Method
+from ..scenes import Scene
+
+#: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
+LINES = 6
+
+#: The columns of the table; those whose name ends in ``>`` are flush right.
+COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "ns>", "objects>", "blows up at dt>")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method with the largest step found that is good enough; its run was made.
+
+    Attributes:
+        method: which.
+        substeps: steps in a frame; None if any step will do.
+        steps: steps over the horizon.
+        dt: the step, in units of time.
+        error: the largest state error of the run, confirmed.
+        predicted: what was expected of it without the run, or None where prediction makes no sense.
+        predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with a longer step and the order.
+        frequency_error: Ψ/Φ − 1 of the mode that drifts most, or None.
+        damping_error: damping that the method adds to that mode, in 1 per unit of time; below zero it grows. Or None.
+        evaluations_per_frame: rate evaluations in a frame; None without a frame.
+        evaluations_per_time: rate evaluations in a unit of time.
+        ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
+        seconds_per_frame: measured, in a frame; None without a frame.
+        seconds_per_time: measured, in a unit of time.
+        objects: how many such objects the budget suffices for; None without a budget.
+        limit: the step beyond which something grows, by the eigenvalues: 0 for never stable, infinite for none, None if they
+            do not say.
+        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation along the true motion, as if that stood still.
+        mode: what grows beyond the limit, in words, or None.
+        mode_frequency: its frequency in the exact solution, in rad per unit of time, or None.
+        observed_limit: the largest step whose run over the horizon does not grow; infinite if none that was tried does.
+        robust: from this many steps (in a frame, or over the horizon) on, all that were tried are good enough too; None if errors
+            are above the tolerance up to twice as many.
+    """
+
+    method: Method
+    substeps: int | None
+    steps: int
+    dt: float
+    error: float
+    predicted: float | None
+    predicted_by: str | None
+    frequency_error: float | None
+    damping_error: float | None
+    evaluations_per_frame: int | None
+    evaluations_per_time: float
+    ns_per_step: float
+    seconds_per_frame: float | None
+    seconds_per_time: float
+    objects: int | None
+    limit: float | None
+    limit_by: str
+    mode: str | None
+    mode_frequency: float | None
+    observed_limit: float
+    robust: int | None
+
+    @property
+    def margin(self) -> float:
+        """How many times as long a step may be before the method blows up: by the exact limit, or else by the observed one."""
+        exact = self.limit_by == "linear" and self.limit
+        return (self.limit if exact and self.limit else self.observed_limit) / self.dt
+
+    @property
+    def is_robust(self) -> bool:
+        """Whether a few more steps are good enough too."""
+        return self.robust is not None and self.robust <= (self.steps if self.substeps is None else self.substeps)
+
+    def data(self) -> dict[str, Any]:
+        """The same for programs, the method by its name."""
+        names = [name for name in self.__dataclass_fields__ if name != "method"]
+        return {"method": self.method.name} | {name: getattr(self, name) for name in names} | {"margin": self.margin}
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """Why a method is not advised.
+
+    Attributes:
+        method: its name.
+        kind: ``"refused"`` by the system; ``"unstable"`` or ``"inaccurate"`` at the most steps that were tried; ``"dominated"``,
+            more than ten times as dear as the best; ``"budget"``, good enough but too dear.
+        reason: the same in words and numbers.
+    """
+
+    method: str
+    kind: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """What would have to give if nothing fits.
+
+    Attributes:
+        least_error: the least state error that was found within the budget, or infinity.
+        method: by which method, or None.
+        substeps: with how many steps in a frame (over the horizon without one), or None.
+        needed_budget: seconds in a frame (in a unit of time without one) that the tolerance needs, or None if nothing meets it.
+        needed_method: by which method, or None.
+    """
+
+    least_error: float
+    method: str | None
+    substeps: int | None
+    needed_budget: float | None
+    needed_method: str | None
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Which method and which step.
+
+    Attributes:
+        scene: for which scene, up to the horizon over which its true motion is known.
+        frame: the frame, in units of time, or None for any step.
+        tolerance: the largest state error that is allowed.
+        budget: seconds that may be used in a frame (in a unit of time without one), or None for any.
+        cost: by what ``ranked`` is ordered, ``"time"`` or ``"evaluations"``.
+        ranked: what is good enough and fits, the cheapest first.
+        rejected: the other methods, and why.
+        shortfall: what would have to give; None if something fits.
+        runs: how many runs were made to find it.
+    """
+
+    scene: Scene
+    frame: float | None
+    tolerance: float
+    budget: float | None
+    cost: str
+    ranked: tuple[Row, ...]
+    rejected: tuple[Rejected, ...]
+    shortfall: Shortfall | None
+    runs: int
+
+    @property
+    def best(self) -> Row | None:
+        """The cheapest that is good enough, or None."""
+        return self.ranked[0] if self.ranked else None
+
+    def data(self) -> dict[str, Any]:
+        """All of it for programs; what is infinite is None."""
+        whole = {
+            "scene": self.scene.name,
+            "horizon": self.scene.horizon,
+            "frame": self.frame,
+            "tolerance": self.tolerance,
+            "budget": self.budget,
+            "cost": self.cost,
+            "best": self.best.data() if self.best else None,
+            "ranked": [row.data() for row in self.ranked],
+            "rejected": [asdict(each) for each in self.rejected],
+            "shortfall": asdict(self.shortfall) if self.shortfall else None,
+            "runs": self.runs,
+        }
+        found: dict[str, Any] = finite(whole)
+        return found
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """The text of ``data()`` in JSON; also written to a file if one is given."""
+        text = json.dumps(self.data(), ensure_ascii=False, indent=1)
+        if path is not None:
+            Path(path).write_text(text + "\n", encoding="utf-8")
+        return text
+
+    def summary(self) -> list[str]:
+        """The advice in sentences, a line each."""
+        per = "a frame" if self.frame is not None else "a unit of time"
+        best = self.best
+        if best is None:
+            return self._what_would_have_to_give(per)
+        count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
+        lines = [
+            f"Use {best.method.name} with {count}, dt = {best.dt:.4g}: error {best.error:.2g} in the run of {best.steps} steps."
+        ]
+        ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
+        evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
+        lines.append(f"Cost {per}: {evaluations:.4g} rate evaluations, {ns:.3g} ns measured in a batch on one thread.")
+        if best.objects is not None:
+            lines.append(f"The budget of {self.budget:.3g} s {per} suffices for {best.objects} such objects.")
+        lines.append(_margin(best))
+        if not best.is_robust:
+            unit = "steps a frame" if self.frame is not None else "steps"
+            where = f"from {best.robust} {unit} on" if best.robust else "nowhere near"
+            lines.append(f"Errors are not even here: {where} a few steps more are good enough too.")
+        return lines
+
+    def _what_would_have_to_give(self, per: str) -> list[str]:
+        gap, unit = self.shortfall, "steps a frame" if self.frame is not None else "steps"
+        if gap is None:
+            return ["Nothing was tried."]
+        lines = ["Nothing fits."]
+        if gap.method is not None:
+            within = "within the budget" if self.budget is not None else "found"
+            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method} with {gap.substeps} {unit}.")
+        elif self.budget is not None:
+            lines.append(f"The budget of {self.budget:.3g} s {per} does not suffice for one step of any method.")
+        if gap.needed_budget is not None:
+            lines.append(f"The tolerance needs a budget of {gap.needed_budget:.3g} s {per}, by {gap.needed_method}.")
+        else:
+            lines.append("No number of steps that was tried meets the tolerance: allow a larger error, or a shorter horizon.")
+        return lines
+
+    def table(self) -> list[tuple[str, ...]]:
+        """The ranked rows as text, in ``COLUMNS``."""
+        rows: list[tuple[str, ...]] = []
+        for row in self.ranked:
+            framed = row.seconds_per_frame is not None and row.evaluations_per_frame is not None
+            rows.append(
+                (
+                    row.method.name,
+                    str(row.substeps or row.steps) + ("" if row.is_robust else "*"),
+                    f"{row.dt:.4g}",
+                    f"{row.error:.2g}",
+                    "–" if row.predicted is None else f"{row.predicted:.2g}",
+                    f"{row.evaluations_per_frame if framed else row.evaluations_per_time:.4g}",
+                    f"{1e9 * ((row.seconds_per_frame or 0.0) if framed else row.seconds_per_time):.3g}",
+                    "–" if row.objects is None else f"{row.objects:.3g}",
+                    _blows(row),
+                )
+            )
+        return rows
+
+    @property
+    def title(self) -> str:
+        """What was asked."""
+        frame = "any step" if self.frame is None else f"frame {self.frame:.4g}"
+        return f"{self.scene.title}: error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
+
+    def __str__(self) -> str:
+        lines = [self.title, *self.summary()]
+        if self.ranked:
+            head = [name.removesuffix(">") for name in COLUMNS]
+            rows = [head, *map(list, self.table()[:LINES])]
+            widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+            lines += ["", *("  ".join(_aligned(cell, i, widths) for i, cell in enumerate(row)).rstrip() for row in rows)]
+            if len(self.ranked) > LINES:
+                lines.append(f"and {len(self.ranked) - LINES} more")
+        if self.rejected:
+            lines.append("")
+            kinds = dict.fromkeys(each.kind for each in self.rejected)
+            for kind in kinds:
+                these = [each for each in self.rejected if each.kind == kind]
+                lines += [f"{each.method}: {each.reason}" for each in these[:2]]
+                if len(these) > 2:
+                    lines.append(f"{kind} likewise: {', '.join(each.method for each in these[2:])}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        best = self.best
+        said = "nothing fits" if best is None else f"{best.method.name}, dt = {best.dt:g}, error {best.error:.2g}"
+        return f"<advice for {self.scene.name}: {said}>"
+
+
+def _aligned(cell: str, i: int, widths: list[int]) -> str:
+    return cell.rjust(widths[i]) if COLUMNS[i].endswith(">") else cell.ljust(widths[i])
+
+
+def _blows(row: Row) -> str:
+    """Where a row blows up, in a few letters."""
+    if row.limit_by == "linear" and row.limit is not None:
+        return "grows always" if row.limit == 0.0 else ("never" if math.isinf(row.limit) else f"{row.limit:.4g}")
+    return "not seen" if math.isinf(row.observed_limit) else f"~{row.observed_limit:.3g}"
+
+
+def _margin(row: Row) -> str:
+    """How far a row is from blowing up, in a sentence."""
+    seen = "" if math.isinf(row.observed_limit) else f" Runs up to the horizon are stable to dt = {row.observed_limit:.3g}."
+    turns = "" if not row.mode_frequency else f" of {row.mode_frequency:.4g} rad per unit of time"
+    if row.limit_by == "linear" and row.limit is not None:
+        if math.isinf(row.limit):
+            return "Nothing grows with any step."
+        if row.limit == 0.0:
+            return f"It is never stable: {row.mode}{turns} grows slowly with every step, so not beyond this horizon.{seen}"
+        return f"It blows up beyond dt = {row.limit:.5g}, a step {row.margin:.3g} times as long: {row.mode}{turns}."
+    said = f"It blows up beyond about dt = {row.observed_limit:.3g}, a step {row.margin:.3g} times as long."
+    if math.isinf(row.observed_limit):
+        said = "No step that was tried blows up."
+    if row.limit and row.mode_frequency:
+        said += f" The fastest oscillation along the motion,{turns[3:]}, could be held up to dt = {row.limit:.3g}."
+    return said

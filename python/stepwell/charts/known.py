@@ -1,0 +1,75 @@
+"""The true motion of a scene as charts ask for it: thousands of times over, and only as far as it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .._checks import Array
+from ..errors import ArgumentError
+from ..scenes import Scene
+from ..scenes.truth import AGREES, with_truth
+
+#: Places through which a polynomial goes that tells the state between them.
+NODES = 10
+
+#: Nodes of the whole motion at first and at most, and how near to a run the polynomials come, in the blocks' largest lengths.
+FEW, MANY, NEAR = 500, 64_000, 0.1 * AGREES
+
+Exact = Callable[[Array], tuple[Array, Array]]
+
+
+def chartable(scene: Scene) -> tuple[Scene, float]:
+    """The scene with a known motion over its whole horizon, without a control, and the least error that means something.
+
+    A scene without an exact solution gets one by ``with_truth``, and ends where that does.
+
+    Raises:
+        ArgumentError: if the true motion is not known for any time.
+    """
+    if scene.exact is not None and scene.until >= scene.horizon:
+        return scene, 0.0
+    floor = 0.0 if scene.exact is not None else 10.0 * AGREES
+    known = with_truth(scene)
+    if not known.until > 0.0 or known.exact is None:
+        raise ArgumentError(f"scene: the true motion of {scene.name} is not known for any time, so there is no error to chart")
+    until = min(known.horizon, known.until)
+    if scene.exact is None:
+        error = "as far from the true places or velocities as the largest true ones"
+        known = replace(known, exact=dense(known.exact, until), control=None, error=error)
+    return replace(known, horizon=until), floor
+
+
+def dense(exact: Exact, until: float) -> Exact:
+    """The same motion from 0 to ``until``, by polynomials through states that are computed once."""
+    between = np.linspace(0.0, until, 97)[1:-1] + until / 2e4
+    wanted = exact(between)
+    nodes = FEW
+    while True:
+        found = _interpolant(exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
+        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True))
+        if apart <= NEAR or nodes >= MANY:
+            return found
+        nodes *= 2
+
+
+def _interpolant(blocks: tuple[Array, Array], spacing: float) -> Exact:
+    last = len(blocks[0]) - 1
+
+    def states(t: Array) -> tuple[Array, Array]:
+        place = np.asarray(t, dtype=np.float64) / spacing
+        first = np.clip(np.floor(place).astype(np.int64) - (NODES // 2 - 1), 0, last + 1 - NODES)
+        u = place - first
+        found = []
+        for block in blocks:
+            value = np.zeros((len(u), *block.shape[1:]))
+            for j in range(NODES):
+                others = [k for k in range(NODES) if k != j]
+                share = np.prod([(u - k) / (j - k) for k in others], axis=0)
+                value += share.reshape(-1, *(1,) * (block.ndim - 1)) * block[first + j]
+            found.append(value)
+        return found[0], found[1]
+
+    return states

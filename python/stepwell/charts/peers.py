@@ -1,0 +1,243 @@
+"""Other programs on the axes of a work-precision chart.
+
+A peer is a function, or a ``Peer`` made of one, that is given a scene, times and a setting (a tolerance or a step), and returns
+the states at these times with its rate evaluations and seconds. Those of SciPy, heyoka and REBOUND are here; each
+package is imported when its function is called, and need not be installed otherwise.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .._checks import Array, known
+from ..errors import UnsupportedError
+from ..scenes import Scene
+from ..systems import NBody
+
+#: Tolerances of a peer, and of methods that choose their steps: two in each factor of ten.
+TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What a peer found.
+
+    Attributes:
+        v: velocity blocks at the times that were asked for, shape (times, *block).
+        y: coordinate blocks, likewise.
+        evaluations: rate evaluations that it took, or None if it does not tell; it is then charted by its time alone.
+        seconds: that it took, without what is prepared once.
+    """
+
+    v: Array
+    y: Array
+    evaluations: int | None
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another program.
+
+    Attributes:
+        name: in the table and the picture.
+        solve: from scene, times of shape (n,) above 0, the last at the horizon, and a setting, to what was found. It raises
+            ``UnsupportedError`` for a scene that it cannot do, which the chart lists among what is refused.
+        settings: with which to run it.
+        by: what they are, ``"tolerance"`` or ``"step"``.
+        order: of convergence, or None.
+    """
+
+    name: str
+    solve: Callable[[Scene, Array, float], Solved]
+    settings: Sequence[float] = TOLERANCES
+    by: str = "tolerance"
+    order: int | None = None
+
+    @property
+    def title(self) -> str:
+        """The name in a picture."""
+        return self.name
+
+
+def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
+    """A peer of a function: its name is the function's, its settings are tolerances."""
+    return given if isinstance(given, Peer) else Peer(getattr(given, "__name__", type(given).__name__), given)
+
+
+def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
+    """SciPy's ``solve_ivp`` with ``rtol`` = ``atol`` = the tolerance; rates in NumPy, a call of Python for each.
+
+    The states between its steps are interpolated, by polynomials of less order than its steps, so that errors of
+    DOP853 and RK45 include those of the interpolation, except at the end.
+
+    Args:
+        method: ``"RK45"``, ``"DOP853"``, or another of its explicit methods.
+        settings: tolerances; it takes none below 100 times the rounding of a float.
+
+    Raises:
+        UnsupportedError: if SciPy is not installed.
+    """
+    solver = _need("scipy.integrate", "scipy")
+
+    def solve(scene: Scene, times: Array, tolerance: float) -> Solved:
+        system = scene.system.scaled(1.0, ())
+        cut = scene.v.size
+
+        def rates(t: float, s: Array) -> Array:
+            v, y = s[:cut].reshape(scene.v.shape), s[cut:].reshape(scene.y.shape)
+            return np.concatenate([np.ravel(system.dv(t, v, y)), np.ravel(system.dy(t, v, y))])
+
+        start = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
+        begin = time.perf_counter()
+        span = 0.0, float(times[-1])
+        found = solver.solve_ivp(rates, span, start, method=method, t_eval=times, rtol=tolerance, atol=tolerance)
+        seconds = time.perf_counter() - begin
+        states = np.full((len(times), len(start)), np.nan)
+        states[: found.y.shape[1]] = found.y.T
+        return Solved(*_blocks(scene, states), int(found.nfev), seconds)
+
+    return Peer(f"SciPy {method}", solve, settings)
+
+
+def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
+    """Taylor series by heyoka, compiled for the scene; bodies, and linear systems without inputs.
+
+    A step with a series of order p is counted as p rate evaluations. States between steps are by the series. What is compiled
+    before the run is not timed.
+
+    Raises:
+        UnsupportedError: if heyoka is not installed.
+    """
+    hy = _need("heyoka", "heyoka")
+
+    @lru_cache(maxsize=1)
+    def compiled(scene: Scene, tolerance: float) -> Any:
+        return hy.taylor_adaptive(_expressions(hy, scene), np.zeros(scene.v.size + scene.y.size), tol=tolerance)
+
+    def solve(scene: Scene, times: Array, tolerance: float) -> Solved:
+        series = compiled(scene, tolerance)
+        series.time = 0.0
+        series.state[:] = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
+        begin = time.perf_counter()
+        found = series.propagate_grid(np.concatenate([[0.0], times]))
+        seconds = time.perf_counter() - begin
+        return Solved(*_blocks(scene, found[-1][1:]), int(found[3]) * series.order, seconds)
+
+    return Peer("heyoka", solve, settings)
+
+
+#: REBOUND's integrators that are offered, and whether a setting is a tolerance.
+REBOUND = {"ias15": True, "bs": True, "leapfrog": False}
+
+
+def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) -> Peer:
+    """REBOUND; bodies under Newton's law only.
+
+    Its rate evaluations are counted in a run of their own, which is not timed.
+
+    Args:
+        integrator: ``"ias15"`` or ``"bs"`` by tolerance (of ias15 its ``epsilon``, which is not an error but a power of one), or
+            ``"leapfrog"`` by step.
+        settings: tolerances, or steps; steps are needed for leapfrog.
+
+    Raises:
+        UnsupportedError: if REBOUND is not installed.
+    """
+    rb = _need("rebound", "rebound")
+    known("integrator", integrator, REBOUND)
+
+    def simulation(scene: Scene, setting: float) -> Any:
+        system = scene.system
+        if not isinstance(system, NBody) or system.force != "newton":
+            raise UnsupportedError(f"REBOUND has bodies under Newton's law only; {system!r} is not that")
+        sim = rb.Simulation()
+        sim.G, sim.softening, sim.integrator = float(system.G), float(system.softening), integrator
+        sim.dt = scene.dt if REBOUND[integrator] else setting
+        for name in ("eps_rel", "eps_abs") if integrator == "bs" else ("epsilon",) if integrator == "ias15" else ():
+            # Since version 5 an integrator's options are its own; before, the simulation's.
+            setattr(getattr(sim, f"ri_{integrator}", sim.integrator), name, setting)
+        for m, v, y in zip(system.masses.tolist(), scene.v.tolist(), scene.y.tolist(), strict=True):
+            x3, v3 = [*y, 0.0][:3], [*v, 0.0][:3]
+            sim.add(m=m, x=x3[0], y=x3[1], z=x3[2], vx=v3[0], vy=v3[1], vz=v3[2])
+        return sim
+
+    def solve(scene: Scene, times: Array, setting: float) -> Solved:
+        count = 0
+
+        def counted(_: Any) -> None:
+            nonlocal count
+            count += 1
+
+        sim = simulation(scene, setting)
+        sim.additional_forces = counted
+        for t in times.tolist():
+            sim.integrate(t)
+        sim = simulation(scene, setting)
+        dim = scene.y.shape[1]
+        v, y = (np.empty((len(times), *scene.y.shape)) for _ in range(2))
+        seconds = 0.0
+        for i, t in enumerate(times.tolist()):
+            begin = time.perf_counter()
+            sim.integrate(t)
+            seconds += time.perf_counter() - begin
+            v[i], y[i] = ([getattr(p, block)[:dim] for p in sim.particles] for block in ("vxyz", "xyz"))
+        return Solved(v, y, count, seconds)
+
+    if settings is None:
+        if not REBOUND[integrator]:
+            raise UnsupportedError(f"settings: expected the steps of {integrator}, got none")
+        settings = TOLERANCES
+    return Peer(f"REBOUND {integrator}", solve, settings, "tolerance" if REBOUND[integrator] else "step")
+
+
+def _need(module: str, package: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise UnsupportedError(f"peers: {package} is not installed; pip install {package}") from None
+
+
+def _blocks(scene: Scene, states: Array) -> tuple[Array, Array]:
+    """Blocks of states in rows, v first."""
+    cut = scene.v.size
+    return states[:, :cut].reshape(-1, *scene.v.shape), states[:, cut:].reshape(-1, *scene.y.shape)
+
+
+def _expressions(hy: Any, scene: Scene) -> list[Any]:
+    """The scene's rates as heyoka's expressions."""
+    system, cut = scene.system, scene.v.size
+    size = cut + scene.y.size
+    names = hy.make_vars(*(f"s{i}" for i in range(size)))
+    if system.linear and not system.given_inputs():
+        rates = system.scaled(1.0, ())
+        columns = []
+        for unit in np.eye(size):
+            v, y = (block[0] for block in _blocks(scene, unit[np.newaxis]))
+            columns.append(np.concatenate([np.ravel(rates.dv(0.0, v, y)), np.ravel(rates.dy(0.0, v, y))]))
+        matrix = np.array(columns).T.tolist()
+        return [
+            (s, sum((a * x for a, x in zip(row, names, strict=True) if a), 0.0 * s)) for s, row in zip(names, matrix, strict=True)
+        ]
+    if not isinstance(system, NBody):
+        raise UnsupportedError(f"heyoka is given bodies and linear systems without inputs only; {system!r} is neither")
+    n, dim = scene.y.shape
+    place = [names[cut + dim * i : cut + dim * (i + 1)] for i in range(n)]
+    power = -1.5 if system.force == "newton" else -1.0
+    pull: list[list[Any]] = [[0.0] * dim for _ in range(n)]
+    strength, soft = (float(system.G) * system.masses).tolist(), float(system.softening) ** 2
+    for i in range(n):
+        for j in range(i + 1, n):
+            way = [b - a for a, b in zip(place[i], place[j], strict=True)]
+            over = (sum(d * d for d in way) + soft) ** power
+            for k, d in enumerate(way):
+                pull[i][k] += strength[j] * (d * over)
+                pull[j][k] -= strength[i] * (d * over)
+    return list(zip(names, [each for body in pull for each in body] + list(names[:cut]), strict=True))

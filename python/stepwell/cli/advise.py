@@ -1,0 +1,66 @@
+"""Advise on a scene: the cheapest method and step that are good enough, and how far they are from blowing up."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..advice import COSTS, advise
+from ..advice.result import COLUMNS
+from ..errors import ArgumentError
+from ..methods import method
+from ..scenes import scene
+from . import show
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scene", metavar="SCENE", help="a scene; see stepwell scenes")
+    parser.add_argument(
+        "--frame",
+        default="1/60",
+        metavar="TIME",
+        help="units of time into which a whole number of steps must fit, such as 0.02 or 1/60; any for any step (default: 1/60)",
+    )
+    parser.add_argument("--tolerance", type=float, default=1e-2, metavar="E", help="largest state error allowed (default: 0.01)")
+    parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing in a frame (default: the frame)")
+    parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
+    parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write all of it: .json")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Find, write, tell."""
+    chosen, frame = scene(args.scene), _frame(args.frame)
+    methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
+    if args.output is not None and args.output.suffix != ".json":
+        raise ArgumentError(f"-o: expected a file ending in .json, got {str(args.output)!r}")
+    if not args.json:
+        show.need_rich()
+
+    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost)
+    if args.output is not None:
+        found.to_json(args.output)
+    if args.json:
+        show.print_json(found.data())
+        return
+    written = [f"written: {args.output}"] if args.output is not None else []
+    rejected = [f"{each.method}: {each.reason}" for each in found.rejected]
+    if found.ranked:
+        per = "a frame" if frame is not None else "a unit of time"
+        head = [name.replace("evaluations", f"evaluations {per}").replace("ns>", f"ns {per}>") for name in COLUMNS]
+        show.table(found.title, head, found.table(), [*found.summary(), "", *rejected, *written])
+    else:
+        print("\n".join([found.title, *found.summary(), "", *rejected, *written]))
+
+
+def _frame(text: str) -> float | None:
+    """The frame from what is typed: a number, a fraction, or any."""
+    if text == "any":
+        return None
+    numerator, slash, denominator = text.partition("/")
+    try:
+        return float(numerator) / float(denominator) if slash else float(numerator)
+    except (ValueError, ZeroDivisionError):
+        raise ArgumentError(f"--frame: expected a time such as 0.02 or 1/60, or any, got {text!r}") from None

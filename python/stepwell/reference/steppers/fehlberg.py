@@ -1,0 +1,27 @@
+"""Runge-Kutta-Fehlberg 4(5) (§12): goes on with the fourth-order result, and estimates its error by the fifth-order one."""
+
+from .. import tableau
+from ..tableau import Increments
+from ..types import Array, Blocks, Scaled
+
+NODES = (0.0, 0.25, 0.375, 12 / 13, 1.0, 0.5)
+ROWS = (
+    (),
+    (1 / 4,),
+    (3 / 32, 9 / 32),
+    (1932 / 2197, -7200 / 2197, 7296 / 2197),
+    (439 / 216, -8.0, 3680 / 513, -845 / 4104),
+    (-8 / 27, 2.0, -3544 / 2565, 1859 / 4104, -11 / 40),
+)
+WEIGHTS = (25 / 216, 0.0, 1408 / 2565, 2197 / 4104, -1 / 5, 0.0)
+ERROR = (-1 / 360, 0.0, 128 / 4275, 2197 / 75240, -1 / 50, -2 / 55)
+
+
+def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """Six evaluations."""
+    return tableau.stages(NODES, ROWS, s, t, h, v, y)
+
+
+def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
+    """The fourth-order result."""
+    return tableau.plus(v, y, WEIGHTS, stages(s, t, h, v, y))

@@ -1,0 +1,34 @@
+"""Explicit Runge-Kutta methods by their tableau, as the papers print them: weights of increments, zeros left out of the sums."""
+
+from collections.abc import Sequence
+
+from .types import Array, Blocks, Scaled
+
+Weights = Sequence[float]
+Increments = list[tuple[Array, Array]]
+
+
+def stages(nodes: Weights, rows: Sequence[Weights], s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """The increments of both blocks, one stage after the other."""
+    found: Increments = []
+    for node, row in zip(nodes, rows, strict=True):
+        at = t + node * h if node not in (0.0, 1.0) else t + h if node else t
+        vi, yi = plus(v, y, row, found) if row else (v, y)
+        found.append((s.dv(at, vi, yi), s.dy(at, vi, yi)))
+    return found
+
+
+def plus(v: Array, y: Array, weights: Weights, increments: Increments) -> Blocks:
+    """Both blocks and the weighted sums of their increments."""
+    dv, dy = combined(weights, increments)
+    return v + dv, y + dy
+
+
+def combined(weights: Weights, increments: Increments) -> Blocks:
+    """The weighted sums of the increments of both blocks, from the left."""
+    terms = [(c, dv, dy) for c, (dv, dy) in zip(weights, increments, strict=True) if c != 0.0]
+    (c, dv, dy), *rest = terms
+    v, y = c * dv, c * dy
+    for c, dv, dy in rest:
+        v, y = v + c * dv, y + c * dy
+    return v, y

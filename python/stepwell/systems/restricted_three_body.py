@@ -1,0 +1,62 @@
+"""The restricted problem of three bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from ..errors import ArgumentError
+from ..reference.systems import restricted_three_body as reference
+from .base import Parameters, System, row, shown
+
+
+class RestrictedThreeBody(System):
+    """A body without mass in the plane of two that circle each other, seen from the frame that turns with them.
+
+    The unit of length is their distance, that of mass their sum, and a turn of the frame takes 2π: the heavy body, of mass
+    1 − μ, stands at (−μ, 0) and the light one, of mass μ, at (1 − μ, 0). Blocks have shape (2,).
+
+    ẍ = x + 2ẏ − (1 − μ)(x + μ)/r₁³ − μ(x − 1 + μ)/r₂³, ÿ = y − 2ẋ − (1 − μ)y/r₁³ − μy/r₂³
+
+    Args:
+        mu: μ, the light body's share of the mass, above 0 and below 1; broadcasts over the batch. The moon's share of earth and
+            moon, as Arenstorf took it, if not given.
+
+    Raises:
+        ArgumentError: what is wrong with ``mu``.
+    """
+
+    kernel = "restricted_three_body"
+    axes = "x and y"
+    v_shape = y_shape = (2,)
+    velocity_term = "the Coriolis force"
+
+    def __init__(self, mu: Any = 0.012277471) -> None:
+        self.mu = _checks.numbers("mu", mu)
+        wrong = self.mu[~((self.mu > 0.0) & (self.mu < 1.0))]
+        if wrong.size:
+            raise ArgumentError(f"mu: expected shares of the mass above 0 and below 1, got {wrong.flat[0]:g}")
+        self.batch = self.mu.shape
+
+    def __repr__(self) -> str:
+        return f"RestrictedThreeBody({shown({'mu': self.mu})})"
+
+    def scaled(self, h: float, batch: Shape) -> reference.RestrictedThreeBody:
+        """The NumPy reference, scaled to the step h."""
+        return reference.RestrictedThreeBody(h, self.mu)
+
+    def parameters(self, batch: Shape) -> Parameters:
+        """The row for the core, as ``restricted_three_body.rs`` documents it."""
+        return Parameters(rows=[row(self.mu, batch)])
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, which the motion keeps; no other energy is kept here."""
+        with np.errstate(all="ignore"):
+            across = y[1] * y[1]
+            from_heavy, from_light = y[0] + self.mu, (y[0] - 1.0) + self.mu
+            pull = (1.0 - self.mu) / np.sqrt(from_heavy * from_heavy + across)
+            pull = pull + self.mu / np.sqrt(from_light * from_light + across)
+            return np.asarray(0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * (y[0] * y[0] + across) - pull)
