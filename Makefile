@@ -7,6 +7,9 @@ BIN    := .venv/bin
 SOURCES := $(shell find rust python benches/kernels -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
 
+# Files that build.rs finds, so that cargo does not tell rustfmt of them.
+LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs")
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test wheel dev bench lint rust-test python-test format clean
 
@@ -29,6 +32,7 @@ bench: .venv/bench ## time every language on the same work, in one run, into ben
 
 lint: .venv/test
 	cargo fmt --all --check
+	rustfmt --edition 2024 --check $(LISTED)
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
@@ -43,6 +47,7 @@ python-test: .venv/test
 
 format: .venv/test ## format Rust and Python
 	cargo fmt --all
+	rustfmt --edition 2024 $(LISTED)
 	$(BIN)/ruff check --fix --quiet .
 	$(BIN)/ruff format --quiet .
 	$(BIN)/python docs/generate.py

@@ -81,10 +81,17 @@ def test_the_quick_run_writes_a_report(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     report = out.read_text(encoding="utf-8")
     lines = [cells(line) for line in report.splitlines() if line.startswith("|")]
-    tables = [i for i, line in enumerate(lines) if line[0] == "contestant"]
+    first_chosen = next(i for i, line in enumerate(lines) if line[1] == "1e-03")
+    tables = [i for i, line in enumerate(lines[:first_chosen]) if line[0] == "contestant"]
     assert len(tables) == len(workloads.catalogue())
     units = {work.unit.name for work in workloads.catalogue()}
-    for row in lines[: next(i for i, line in enumerate(lines) if line[0] == "what")]:
+    for row in lines[first_chosen : next(i for i, line in enumerate(lines) if line[0] == "what")]:
+        if row[0].startswith("stepwell"):
+            assert float(row[1]) > 0
+            assert float(row[-1]) >= 1
+    chosen = {row[0] for row in lines[first_chosen:]}
+    assert {f"stepwell {m.name}" for m in sw.methods() if m.error_order is not None} <= chosen
+    for row in lines[:first_chosen]:
         if row[0] == "contestant":
             assert row[1] in units
             assert row[2:4] == ["min … max", "error"]

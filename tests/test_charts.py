@@ -64,6 +64,8 @@ def test_the_error_falls_with_the_order_that_is_declared(charts, scene, method):
     curve = next(curve for curve in chart.curves if curve.method is method)
     if (scene.name, method.name) == ("pendulum", "fehlberg"):
         return  # of two signs of error, which cancel in this window; test_orders.py looks closer
+    if method.order > 5 and not scene.system.linear:
+        return  # sixteen digits do not show it; test_orders.py takes fifty
     assert slope(curve) == pytest.approx(method.order, abs=0.1 if scene.system.linear else 0.25)
 
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import decimal
 import itertools
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from types import ModuleType
 from typing import Any
 
+import dop853
 import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import UnsupportedError
+from stepwell.reference import tableau
 
-METHODS = sw.methods()
+#: Sixteen digits show orders up to 5: of higher ones the error is rounding before its first power rules.
+METHODS = [m for m in sw.methods() if m.order <= 5]
+HIGH = {"dop853": dop853}
 
 
 def five_bodies() -> tuple[sw.System, Any, Any]:
@@ -72,3 +80,91 @@ def test_the_order_is_the_declared_one(name: str, method: sw.Method) -> None:
         usable = [size for size in cleaned if size > 2e-12 * 2**p]
         slopes.append(float(np.log2(usable[-2] / usable[-1])))
     assert slopes == pytest.approx([p, p], abs=0.1)
+
+
+# ---- orders above 5, in 50 digits
+
+
+@pytest.fixture
+def fifty_digits() -> Iterator[None]:
+    with decimal.localcontext(prec=50):
+        yield
+
+
+def sine(x: Decimal) -> Decimal:
+    total, term, k = Decimal(0), x, 1
+    while abs(term) > Decimal("1e-50"):
+        total += term
+        term = -term * x * x / ((k + 1) * (k + 2))
+        k += 2
+    return total
+
+
+def spring(t: Decimal, v: Any, y: Any) -> Any:
+    return -Decimal("1.69") * y - Decimal("0.4") * v
+
+
+def pushed(t: Decimal, v: Any, y: Any) -> Any:
+    return -Decimal("1.69") * y + Decimal("0.8") * sine(Decimal("2.1") * t + Decimal("0.3"))
+
+
+def pendulum(t: Decimal, v: Any, y: Any) -> Any:
+    return np.array([-sine(angle) for angle in y])
+
+
+def ellipse(t: Decimal, v: Any, y: Any) -> Any:
+    r2 = y[0] * y[0] + y[1] * y[1]
+    return -y / (r2 * r2.sqrt())
+
+
+class Scaled:
+    """A system of second order, scaled to a step, on numbers of any kind."""
+
+    def __init__(self, rate: Callable[[Decimal, Any, Any], Any], h: Decimal) -> None:
+        self.rate, self.h = rate, h
+
+    def dv(self, t: Decimal, v: Any, y: Any) -> Any:
+        return self.h * self.rate(t, v, y)
+
+    def dy(self, t: Decimal, v: Any, y: Any) -> Any:
+        return self.h * v
+
+
+def high_end(method: ModuleType, rate: Any, steps: int) -> tuple[Any, Any]:
+    v, y = np.array([Decimal("0.4"), Decimal("0.9")]), np.array([Decimal("1.1"), Decimal("0.2")])
+    h = Decimal(1) / steps
+    s: Any = Scaled(rate, h)
+    for k in range(steps):
+        increments = tableau.stages(method.NODES, method.ROWS, s, k * h, h, v, y)  # type: ignore[arg-type]
+        v, y = tableau.plus(v, y, method.WEIGHTS, increments)
+    return v, y
+
+
+@pytest.mark.usefixtures("fifty_digits")
+@pytest.mark.parametrize("rate", [spring, pushed, pendulum, ellipse])
+@pytest.mark.parametrize("name", HIGH)
+def test_a_high_order_is_the_declared_one(name: str, rate: Any) -> None:
+    """Halving the step divides what a halving still changes by 2ᵖ, in both blocks; the next power leaves half each time."""
+    ends = [high_end(HIGH[name], rate, steps) for steps in (8, 16, 32, 64, 128)]
+    for block in (0, 1):
+        changes = [float(sum(d * d for d in fine[block] - coarse[block]).sqrt()) for coarse, fine in itertools.pairwise(ends)]
+        first, second = np.log2(changes[1] / changes[2]), np.log2(changes[2] / changes[3])
+        assert 2 * second - first == pytest.approx(sw.method(name).order, abs=0.1)
+
+
+@pytest.mark.usefixtures("fifty_digits")
+@pytest.mark.parametrize("name", HIGH)
+def test_the_tableau_is_the_printed_one(name: str) -> None:
+    """Every number of it, rounded once. Its nodes are the sums of its rows, and a step without rates stays where it is."""
+    printed, ours = HIGH[name], sw.method(name).steps
+    for part in ("NODES", "WEIGHTS", "ERROR"):
+        assert getattr(ours, part) == tuple(map(float, getattr(printed, part))), part
+    assert tuple(tuple(map(float, row)) for row in printed.ROWS) == ours.ROWS
+    assert tuple(float(a - b) for a, b in zip(printed.WEIGHTS, printed.LOWER, strict=True)) == ours.COARSE
+    for node, row in zip(printed.NODES, printed.ROWS, strict=True):
+        assert abs(sum(row) - node) < Decimal("1e-27")
+    assert abs(sum(printed.WEIGHTS) - 1) < Decimal("1e-27")
+
+
+def test_every_method_has_its_order_measured() -> None:
+    assert {m.name for m in METHODS} | set(HIGH) == {m.name for m in sw.methods()}

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 from . import extras, machine, peers, report, runner, workloads
+from .chosen import tables
 
 EPILOG = """To compare at another CPU level: STEPWELL_ISA=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
 NUMBA_CPU_NAME=haswell NUMBA_CPU_FEATURES=+avx2,+fma (numba)."""
@@ -18,7 +19,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
     parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
     parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
-    parser.add_argument("--only", default="", metavar="W4", help="only the works whose names begin so")
+    parser.add_argument(
+        "--only", default="", metavar="W4", help="only the works whose names begin so; chosen for steps of chosen length"
+    )
     given = parser.parse_args()
     repeats = 3 if given.quick else given.repeats
     warnings.simplefilter("error")
@@ -36,6 +39,11 @@ def main() -> None:
         made = report.table(work, rows)
         report.show(*made)
         parts += [report.markdown(*made), report.threads(rows)]
+    if "chosen".startswith(given.only) or given.only.startswith("chosen"):
+        parts.append("## Steps of chosen length\n\n" + tables.READING.format(repeats=repeats))
+        for made in tables.tables(repeats, given.quick):
+            report.show(*made)
+            parts.append(report.markdown(*made))
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]

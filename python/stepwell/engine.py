@@ -351,12 +351,16 @@ def adapt(plan: Plan, pacing: Pacing, v: Array, y: Array) -> Adapted:
         pairs, s = plan.method.steps, plan.system.scaled(1.0, plan.batch)
         steps: Any = pairs
 
-        def attempt(s: Any, t: Any, h: Any, v: Array, y: Array) -> tuple[Blocks, Blocks]:
-            increments = steps.stages(s, t, h, v, y)
-            return tableau.plus(v, y, steps.WEIGHTS, increments), tableau.combined(steps.ERROR, increments)
+        coarse = getattr(steps, "COARSE", None)
 
-        wide = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in ("first", "relative", "absolute")}
-        whole = adaptive.run(attempt, s, v, y, plan.block_axes, t0=plan.t0, at=pacing.at, budget=pacing.budget, **wide)
+        def attempt(s: Any, t: Any, h: Any, v: Array, y: Array) -> tuple[Blocks, Blocks, Blocks | None]:
+            increments = steps.stages(s, t, h, v, y)
+            corrected = None if coarse is None else tableau.combined(coarse, increments)
+            return tableau.plus(v, y, steps.WEIGHTS, increments), tableau.combined(steps.ERROR, increments), corrected
+
+        wide: Any = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in ("first", "relative", "absolute")}
+        timing: Any = {"t0": plan.t0, "at": pacing.at, "budget": pacing.budget, "order": plan.method.error_order}
+        whole = adaptive.run(attempt, s, v, y, plan.block_axes, **timing, **wide)
         return Adapted(*whole)
     kept, members = len(pacing.at), prod(plan.batch)
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))

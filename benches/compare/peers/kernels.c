@@ -42,20 +42,15 @@ void free_false_euler(long n, long steps, double h, const double *const *in, dou
 static inline double sine(double x)
 {
     const double magic = 6755399441055744.0; /* 1.5*2^52 */
-    double shifted = x * 0.636619772367581343 + magic;
-    double n = shifted - magic;
-    uint64_t quadrant, bits;
-    memcpy(&quadrant, &shifted, 8);
-    double r = ((x - n * 1.5707963267341256) - n * 6.077100506303966e-11) - n * 2.0222662487959506e-21;
-    double z = r * r;
-    double s = r + (r * z) * (-1.66666666666666324348e-1 + z * (8.33333333332248946124e-3 + z * (-1.98412698298579493134e-4
-               + z * (2.75573137070700676789e-6 + z * (-2.50507602534068634195e-8 + z * 1.58969099521155010221e-10)))));
-    double c = (1.0 - 0.5 * z) + (z * z) * (4.16666666666666019037e-2 + z * (-1.38888888888741095749e-3
-               + z * (2.48015872894767294178e-5 + z * (-2.75573143513906633035e-7 + z * (2.08757232129817482790e-9
-               + z * -1.13596475577881948265e-11)))));
-    double a = quadrant & 1 ? c : s;
+    double shifted = x * 0.3183098861837907 + magic, n = shifted - magic;
+    double r = (x - n * 3.1415926534682512) - n * 1.2154201013012384e-10, z = r * r, w = z * z;
+    double odd = 0.008333333333333196 + w * (2.75573192107121e-6 + w * (1.6058937294753282e-10 + w * 2.7205082501769597e-15));
+    double even = -0.00019841269841207676 + w * (-2.505210682744121e-8 + w * -7.64292781535996e-13);
+    double a = r + (r * z) * (-0.16666666666666666 + z * (odd + z * even));
+    uint64_t half_turns, bits;
+    memcpy(&half_turns, &shifted, 8);
     memcpy(&bits, &a, 8);
-    bits ^= (quadrant & 2) << 62;
+    bits ^= half_turns << 63;
     memcpy(&a, &bits, 8);
     return a;
 }

@@ -33,7 +33,7 @@ COLOURS = (
 )
 PEERS = "1234+|"
 #: The line tells the order: the more accurate, the more solid.
-LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5))}
+LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
 GREY = "#666666"
 
 #: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.

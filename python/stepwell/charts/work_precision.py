@@ -21,8 +21,11 @@ from .known import chartable
 from .peers import TOLERANCES, Peer, Solved
 from .peers import peer as find_peer
 
-#: The ladder goes from this many times the scene's step, beyond every method's limit, to this small a part of it.
+#: The ladder goes from this many times the scene's step to this small a part of it.
 LARGEST, SMALLEST = 16.0, 1 / 3000
+
+#: And by so many rungs beyond, where even the method of the widest limit is unstable.
+BELOW = 2
 
 #: But no run of the ladder has more steps than this, for it would take minutes.
 MOST = 2_000_000
@@ -55,7 +58,7 @@ def work_precision(
     Args:
         scene: a ``Scene``, or the name of one.
         methods: names, or what ``stepwell.method`` returns; all if None.
-        steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 16
+        steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 24
             times the scene's down to a 3000th of it, or to two million steps.
         tolerances: of the methods that estimate their error, which get a second curve, "merson, tolerance"; if None, 1e-2 to
             1e-12, two in each factor of ten; none if empty. Such a run is looked at, and so ends a step, at ten times.
@@ -120,5 +123,7 @@ def _ladder(scene: Scene) -> list[int]:
     """Numbers of steps, evenly spread on a logarithmic scale."""
     most = MOST * min(1.0, LIGHT / max(1, scene.y.size)) ** 2
     few, many = scene.horizon / (LARGEST * scene.dt), min(most, scene.horizon / (SMALLEST * scene.dt))
-    rungs = np.geomspace(max(4.0, few), many, round(RUNGS * np.log10(many / few)) + 1)
-    return sorted({round(n) for n in rungs.tolist()})
+    few = max(4.0, few)
+    gaps = round(RUNGS * np.log10(many / few))
+    rungs = few * (many / few) ** (np.arange(-BELOW, gaps + 1) / gaps)
+    return sorted({round(n) for n in rungs.tolist() if n >= 4.0})

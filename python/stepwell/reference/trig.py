@@ -8,51 +8,45 @@ import numpy as np
 
 from .types import Array
 
-TWO_OVER_PI = 0.636619772367581343
+PER_HALF_TURN = 0.3183098861837907  # 1/π
 MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which then stands in the low bits
-HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
+PI = (3.1415926534682512, 1.2154201013012384e-10)
 S = (
-    -1.66666666666666324348e-1,
-    8.33333333332248946124e-3,
-    -1.98412698298579493134e-4,
-    2.75573137070700676789e-6,
-    -2.50507602534068634195e-8,
-    1.58969099521155010221e-10,
-)
-C = (
-    4.16666666666666019037e-2,
-    -1.38888888888741095749e-3,
-    2.48015872894767294178e-5,
-    -2.75573143513906633035e-7,
-    2.08757232129817482790e-9,
-    -1.13596475577881948265e-11,
+    -0.16666666666666666,
+    0.008333333333333196,
+    -0.00019841269841207676,
+    2.75573192107121e-6,
+    -2.505210682744121e-8,
+    1.6058937294753282e-10,
+    -7.64292781535996e-13,
+    2.7205082501769597e-15,
 )
 
 
 def sin(x: Array) -> Array:
     """Sin x."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
-        return _sin(x.real, 0) + 1j * (x.imag * _sin(x.real, 1))
-    return _sin(x, 0)
+        return sin(x.real) + 1j * (x.imag * cos(x.real))
+    y = np.asarray(x * PER_HALF_TURN + MAGIC)
+    n = y - MAGIC
+    return _half_turn((x - n * PI[0]) - n * PI[1], y)
 
 
 def cos(x: Array) -> Array:
-    """Cos x, which is the sine a quadrant further."""
-    return _sin(x, 1)
+    """Cos x, which is the sine a quarter of a turn further."""
+    y = np.asarray((x * PER_HALF_TURN + 0.5) + MAGIC)
+    n = (y - MAGIC) - 0.5
+    return _half_turn((x - n * PI[0]) - n * PI[1], y)
 
 
-def _sin(x: Array, quadrants: int) -> Array:
-    """Sin(x + quadrants·π/2): reduced by π/2 in three parts, then fdlibm's polynomials."""
-    y = np.asarray(x * TWO_OVER_PI + MAGIC)
-    n = y - MAGIC
-    r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2]
+def _half_turn(r: Array, y: Array) -> Array:
+    """Sin r on [−π/2, π/2]; its sign turns if the integer in the low bits of y is odd."""
     z = r * r
-    s = r + (r * z) * (S[0] + z * (S[1] + z * (S[2] + z * (S[3] + z * (S[4] + z * S[5])))))
-    c = (1.0 - 0.5 * z) + (z * z) * (C[0] + z * (C[1] + z * (C[2] + z * (C[3] + z * (C[4] + z * C[5])))))
+    w = z * z
+    odd = S[1] + w * (S[3] + w * (S[5] + w * S[7]))
+    even = S[2] + w * (S[4] + w * S[6])
+    s = r + (r * z) * (S[0] + z * (odd + z * even))
     if y.dtype == object:
-        return s  # numbers without bits, which count what is done to them; both branches were done
-    quadrant = y.view(np.uint64) + np.uint64(quadrants)
-    a = np.asarray(np.where(quadrant & np.uint64(1) == 0, s, c))
-    sign = (quadrant & np.uint64(2)) << np.uint64(62)
-    signed: Array = (a.view(np.uint64) ^ sign).view(np.float64)
+        return s  # numbers without bits, which count what is done to them
+    signed: Array = (np.asarray(s).view(np.uint64) ^ (y.view(np.uint64) << np.uint64(63))).view(np.float64)
     return signed

@@ -141,13 +141,7 @@ impl<'a> Worker<'a> {
     fn new(plan: &'a Plan<'a>) -> Result<Self, Error> {
         let threads = if plan.members == 1 { plan.threads } else { 1 };
         let clock = Clock { t0: plan.t0, h: 1.0, start: 0, level: plan.level, threads };
-        let mut group = plan.model.group(&clock, Width::Wide)?;
-        if !group.adapts() || plan.members < group.lanes() {
-            let narrow = plan.model.group(&clock, Width::Narrow)?;
-            if narrow.adapts() && (!group.adapts() || narrow.pays_for(plan.members)) {
-                group = narrow;
-            }
-        }
+        let group = plan.model.group(&clock, if plan.members > 1 { Width::Paced } else { Width::Lone })?;
         if !group.adapts() {
             return Err(Error::NoEstimate);
         }

@@ -60,33 +60,31 @@ pub trait Block {
         }
     }
 
-    /// `self = a + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left
+    /// `self = a + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left, over slots and their weights
     #[inline(always)]
-    fn sum_weighted<D: Block, const N: usize>(&mut self, a: &impl Block, terms: [(f64, &D); N]) {
-        let n = self.numbers().len();
-        let (a, terms) = (&a.numbers()[..n], terms.map(|(c, d)| (c, &d.numbers()[..n])));
+    fn sum_weighted<D: Block, const N: usize>(&mut self, a: &impl Block, d: &[D; SLOTS], terms: [(usize, f64); N]) {
+        let n = alike(self, d, terms);
+        let a = &a.numbers()[..n];
         for (i, s) in self.numbers_mut().iter_mut().enumerate() {
-            *s = a[i] + weighted(&terms, i);
+            *s = a[i] + weighted(d, terms, i);
         }
     }
 
-    /// `self = self + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left
+    /// `self = self + (c₀·d₀ + c₁·d₁ + …)`, the sum from the left, over slots and their weights
     #[inline(always)]
-    fn add_weighted<D: Block, const N: usize>(&mut self, terms: [(f64, &D); N]) {
-        let n = self.numbers().len();
-        let terms = terms.map(|(c, d)| (c, &d.numbers()[..n]));
+    fn add_weighted<D: Block, const N: usize>(&mut self, d: &[D; SLOTS], terms: [(usize, f64); N]) {
+        alike(self, d, terms);
         for (i, s) in self.numbers_mut().iter_mut().enumerate() {
-            *s += weighted(&terms, i);
+            *s += weighted(d, terms, i);
         }
     }
 
-    /// `self = c₀·d₀ + c₁·d₁ + …`, from the left
+    /// `self = c₀·d₀ + c₁·d₁ + …`, from the left, over slots and their weights
     #[inline(always)]
-    fn set_weighted<D: Block, const N: usize>(&mut self, terms: [(f64, &D); N]) {
-        let n = self.numbers().len();
-        let terms = terms.map(|(c, d)| (c, &d.numbers()[..n]));
+    fn set_weighted<D: Block, const N: usize>(&mut self, d: &[D; SLOTS], terms: [(usize, f64); N]) {
+        alike(self, d, terms);
         for (i, s) in self.numbers_mut().iter_mut().enumerate() {
-            *s = weighted(&terms, i);
+            *s = weighted(d, terms, i);
         }
     }
 
@@ -151,18 +149,42 @@ pub fn at_a_line<T>(make: impl Fn() -> T, numbers: impl Fn(&T) -> &[f64]) -> T {
     }
 }
 
+/// Does something for each of N terms. Written out: a loop over more than six terms is unrolled so late that no lane loop around it
+/// is a vector loop.
+macro_rules! each_term {
+    ($n:ident, |$k:ident| $body:expr) => {
+        each_term!(@ $n, |$k| $body, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11)
+    };
+    (@ $n:ident, |$k:ident| $body:expr, $($i:literal),*) => {
+        const { assert!($n <= SLOTS) };
+        $(if $n > $i {
+            let $k: usize = $i;
+            $body;
+        })*
+    };
+}
+
 /// The `i`-th number of c₀·d₀ + c₁·d₁ + …, from the left.
 #[inline(always)]
-fn weighted<const N: usize>(terms: &[(f64, &[f64]); N], i: usize) -> f64 {
-    let mut sum = terms[0].0 * terms[0].1[i];
-    for (c, d) in &terms[1..] {
-        sum += c * d[i];
-    }
+fn weighted<D: Block, const N: usize>(d: &[D; SLOTS], terms: [(usize, f64); N], i: usize) -> f64 {
+    let term = |k: usize| terms[k].1 * d[terms[k].0].numbers()[i];
+    let mut sum = term(0);
+    each_term!(N, |k| if k > 0 {
+        sum += term(k)
+    });
     sum
 }
 
+/// How many numbers a block has. Panics unless the terms have as many, so that a loop over them need not ask.
+#[inline(always)]
+fn alike<D: Block, const N: usize>(block: &(impl Block + ?Sized), d: &[D; SLOTS], terms: [(usize, f64); N]) -> usize {
+    let n = block.numbers().len();
+    each_term!(N, |k| assert!(d[terms[k].0].numbers().len() == n));
+    n
+}
+
 /// How many increments of each block a step may hold at once.
-pub const SLOTS: usize = 6;
+pub const SLOTS: usize = 12;
 
 /// Scratch for one step: the increments of the stages, and one intermediate state.
 ///
@@ -178,14 +200,24 @@ pub struct Work<S: System + ?Sized> {
     pub y: S::Y,
 }
 
+/// One block for each slot, written out: the compiler does not unroll a loop over so many, and then no lane loop is a vector loop.
+macro_rules! slots {
+    ($block:ident, $used:ident) => {
+        slots!($block, $used, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11)
+    };
+    ($block:ident, $used:ident, $($i:literal),*) => {
+        [$(if $used($i) { $block.like() } else { $block.unused() }),*]
+    };
+}
+
 impl<S: System + ?Sized> Work<S> {
     /// Scratch for blocks of the shapes of `v` and `y` and a method of so many evaluations.
     #[inline(always)]
     pub fn new(evaluations: u32, v: &S::V, y: &S::Y) -> Self {
         let used = |i: usize| i < evaluations as usize;
         Work {
-            dv: std::array::from_fn(|i| if used(i) { v.like() } else { v.unused() }),
-            dy: std::array::from_fn(|i| if used(i) { y.like() } else { y.unused() }),
+            dv: slots!(v, used),
+            dy: slots!(y, used),
             v: if used(1) { v.like() } else { v.unused() },
             y: if used(1) { y.like() } else { y.unused() },
         }

@@ -100,13 +100,18 @@ impl Clock {
     }
 }
 
-/// How many members to expect: a wide group has the throughput, a narrow one the latency.
+/// How many members to expect: a wide group has the throughput, a narrow one the latency. The other two step at a pace of their
+/// own and not otherwise; a group that cannot do that may be anything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     /// As many lanes as the level's registers hold.
     Wide,
     /// A few lanes, for a few members.
     Narrow,
+    /// Lanes that go at a pace of their own each.
+    Paced,
+    /// One member at a pace of its own.
+    Lone,
 }
 
 /// Lanes of a narrow group. One vector of AVX-512, two of AVX2: a step takes as long as for a single member.

@@ -27,6 +27,7 @@ pub mod signal;
 pub mod stepper;
 pub mod system;
 pub mod table;
+pub mod tableau;
 pub mod tile;
 pub mod trig;
 pub mod world;

@@ -103,6 +103,6 @@ fn at_level<const L: usize>(spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: u
 pub fn group(spec: &Spec, nodes: &[f64], clock: &Clock, v_rows: usize, width: Width) -> Box<dyn Group> {
     match width {
         Width::Wide => at_level::<LANES>(spec, nodes, clock, v_rows),
-        Width::Narrow => at_level::<1>(spec, nodes, clock, v_rows),
+        _ => at_level::<1>(spec, nodes, clock, v_rows),
     }
 }

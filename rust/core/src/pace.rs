@@ -10,14 +10,17 @@ use crate::{
 };
 
 /// A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
-/// (PI control, Gustafsson 1988), held between LEAST and MOST; after a rejected step there is no p and no growth.
+/// (PI control, Gustafsson 1988), held between LEAST and MOST; after a rejected step there is no p and no growth. Where the error
+/// is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
 const SAFETY: f64 = 0.9;
 const LEAST: f64 = 0.2;
 const MOST: f64 = 5.0;
 /// r² below this counts as this.
 const TINY_SQUARE: f64 = 1e-10 * 1e-10;
-/// The sixteenth root of the least p, 1e-4.
-const CALM_ROOT: f64 = 0.562_341_325_190_349_1;
+/// The sixteenth root of the least p, 1e-4, and its thirty-second.
+const CALM_ROOTS: [f64; 2] = [0.562_341_325_190_349_1, 0.749_894_209_332_455_8];
+/// The highest order of an estimate that counts as low.
+const LOW: u32 = 5;
 
 /// Numbers of a pace.
 pub const NUMBERS: usize = 10;
@@ -35,7 +38,7 @@ pub struct Pace {
     pub relative: f64,
     /// Tolerated error beside the relative one.
     pub absolute: f64,
-    /// The sixteenth root of the last accepted error.
+    /// The sixteenth root of the last accepted error, or its thirty-second.
     pub before: f64,
     /// How much the next step may grow.
     pub most: f64,
@@ -93,15 +96,16 @@ impl Pace {
         (self.t < self.target) & (self.t + step > self.t) & (self.accepted + self.rejected < budget)
     }
 
-    /// Takes in the error of an attempt; says whether the state goes on.
+    /// Takes in the error of an attempt; says whether the state goes on. `high`: the estimate is of a high order.
     #[inline(always)]
-    fn decide(&mut self, budget: f64, r2: f64) -> bool {
+    fn decide(&mut self, high: bool, budget: f64, r2: f64) -> bool {
         let ((step, last), runs) = (self.step(), self.runs(budget));
         let good = r2 <= 1.0; // NaN is not
         let floored = if r2 > TINY_SQUARE { r2 } else { TINY_SQUARE };
         let r16 = floored.sqrt().sqrt().sqrt().sqrt(); // the eighth root of r
         let r32 = r16.sqrt();
-        let factor = SAFETY / (r16 * r32.sqrt());
+        let r64 = r32.sqrt();
+        let factor = SAFETY / (if high { r32 } else { r16 } * r64);
         let factor = if good { factor * self.before } else { factor };
         let factor = if factor > LEAST { factor } else { LEAST };
         let ceiling = if good { self.most } else { 1.0 };
@@ -112,7 +116,8 @@ impl Pace {
         let grown = if good & last & (grown < self.h) { self.h } else { grown };
         let took = runs & good;
         let reached = if last { self.target } else { self.t + step };
-        let root = if r32 > CALM_ROOT { r32 } else { CALM_ROOT };
+        let (root, calm) = if high { (r64, CALM_ROOTS[1]) } else { (r32, CALM_ROOTS[0]) };
+        let root = if root > calm { root } else { calm };
         self.t = if took { reached } else { self.t };
         self.h = if runs { grown } else { self.h };
         self.before = if took { root } else { self.before };
@@ -195,8 +200,15 @@ pub fn attempt<S: System, St: Stepper>(
     trial.y.numbers_mut().copy_from_slice(y.numbers());
     St::step(s, pace.t, step, &mut trial.v, &mut trial.y, &mut trial.work);
     St::error(&mut trial.work);
-    let r2 = over(pace, &trial.work.v, v, &trial.v) + over(pace, &trial.work.y, y, &trial.y);
-    let took = pace.decide(budget, r2);
+    let allowed = (allowed(pace, v, &trial.v), allowed(pace, y, &trial.y));
+    let mut r2 = length2(&trial.work.v) / allowed.0 + length2(&trial.work.y) / allowed.1;
+    if const { St::CORRECTED } {
+        St::coarse_error(&mut trial.work);
+        let coarse = length2(&trial.work.v) / allowed.0 + length2(&trial.work.y) / allowed.1;
+        r2 = if r2 > 0.0 { (r2 * r2) / (r2 + 0.01 * coarse) } else { r2 };
+    }
+    let high = const { matches!(St::RECORD.error_order, Some(order) if order > LOW) };
+    let took = pace.decide(high, budget, r2);
     for (old, new) in v.numbers_mut().iter_mut().zip(trial.v.numbers()) {
         *old = if took { *new } else { *old };
     }
@@ -205,12 +217,12 @@ pub fn attempt<S: System, St: Stepper>(
     }
 }
 
-/// The square of a block's error over what is tolerated: relative to the longer of the old and the new block.
+/// The square of the length of an error that is tolerated in a block: relative to the longer of the old and the new one.
 #[inline(always)]
-fn over(pace: &Pace, error: &impl Block, old: &impl Block, new: &impl Block) -> f64 {
+fn allowed(pace: &Pace, old: &impl Block, new: &impl Block) -> f64 {
     let (a, b) = (length2(old), length2(new));
     let allowed = pace.absolute + pace.relative * (if a > b { a } else { b }).sqrt();
-    length2(error) / (allowed * allowed)
+    allowed * allowed
 }
 
 /// The square of a block's length, number after number.

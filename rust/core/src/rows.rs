@@ -247,6 +247,6 @@ where
 {
     match width {
         Width::Wide => at_level::<Many, St, LANES>(clock, spec),
-        Width::Narrow => at_level::<One, St, 1>(clock, spec),
+        _ => at_level::<One, St, 1>(clock, spec),
     }
 }

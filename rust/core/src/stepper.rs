@@ -68,6 +68,13 @@ pub trait Stepper: 'static {
         w.v.numbers_mut().fill(f64::NAN);
     }
 
+    /// Whether a second estimate, of lower order, corrects the first, so that both together behave as one of the method's order.
+    const CORRECTED: bool = false;
+
+    /// The second estimate, as `error`.
+    #[inline(always)]
+    fn coarse_error<S: System>(_w: &mut Work<S>) {}
+
     /// Turns the velocity in the `v` slot into what the method carries there. `choice` counts [`Record::starts`].
     #[inline(always)]
     fn start<S: System>(_s: &mut S, _choice: usize, _t: f64, _v: &mut S::V, _y: &S::Y, _w: &mut Work<S>) {}

@@ -11,7 +11,7 @@ use nalgebra::SVector;
 use crate::{
     block::Work,
     group::{Clock, Group, Row, Spec, Table, Width},
-    isa::{Isa, Task, with_isa},
+    isa::{Baseline, Isa, Task, with_isa},
     pace::{self, NUMBERS, Pace, Stretched, Trial},
     stepper::Stepper,
     system::System,
@@ -125,7 +125,7 @@ impl<'a, const L: usize> View<'a, L> {
     }
 }
 
-struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> {
+struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool> {
     clock: Clock,
     isa: I,
     family: S,
@@ -223,15 +223,15 @@ where
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> Tile<S, St, I, P, Q, C, L, FEW>
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool>
+    Tile<S, St, I, P, Q, C, L, PACED>
 where
     S: Small<P, Q, C>,
     St: Stepper,
     I: Isa,
 {
-    /// Whether it has a kernel for steps of chosen length: one width does, or the core would grow by half. An attempt is long, so a
-    /// vector or two of lanes keep the machine busy.
-    const ADAPTS: bool = St::RECORD.error_order.is_some() && L > 1 && (L <= 16 || FEW == 1);
+    /// Whether it has the kernel for steps of chosen length, and then no other.
+    const ADAPTS: bool = PACED && St::RECORD.error_order.is_some();
 
     fn boxed(family: S, isa: I, clock: &Clock) -> Box<dyn Group> {
         Box::new(Self {
@@ -266,8 +266,8 @@ where
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const FEW: usize> Group
-    for Tile<S, St, I, P, Q, C, L, FEW>
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool> Group
+    for Tile<S, St, I, P, Q, C, L, PACED>
 where
     S: Small<P, Q, C>,
     St: Stepper,
@@ -319,7 +319,7 @@ where
     }
 
     fn start(&mut self, k: i64) {
-        if const { St::RECORD.carry.is_none() } {
+        if const { PACED || St::RECORD.carry.is_none() } {
             return;
         }
         let (t, choice) = (self.clock.at(k), self.clock.start);
@@ -327,6 +327,9 @@ where
     }
 
     fn advance(&mut self, k: i64, n: i64) {
+        if const { PACED } {
+            return;
+        }
         self.isa.run(Steps::<S, St, P, Q, C, L> {
             clock: self.clock,
             k,
@@ -340,7 +343,7 @@ where
     }
 
     fn finish(&mut self, k: i64) {
-        if const { St::RECORD.carry.is_none() } {
+        if const { PACED || St::RECORD.carry.is_none() } {
             return;
         }
         let (t, choice) = (self.clock.at(k), self.clock.start);
@@ -403,8 +406,19 @@ fn prepare_lane<S: Small<P, Q, C>, const P: usize, const Q: usize, const C: usiz
     }
 }
 
-/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, or a narrow one of `FEW`.
-pub fn group<S, St, const P: usize, const Q: usize, const C: usize, const WIDE: usize, const HALF: usize, const FEW: usize>(
+/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, a narrow one of `FEW`, or `OWN` lanes that go at
+/// a pace of their own each. An attempt is long, so a vector or two of those keep the machine busy.
+pub fn group<
+    S,
+    St,
+    const P: usize,
+    const Q: usize,
+    const C: usize,
+    const WIDE: usize,
+    const HALF: usize,
+    const FEW: usize,
+    const OWN: usize,
+>(
     family: S,
     clock: &Clock,
     width: Width,
@@ -413,15 +427,22 @@ where
     S: Small<P, Q, C>,
     St: Stepper,
 {
-    with_isa!(
-        clock.level,
-        |isa| match width {
-            Width::Wide => Tile::<S, St, _, P, Q, C, WIDE, FEW>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW, FEW>::boxed(family, isa, clock),
-        },
+    if const { St::RECORD.error_order.is_some() } {
         match width {
-            Width::Wide => Tile::<S, St, _, P, Q, C, HALF, FEW>::boxed(family, isa, clock),
-            Width::Narrow => Tile::<S, St, _, P, Q, C, FEW, FEW>::boxed(family, isa, clock),
+            // One member has few numbers to put side by side, so no level does better than another.
+            Width::Lone => return Tile::<S, St, _, P, Q, C, 1, true>::boxed(family, Baseline, clock),
+            Width::Paced => {
+                return with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, OWN, true>::boxed(family, isa, clock));
+            }
+            _ => {}
         }
-    )
+    }
+    match width {
+        Width::Wide => with_isa!(
+            clock.level,
+            |isa| Tile::<S, St, _, P, Q, C, WIDE, false>::boxed(family, isa, clock),
+            Tile::<S, St, _, P, Q, C, HALF, false>::boxed(family, isa, clock)
+        ),
+        _ => with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, FEW, false>::boxed(family, isa, clock)),
+    }
 }

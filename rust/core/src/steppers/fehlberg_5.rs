@@ -1,8 +1,9 @@
 use super::fehlberg::{difference, stages};
 use crate::{
-    block::{Block, Work},
+    block::Work,
     stepper::{Needs, Record, Stepper},
     system::System,
+    tableau::go_on,
 };
 
 pub struct Fehlberg5;
@@ -31,21 +32,7 @@ impl Stepper for Fehlberg5 {
     #[inline(always)]
     fn step<S: System>(s: &mut S, t: f64, h: f64, v: &mut S::V, y: &mut S::Y, w: &mut Work<S>) {
         stages(s, t, h, v, y, w);
-        let ([dv1, _, dv3, dv4, dv5, dv6], [dy1, _, dy3, dy4, dy5, dy6]) = (&w.dv, &w.dy);
-        v.add_weighted([
-            (16.0 / 135.0, dv1),
-            (6656.0 / 12825.0, dv3),
-            (28561.0 / 56430.0, dv4),
-            (-0.18, dv5),
-            (2.0 / 55.0, dv6),
-        ]);
-        y.add_weighted([
-            (16.0 / 135.0, dy1),
-            (6656.0 / 12825.0, dy3),
-            (28561.0 / 56430.0, dy4),
-            (-0.18, dy5),
-            (2.0 / 55.0, dy6),
-        ]);
+        go_on(v, y, w, [(0, 16.0 / 135.0), (2, 6656.0 / 12825.0), (3, 28561.0 / 56430.0), (4, -0.18), (5, 2.0 / 55.0)]);
     }
 
     #[inline(always)]

@@ -1,7 +1,8 @@
 use crate::{
-    block::{Block, Work},
+    block::Work,
     stepper::{Needs, Record, Stepper},
     system::System,
+    tableau::{estimate, first, go_on, stage},
 };
 
 pub struct Merson;
@@ -33,34 +34,16 @@ impl Stepper for Merson {
 
     #[inline(always)]
     fn step<S: System>(s: &mut S, t: f64, h: f64, v: &mut S::V, y: &mut S::Y, w: &mut Work<S>) {
-        let ([dv1, dv2, dv3, dv4, dv5, ..], [dy1, dy2, dy3, dy4, dy5, ..]) = (&mut w.dv, &mut w.dy);
-        let (third, half) = (t + THIRD * h, t + 0.5 * h);
-        s.dv(t, v, y, dv1);
-        s.dy(t, v, y, dy1);
-        w.v.sum_weighted(v, [(THIRD, dv1)]);
-        w.y.sum_weighted(y, [(THIRD, dy1)]);
-        s.dv(third, &w.v, &w.y, dv2);
-        s.dy(third, &w.v, &w.y, dy2);
-        w.v.sum_weighted(v, [(SIXTH, dv1), (SIXTH, dv2)]);
-        w.y.sum_weighted(y, [(SIXTH, dy1), (SIXTH, dy2)]);
-        s.dv(third, &w.v, &w.y, dv3);
-        s.dy(third, &w.v, &w.y, dy3);
-        w.v.sum_weighted(v, [(0.125, dv1), (0.375, dv3)]);
-        w.y.sum_weighted(y, [(0.125, dy1), (0.375, dy3)]);
-        s.dv(half, &w.v, &w.y, dv4);
-        s.dy(half, &w.v, &w.y, dy4);
-        w.v.sum_weighted(v, [(0.5, dv1), (-1.5, dv3), (2.0, dv4)]);
-        w.y.sum_weighted(y, [(0.5, dy1), (-1.5, dy3), (2.0, dy4)]);
-        s.dv(t + h, &w.v, &w.y, dv5);
-        s.dy(t + h, &w.v, &w.y, dy5);
-        v.add_weighted([(SIXTH, dv1), (2.0 / 3.0, dv4), (SIXTH, dv5)]);
-        y.add_weighted([(SIXTH, dy1), (2.0 / 3.0, dy4), (SIXTH, dy5)]);
+        first(s, t, v, y, w);
+        stage(s, t + THIRD * h, v, y, w, 1, [(0, THIRD)]);
+        stage(s, t + THIRD * h, v, y, w, 2, [(0, SIXTH), (1, SIXTH)]);
+        stage(s, t + 0.5 * h, v, y, w, 3, [(0, 0.125), (2, 0.375)]);
+        stage(s, t + h, v, y, w, 4, [(0, 0.5), (2, -1.5), (3, 2.0)]);
+        go_on(v, y, w, [(0, SIXTH), (3, 2.0 / 3.0), (4, SIXTH)]);
     }
 
     #[inline(always)]
     fn error<S: System>(w: &mut Work<S>) {
-        let ([dv1, _, dv3, dv4, dv5, ..], [dy1, _, dy3, dy4, dy5, ..]) = (&w.dv, &w.dy);
-        w.v.set_weighted([(1.0 / 15.0, dv1), (-0.3, dv3), (4.0 / 15.0, dv4), (-1.0 / 30.0, dv5)]);
-        w.y.set_weighted([(1.0 / 15.0, dy1), (-0.3, dy3), (4.0 / 15.0, dy4), (-1.0 / 30.0, dy5)]);
+        estimate(w, [(0, 1.0 / 15.0), (2, -0.3), (3, 4.0 / 15.0), (4, -1.0 / 30.0)]);
     }
 }

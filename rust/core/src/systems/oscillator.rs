@@ -21,12 +21,10 @@ use crate::{
     tile::{self, INPUTS, Small, View},
 };
 
-/// The choice of state variables, and of what pulls back.
+/// What a kernel knows of the choice of state variables, and what pulls back.
 pub trait Form: Send + 'static {
-    /// Factor of v in h·ẏ, from the factor of the pull and h.
-    fn speed(stiffness: f64, h: f64) -> f64;
-    /// Factors of the pull and of the inputs in h·v̇.
-    fn factors(h: f64, omega: f64) -> [f64; 3];
+    /// Factor of v in h·ẏ.
+    fn speed(constants: &[f64; CONSTANTS], h: f64) -> f64;
     /// The pull at y: that of a spring, if nothing else is said.
     #[inline(always)]
     fn pull(y: f64) -> f64 {
@@ -34,28 +32,51 @@ pub trait Form: Send + 'static {
     }
 }
 
-/// v is the velocity divided by ω₀: the phase diagram is a circle.
+/// v is the velocity divided by ω₀: the phase diagram is a circle, and Φ the only constant of a free oscillator.
 pub struct Canonical;
 /// v is the velocity.
 pub struct Physical;
+/// One or the other, as a constant says: beside other constants one more is cheaper than a second kernel.
+pub struct Either;
 
 impl Form for Canonical {
     #[inline(always)]
-    fn speed(phi: f64, _h: f64) -> f64 {
-        phi
-    }
-    fn factors(h: f64, omega: f64) -> [f64; 3] {
-        [h * omega, h * omega, h / omega]
+    fn speed(c: &[f64; CONSTANTS], _h: f64) -> f64 {
+        c[0]
     }
 }
 
 impl Form for Physical {
     #[inline(always)]
-    fn speed(_phi: f64, h: f64) -> f64 {
+    fn speed(_c: &[f64; CONSTANTS], h: f64) -> f64 {
         h
     }
-    fn factors(h: f64, omega: f64) -> [f64; 3] {
-        [h * (omega * omega), h * (omega * omega), h]
+}
+
+impl Form for Either {
+    #[inline(always)]
+    fn speed(c: &[f64; CONSTANTS], _h: f64) -> f64 {
+        c[SPEED]
+    }
+}
+
+/// The choice of state variables.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Variables {
+    /// v is the velocity divided by ω₀.
+    Canonical,
+    /// v is the velocity.
+    Physical,
+    /// v is the velocity, y an angle, and the only input an acceleration.
+    Angle,
+}
+
+/// Factors of the pull and of the inputs in h·v̇.
+fn factors(variables: Variables, h: f64, omega: f64) -> [f64; 3] {
+    match variables {
+        Variables::Canonical => [h * omega, h * omega, h / omega],
+        Variables::Physical => [h * (omega * omega), h * (omega * omega), h],
+        Variables::Angle => [h * (omega * omega), h, h],
     }
 }
 
@@ -135,8 +156,10 @@ pub trait Drive: Send + 'static {
     -> Self::Force<'a, L>;
 }
 
-/// Spring, drag, and two inputs of amplitude, frequency and phase.
-const CONSTANTS: usize = 8;
+/// Spring, drag, two inputs of amplitude, frequency and phase, and the factor of v in h·ẏ.
+pub const CONSTANTS: usize = 9;
+/// The place of that factor.
+const SPEED: usize = 8;
 
 impl Drive for Free {
     type Force<'a, const L: usize> = Free;
@@ -237,6 +260,7 @@ impl<A: Source, B: Source> Drive for Driven<(A, B)> {
 struct Family<F, D> {
     /// For x and a, or the only input: whether it is a sinusoid, held, or not there.
     inputs: [Option<Kind>; 2],
+    variables: Variables,
     form: PhantomData<fn() -> (F, D)>,
 }
 
@@ -260,10 +284,11 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     type Member<'a, const L: usize> = Oscillator<F, D::Force<'a, L>>;
 
     fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
-        let [stiffness, by_x, by_a] = F::factors(h, p[0]);
+        let [stiffness, by_x, by_a] = factors(self.variables, h, p[0]);
         let mut c = [0.0; CONSTANTS];
         c[0] = stiffness;
         c[1] = (2.0 * p[1]) * (h * p[0]);
+        c[SPEED] = if self.variables == Variables::Canonical { stiffness } else { h };
         let mut slot = 2;
         for (kind, factor, of) in [(self.inputs[0], by_x, 2), (self.inputs[1], by_a, 5)] {
             if matches!(kind, Some(Kind::Sine | Kind::Beat)) {
@@ -275,7 +300,7 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     }
 
     fn input_factor(&self, h: f64, p: [f64; CONSTANTS], i: usize) -> f64 {
-        let [_, by_x, by_a] = F::factors(h, p[0]);
+        let [_, by_x, by_a] = factors(self.variables, h, p[0]);
         if i == 0 && self.inputs[0] == Some(Kind::Held) { by_x } else { by_a }
     }
 
@@ -290,27 +315,34 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
         inputs: &[View<'a, L>; INPUTS],
         lane: usize,
     ) -> Self::Member<'a, L> {
-        Oscillator { stiffness: c[0], speed: F::speed(c[0], h), force: D::force(&c, inputs, lane), form: PhantomData }
+        Oscillator { stiffness: c[0], speed: F::speed(&c, h), force: D::force(&c, inputs, lane), form: PhantomData }
     }
 }
 
 /// A group of this form and this force.
 pub(super) fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize>(
     inputs: [Option<Kind>; 2],
+    variables: Variables,
     clock: &Clock,
     width: Width,
 ) -> Box<dyn Group> {
-    let family = Family::<F, D> { inputs, form: PhantomData };
+    let family = Family::<F, D> { inputs, variables, form: PhantomData };
     // Many stages are long enough for two vectors of lanes to keep the machine busy; more kernels of them would only make the core
     // larger, by half.
     if const { St::RECORD.evaluations > 4 } {
-        tile::group::<_, St, 1, 1, CONSTANTS, 16, 16, 16>(family, clock, width)
+        tile::group::<_, St, 1, 1, CONSTANTS, 16, 16, 16, 16>(family, clock, width)
     } else {
-        tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW>(family, clock, width)
+        tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW, 16>(family, clock, width)
     }
 }
 
-fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+/// A group of oscillators.
+pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
+    let canonical = spec.has("canonical");
+    if canonical == spec.has("physical") {
+        return Err(spec.unknown_options());
+    }
+    let variables = if canonical { Variables::Canonical } else { Variables::Physical };
     if St::RECORD.needs == Needs::Acceleration && spec.has("damped") {
         return Err(Error::VelocityDependent { method: St::RECORD.name, system: "oscillator", term: "damping" });
     }
@@ -319,22 +351,20 @@ fn of_form<F: Form, St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Re
     // Lanes: what was fastest when tried. The free oscillator's v and y fill the registers of AVX-512 and Φ comes from memory.
     kinds.sort(); // a sum of two does not care for their order, and this saves kernels
     Ok(match (kinds.as_slice(), spec.has("damped")) {
-        ([], false) => of_force::<F, Free, St, 112, 24>(inputs, clock, width),
-        ([], true) => of_force::<F, Damped, St, 64, 32>(inputs, clock, width),
-        ([Kind::Held], _) => of_force::<F, Driven<FromTable>, St, 64, 32>(inputs, clock, width),
-        ([Kind::Sine], _) => of_force::<F, Driven<FromSine>, St, 16, 32>(inputs, clock, width),
-        ([Kind::Held, Kind::Held], _) => of_force::<F, Driven<(FromTable, FromTable)>, St, 64, 32>(inputs, clock, width),
-        ([Kind::Held, Kind::Sine], _) => of_force::<F, Driven<(FromTable, FromSine)>, St, 32, 32>(inputs, clock, width),
-        ([Kind::Sine, Kind::Sine], _) => of_force::<F, Driven<(FromSine, FromSine)>, St, 32, 32>(inputs, clock, width),
+        ([], false) if canonical => of_force::<Canonical, Free, St, 112, 24>(inputs, variables, clock, width),
+        ([], false) => of_force::<Physical, Free, St, 112, 24>(inputs, variables, clock, width),
+        ([], true) => of_force::<Either, Damped, St, 64, 32>(inputs, variables, clock, width),
+        ([Kind::Held], _) => of_force::<Either, Driven<FromTable>, St, 64, 32>(inputs, variables, clock, width),
+        ([Kind::Sine], _) => of_force::<Either, Driven<FromSine>, St, 16, 32>(inputs, variables, clock, width),
+        ([Kind::Held, Kind::Held], _) => {
+            of_force::<Either, Driven<(FromTable, FromTable)>, St, 64, 32>(inputs, variables, clock, width)
+        }
+        ([Kind::Held, Kind::Sine], _) => {
+            of_force::<Either, Driven<(FromTable, FromSine)>, St, 32, 32>(inputs, variables, clock, width)
+        }
+        ([Kind::Sine, Kind::Sine], _) => {
+            of_force::<Either, Driven<(FromSine, FromSine)>, St, 32, 32>(inputs, variables, clock, width)
+        }
         _ => return Err(spec.unknown_options()),
     })
-}
-
-/// A group of oscillators.
-pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Box<dyn Group>, Error> {
-    match (spec.has("canonical"), spec.has("physical")) {
-        (true, false) => of_form::<Canonical, St>(spec, clock, width),
-        (false, true) => of_form::<Physical, St>(spec, clock, width),
-        _ => Err(spec.unknown_options()),
-    }
 }

@@ -3,7 +3,7 @@
 //! Options: `damped`; `sine` or `held`, what a is. Parameters: ω₀, D, then amplitude, frequency and phase of a. Table: a's, if held.
 //! A driven pendulum always has its damping term.
 
-use super::oscillator::{Damped, Driven, Form, Free, FromBeat, FromSine, FromTable, Kind, kind, of_force};
+use super::oscillator::{CONSTANTS, Damped, Driven, Form, Free, FromBeat, FromSine, FromTable, Kind, Variables, kind, of_force};
 use crate::{
     error::Error,
     group::{Clock, Group, Spec, Width},
@@ -16,11 +16,8 @@ pub struct Angle;
 
 impl Form for Angle {
     #[inline(always)]
-    fn speed(_stiffness: f64, h: f64) -> f64 {
+    fn speed(_c: &[f64; CONSTANTS], h: f64) -> f64 {
         h
-    }
-    fn factors(h: f64, omega: f64) -> [f64; 3] {
-        [h * (omega * omega), h, h]
     }
     #[inline(always)]
     fn pull(y: f64) -> f64 {
@@ -38,12 +35,12 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
         kind(spec, "held", "sine").map(|kind| if kind == Kind::Sine && common(3) && common(4) { Kind::Beat } else { kind });
     let inputs = [input, None];
     // Lanes: a sine is long enough for two vectors of them to hide what one waits for; more were no faster when tried.
-    // A sinusoid that all have in common, as one that drives a sweep is, costs one sine for all lanes.
+    // A sinusoid that all have in common, as one that drives a sweep is, costs one sine for all lanes: the more, the less each pays.
     Ok(match (input, spec.has("damped")) {
-        (None, false) => of_force::<Angle, Free, St, 16, 16>(inputs, clock, width),
-        (None, true) => of_force::<Angle, Damped, St, 16, 16>(inputs, clock, width),
-        (Some(Kind::Held), _) => of_force::<Angle, Driven<FromTable>, St, 16, 16>(inputs, clock, width),
-        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 16, 16>(inputs, clock, width),
-        (Some(Kind::Sine), _) => of_force::<Angle, Driven<FromSine>, St, 16, 16>(inputs, clock, width),
+        (None, false) => of_force::<Angle, Free, St, 16, 16>(inputs, Variables::Angle, clock, width),
+        (None, true) => of_force::<Angle, Damped, St, 16, 16>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Held), _) => of_force::<Angle, Driven<FromTable>, St, 16, 16>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 64, 32>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Sine), _) => of_force::<Angle, Driven<FromSine>, St, 16, 16>(inputs, Variables::Angle, clock, width),
     })
 }

@@ -48,7 +48,8 @@ impl<const D: usize, const LAW: u8> FewBodies<2, D, LAW> {
 }
 
 impl<const D: usize, const LAW: u8> FewBodies<3, D, LAW> {
-    /// h·v̇. The sums are (0 + after) + (0 − before) of the first round or the second.
+    /// h·v̇. The sums are those of any number of bodies, (0 + after) + (0 − before): the zero before `after` changes no sum that is not
+    /// itself zero, and that one is 0 either way.
     #[inline(always)]
     fn meet(&self, y: &[f64], out: &mut [f64]) {
         // Written out: a loop over pairs loses the vector instructions.
@@ -56,9 +57,9 @@ impl<const D: usize, const LAW: u8> FewBodies<3, D, LAW> {
         let (after_1, before_2) = self.pair(y, 1, 2);
         let (after_2, before_0) = self.pair(y, 2, 0);
         for c in 0..D {
-            out[c] = (0.0 + after_0[c]) + (0.0 - before_0[c]);
-            out[D + c] = (0.0 + after_1[c]) + (0.0 - before_1[c]);
-            out[2 * D + c] = (0.0 + after_2[c]) + (0.0 - before_2[c]);
+            out[c] = after_0[c] + (0.0 - before_0[c]);
+            out[D + c] = after_1[c] + (0.0 - before_1[c]);
+            out[2 * D + c] = after_2[c] + (0.0 - before_2[c]);
         }
     }
 }

@@ -28,12 +28,12 @@ use std::thread;
 
 use self::{
     along::{Along, Round, Sums},
-    share::{Share, add, share},
     beside::SideBySide,
     energy::{Back, Push},
     few::Few,
     law::{LOGARITHMIC, NEWTON, PRINTED},
     record::{Quantity, Record},
+    share::{Share, add, share},
 };
 use crate::{
     block::at_a_line,
@@ -223,66 +223,66 @@ impl<const L: usize> Bodies<L> {
 macro_rules! bodies {
     ($lanes:expr) => {
         impl System for Bodies<{ $lanes }> {
-        type V = Rows<{ $lanes }>;
-        type Y = Rows<{ $lanes }>;
+            type V = Rows<{ $lanes }>;
+            type Y = Rows<{ $lanes }>;
 
-        #[inline(always)]
-        fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
-            if self.has(y) {
-                out.copy_from(&self.dv);
-            } else {
-                self.at_hand = false;
-                self.meet(self.control.is_some(), y, out);
+            #[inline(always)]
+            fn dv(&mut self, _t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
+                if self.has(y) {
+                    out.copy_from(&self.dv);
+                } else {
+                    self.at_hand = false;
+                    self.meet(self.control.is_some(), y, out);
+                }
+                self.push(v, out);
             }
-            self.push(v, out);
-        }
 
-        #[inline(always)]
-        fn dy(&mut self, _t: f64, v: &Self::V, _y: &Self::Y, out: &mut Self::Y) {
-            for (out, v) in out.as_mut_slice().iter_mut().zip(v.as_slice()) {
-                *out = self.h * *v;
+            #[inline(always)]
+            fn dy(&mut self, _t: f64, v: &Self::V, _y: &Self::Y, out: &mut Self::Y) {
+                for (out, v) in out.as_mut_slice().iter_mut().zip(v.as_slice()) {
+                    *out = self.h * *v;
+                }
             }
-        }
 
-        #[inline(always)]
-        fn velocity(&mut self, d: &Self::Y, out: &mut Self::V) {
-            for (out, d) in out.as_mut_slice().iter_mut().zip(d.as_slice()) {
-                *out = *d / self.h;
+            #[inline(always)]
+            fn velocity(&mut self, d: &Self::Y, out: &mut Self::V) {
+                for (out, d) in out.as_mut_slice().iter_mut().zip(d.as_slice()) {
+                    *out = *d / self.h;
+                }
             }
-        }
 
-        #[inline(always)]
-        fn settle(&mut self, v: &mut Self::V, y: &mut Self::Y) {
-            if self.projection.is_some() {
-                self.foresee(y);
-                self.back(v, y);
+            #[inline(always)]
+            fn settle(&mut self, v: &mut Self::V, y: &mut Self::Y) {
+                if self.projection.is_some() {
+                    self.foresee(y);
+                    self.back(v, y);
+                }
             }
-        }
 
-        #[inline(always)]
-        fn foresee(&mut self, y: &Self::Y) {
-            if !self.has(y) {
-                let mut dv = std::mem::replace(&mut self.dv, zeros(0));
-                self.meet(true, y, &mut dv);
-                (self.dv, self.at_hand) = (dv, true);
-                self.y.copy_from(y);
+            #[inline(always)]
+            fn foresee(&mut self, y: &Self::Y) {
+                if !self.has(y) {
+                    let mut dv = std::mem::replace(&mut self.dv, zeros(0));
+                    self.meet(true, y, &mut dv);
+                    (self.dv, self.at_hand) = (dv, true);
+                    self.y.copy_from(y);
+                }
             }
-        }
 
-        fn record(&mut self, v: &Self::V, y: &Self::Y, rows: &mut [f64]) {
-            match self.kind.dim {
-                2 => self.record_in::<2>(v, y, rows),
-                _ => self.record_in::<3>(v, y, rows),
+            fn record(&mut self, v: &Self::V, y: &Self::Y, rows: &mut [f64]) {
+                match self.kind.dim {
+                    2 => self.record_in::<2>(v, y, rows),
+                    _ => self.record_in::<3>(v, y, rows),
+                }
             }
-        }
 
-        fn tally(&self) -> &[f64] {
-            &self.work
-        }
+            fn tally(&self) -> &[f64] {
+                &self.work
+            }
 
-        fn tally_mut(&mut self) -> &mut [f64] {
-            &mut self.work
-        }
+            fn tally_mut(&mut self) -> &mut [f64] {
+                &mut self.work
+            }
         }
 
         impl Large<{ $lanes }> for Bodies<{ $lanes }> {
@@ -315,17 +315,21 @@ impl Bodies<{ rows::LANES }> {
     fn meet(&mut self, energy: bool, y: &Rows<{ rows::LANES }>, out: &mut Rows<{ rows::LANES }>) {
         for (i, groups) in self.slabs.iter().enumerate() {
             let (force, potential) = if i == 0 { (&mut *out, &mut self.potential) } else { (&mut self.slab.0, &mut self.slab.1) };
-            meet!(self.kind, energy, SideBySide {
-                n: self.n,
-                groups,
-                y: lanes(y),
-                strength: &self.strength,
-                soft: &self.soft,
-                after: &mut self.after,
-                before: &mut self.before,
-                potential,
-                out: lanes_mut(force),
-            });
+            meet!(
+                self.kind,
+                energy,
+                SideBySide {
+                    n: self.n,
+                    groups,
+                    y: lanes(y),
+                    strength: &self.strength,
+                    soft: &self.soft,
+                    after: &mut self.after,
+                    before: &mut self.before,
+                    potential,
+                    out: lanes_mut(force),
+                }
+            );
             if i > 0 {
                 add(out.as_mut_slice(), self.slab.0.as_slice(), true);
             }
@@ -399,7 +403,8 @@ impl<const L: usize> Bodies<L> {
         let beside = if L == 1 { 0 } else { n };
         let again = if slabs.len() > 1 { beside } else { 0 };
         let keeps = spec.options.get(1).copied().unwrap_or_default();
-        let control = keeps.starts_with("control:").then(|| EnergyControl::new(spec, keeps == "control:limited", 2 * n + 1, h, &member));
+        let control =
+            keeps.starts_with("control:").then(|| EnergyControl::new(spec, keeps == "control:limited", 2 * n + 1, h, &member));
         let way = if keeps == "project:nacozy" { Way::Nacozy } else { Way::Scaling };
         let projection = keeps.starts_with("project:").then(|| Projection::new(spec, way, 2 * n + 1, h, &member));
         let kept = if projection.is_some() || !spec.record.is_empty() { n * dim } else { 0 };
@@ -457,11 +462,11 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     }
     // Lanes: what was fastest when tried.
     Ok(match (n, dim, *law, control.len() + spec.record.len()) {
-        (2, 2, "newton", 0) => tile::group::<_, St, 4, 4, 5, 16, 8, 1>(Few::<2, 2, NEWTON>, clock, width),
-        (2, 3, "newton", 0) => tile::group::<_, St, 6, 6, 5, 16, 8, 1>(Few::<2, 3, NEWTON>, clock, width),
-        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1>(Few::<3, 2, NEWTON>, clock, width),
-        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1>(Few::<3, 2, LOGARITHMIC>, clock, width),
-        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 8, 8, 1>(Few::<3, 3, NEWTON>, clock, width),
+        (2, 2, "newton", 0) => tile::group::<_, St, 4, 4, 5, 16, 8, 1, 16>(Few::<2, 2, NEWTON>, clock, width),
+        (2, 3, "newton", 0) => tile::group::<_, St, 6, 6, 5, 16, 8, 1, 16>(Few::<2, 3, NEWTON>, clock, width),
+        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1, 8>(Few::<3, 2, NEWTON>, clock, width),
+        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1, 16>(Few::<3, 2, LOGARITHMIC>, clock, width),
+        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 16, 8, 1, 8>(Few::<3, 3, NEWTON>, clock, width),
         _ => rows::group::<Bodies<{ rows::LANES }>, Bodies<1>, St>(spec, clock, width),
     })
 }
