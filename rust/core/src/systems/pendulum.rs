@@ -40,7 +40,7 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
         (None, false) => of_force::<Angle, Free, St, 16, 16>(inputs, Variables::Angle, clock, width),
         (None, true) => of_force::<Angle, Damped, St, 16, 16>(inputs, Variables::Angle, clock, width),
         (Some(Kind::Held), _) => of_force::<Angle, Driven<FromTable>, St, 16, 16>(inputs, Variables::Angle, clock, width),
-        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 64, 32>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 128, 32>(inputs, Variables::Angle, clock, width),
         (Some(Kind::Sine), _) => of_force::<Angle, Driven<FromSine>, St, 16, 16>(inputs, Variables::Angle, clock, width),
     })
 }
