@@ -44,6 +44,11 @@ class Counting:
         """NumPy calls this for the square root of an object."""
         return self._count("square_roots")
 
+    def __lt__(self, other: object) -> bool:
+        """Whatever is held within bounds is."""
+        return False
+
+    __gt__ = __lt__
     __radd__ = __sub__ = __rsub__ = __add__
     __rmul__ = __mul__
     __rtruediv__ = __truediv__
