@@ -638,10 +638,18 @@ def test_limits_of_the_damped_oscillator(method: str, damping: float) -> None:
 
 @pytest.mark.parametrize(
     ("method", "limit"),
-    [("standard_euler", 2.0), ("standard_heun", 2.0), ("rk4", 2.785293563405282), ("false_euler", 2 * math.sqrt(2) - 2)],
+    [
+        ("standard_euler", 2.0),
+        ("standard_heun", 2.0),
+        ("rk4", 2.785293563405282),
+        ("merson", 3.548322344234674),
+        ("fehlberg", 3.0200175439705026),
+        ("fehlberg_5", 3.6777066213218954),
+        ("false_euler", 2 * math.sqrt(2) - 2),
+    ],
 )
 def test_limits_at_critical_damping(method: str, limit: float) -> None:
-    """A double rate −1: the limits of the real axis (of RK4, the root of z³ + 4z² + 12z + 24 = 0)."""
+    """A double rate −1: the limits of the real axis (of RK4, the root of z³ + 4z² + 12z + 24 = 0), by bisection in fractions."""
     assert sw.stability_limit(sw.Oscillator(1.0, 1.0), method) == pytest.approx(limit, rel=1e-12)
 
 

@@ -44,6 +44,10 @@ EXPONENT = 20.0
 #: some eps would move its crossing by more than a hundred eps.
 FLAT = 0.03
 
+#: Two eigenvalues that leave the circle at an angle and as close together as this are solved for exactly too: critical damping
+#: makes them double, and rounding moves a double eigenvalue by the square root of its own size.
+CLOSE = 1e-4
+
 #: What is found by going back to where two eigenvalues meet is believed if it is this near, in parts of the step gone back.
 MET = 1e-3
 
@@ -337,10 +341,14 @@ class _Search:
                 k = k - (level + k * (rise + k * bend)) / (rise + 2.0 * k * bend)
             met = seek & ~at_an_angle & (np.abs(k) < MET)
             found = np.where(met, high * (1.0 + excess[0] * k), found)
-        return self.exactly(found, seek & (np.abs(slope) < FLAT))
+        doubtful = seek & (np.abs(slope) < FLAT)
+        if len(self.rates) == 2:
+            z, _ = self.eigenvalues(found)
+            doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < CLOSE)
+        return self.exactly(found, doubtful)
 
     def exactly(self, limits: Array, flat: Any) -> Array:
-        """The limits of two states that leave the circle at so flat an angle that rounding moves them.
+        """The limits of two states that leave the circle at so flat an angle, or so close together, that rounding moves them.
 
         Of z² − 2pz + q, whose p and q are exact polynomials in dt, a pair is on the circle where q = 1, and a single eigenvalue
         where 1 + q ∓ 2p = 0. Newton's steps from the crossing found go to the nearest of these.

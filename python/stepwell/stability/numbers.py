@@ -119,11 +119,16 @@ class Polynomial:
     def root_near(self, x: float) -> float:
         """The root to which Newton's steps from ``x`` lead, with values that are exact; infinite if they lead nowhere."""
         slope = Polynomial(*(k * c for k, c in enumerate(self.coefficients) if k))
-        for _ in range(4):
+        for _ in range(64):  # a few, and one for each bit where the root is a double one
             at = Fraction(x)
-            if not slope(at):
+            value, rise = self(at), slope(at)
+            if not value:
+                break
+            if not rise:
                 return math.inf
-            x = float(at - self(at) / slope(at))
+            if (following := float(at - value / rise)) == x:
+                break
+            x = following
         return x
 
     def __repr__(self) -> str:
