@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import stepwell as sw
+from stepwell.stability.criterion import signed
 
 ROOT = Path(__file__).resolve().parent.parent
 PLACE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
@@ -95,12 +96,12 @@ def deviations() -> str:
     found = sw.criteria()
     head = ["method"]
     for at in found[0].at:
-        head += [f"r₁² at Φ = {at.phi:g}", f"Ψ/Φ − 1 at {at.phi:g}"]
+        head += [f"r₁² − 1 at Φ = {at.phi:g}", f"Ψ/Φ − 1 at {at.phi:g}"]
     rows = []
     for c in found:
         row = [c.method.title]
         for at in c.at:
-            row += [f"{at.r1_squared:.6f}", f"{100 * at.deviation:+.3g} %"]
+            row += [signed(at.r1_squared - 1.0), signed(at.deviation, percent=True)]
         rows.append(row)
     return table(head, rows)
 

@@ -17,18 +17,20 @@ if TYPE_CHECKING:
 
 IMAGES = Path(__file__).resolve().parent / "images"
 
-#: Colours of a picture: enough for lines and letters, and a fraction of the bytes.
-COLOURS = 64
+#: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades want more.
+COLOURS, SHADES = 64, 256
 
 #: The methods whose maps are shown.
-MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4")
+MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4", "merson", "fehlberg_5")
 
 
-def write(name: str, figure: Figure) -> None:
+def write(name: str, figure: Figure, colours: int = COLOURS) -> None:
     """Write a picture with a palette."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", facecolor="white")
-    Image.open(drawn).convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS).save(IMAGES / name, optimize=True)
+    Image.open(drawn).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=colours).save(
+        IMAGES / name, optimize=True
+    )
     print(f"docs/images/{name}")
 
 
@@ -41,7 +43,7 @@ if __name__ == "__main__":
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))
     for method in MAPS:
-        write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot())
+        write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot(), SHADES)
     write("figures.png", sw.charts.figures().plot())
     write("powers.png", sw.charts.powers().plot())
     eight = sw.scenes.figure_eight()

@@ -11,7 +11,7 @@ import numpy as np
 import other_methods as other
 import pytest
 import stepwell as sw
-from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
 from stepwell.stability import KINDS, eigen, maps, operations, series
 from stepwell.stability.numbers import Polynomial
 from truths import CLOSED_FORMS
@@ -31,11 +31,20 @@ Q: dict[str, Any] = {
     "false_heun": lambda f: 1 - f**2 / 2,
     "semi_false_heun": lambda f: 1 - f**4 / 4,
     "rk4": lambda f: 1 - f**6 / 72 + f**8 / 576,
+    # |1 + z + … |² of the polynomials of truths, z = iΦ, multiplied out.
+    "merson": lambda f: 1 - f**8 / 1728 + f**10 / 20736,
+    "fehlberg": lambda f: 1 + 5 * f**6 / 936 - 11 * f**8 / 7488 + f**10 / 10816,
+    "fehlberg_5": lambda f: 1 + 17 * f**6 / 9360 - 7 * f**8 / 12480 + 11 * f**10 / 374400 + f**12 / 4326400,
+    "pefrl": lambda f: 1.0 + 0 * f,
 }
 P: dict[str, Any] = {
     "standard_euler": lambda f: 1 + 0 * f,
     "false_heun": lambda f: 1 - 3 * f**2 / 4 + f**4 / 4,
     "rk4": lambda f: 1 - f**2 / 2 + f**4 / 24,
+    "merson": lambda f: 1 - f**2 / 2 + f**4 / 24,
+    "fehlberg": lambda f: 1 - f**2 / 2 + f**4 / 24,
+    "fehlberg_5": lambda f: 1 - f**2 / 2 + f**4 / 24 - f**6 / 2080,
+    "pefrl": lambda f: np.array([CLOSED_FORMS["pefrl"](x).trace() / 2 for x in f]),
 }
 LIMITS = {
     "standard_euler": 0.0,
@@ -47,6 +56,10 @@ LIMITS = {
     "semi_false_heun": math.sqrt(2 * math.sqrt(5) - 2),
     "leapfrog": 2.0,
     "rk4": 2 * math.sqrt(2),
+    "merson": 2 * math.sqrt(3),
+    "fehlberg": 0.0,
+    "fehlberg_5": 0.0,
+    "pefrl": 2.989449545906729,  # where 1 + p = 0, by bisection of the product of nine shears in fractions
 }
 known = pytest.mark.parametrize("method", sorted(LIMITS))
 
@@ -210,13 +223,18 @@ def test_the_misprinted_matrix_of_false_heun_has_another_determinant() -> None:
     assert misprinted - a.q == pytest.approx(0.04579, abs=1e-5)
 
 
-@pytest.mark.parametrize("method", ["standard_euler", "standard_heun"])
+@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "merson", "fehlberg", "fehlberg_5"])
 def test_growth_over_thousands_of_steps(method: str) -> None:
-    """The energy of the canonical oscillator grows by r₁² each step, because P is r₁ times a rotation."""
+    """The energy of the canonical oscillator is multiplied by r₁² each step, because P is r₁ times a rotation.
+
+    Fehlberg's results pump energy in, Merson's and RK4's take it out.
+    """
     phi = np.array([0.01, 0.1, 0.3, 1.0])
     a = sw.analyse(sw.Oscillator(phi), method, dt=1.0)
+    np.testing.assert_allclose(a.radius**2, Q[method](phi), rtol=0, atol=20 * EPS)
     run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=1000)
-    np.testing.assert_allclose(np.log(2 * run.energy[-1]), 2000 * np.log(a.radius), rtol=0, atol=2000 * 20 * EPS)
+    np.testing.assert_allclose(np.log(2 * run.energy[-1]), 1000 * np.log(Q[method](phi)), rtol=0, atol=1000 * 40 * EPS)
+    assert ((a.radius > 1) == (method in ("standard_euler", "standard_heun", "fehlberg", "fehlberg_5")))[1:].all()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -249,6 +267,98 @@ def test_derivative_of_a_step_that_is_not_linear(method: str) -> None:
             v, y = steps.step(s, 0.0, 0.1, moved[:6].reshape(3, 2), moved[6:].reshape(3, 2))
             ends.append(np.concatenate([v.ravel(), y.ravel()]))
         np.testing.assert_allclose(a.P[:, j], (ends[0] - ends[1]) / (2 * d), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("force", ["logarithmic", "newton", "printed"])
+@pytest.mark.parametrize(
+    "control",
+    [
+        sw.EnergyControl(0.3, target=-0.2),
+        sw.EnergyControl(0.3, form="printed", target=-0.2),
+        sw.Projection(target=-0.2),
+        sw.Projection("nacozy", target=-0.2),
+    ],
+    ids=repr,
+)
+def test_control_belongs_to_the_step(control: Any, force: str) -> None:
+    """P of what is controlled or set back is the derivative of that run, by differences: d⁴ = 1e-16, and rounding 1e-16/d."""
+    scene = sw.scenes.energy_control()
+    options: dict[str, Any] = {"dt": 0.01, "steps": 1, "control": control}
+    start = np.concatenate([scene.v.ravel(), scene.y.ravel()])
+
+    def end(state: Any) -> Any:
+        v, y = state[:6].reshape(3, 2), state[6:].reshape(3, 2)
+        run = sw.integrate(sw.NBody(force=force), "false_euler", v=v, y=y, **options)
+        return run.system, np.concatenate([run.v[-1].ravel(), run.y[-1].ravel()])
+
+    a = sw.analyse(end(start)[0], "false_euler", dt=0.01, at=(scene.v, scene.y))
+    d = 1e-4
+    for j, one in enumerate(d * np.eye(12)):
+        near, far = (end(start + k * one)[1] - end(start - k * one)[1] for k in (1, 2))
+        np.testing.assert_allclose(a.P[:, j], (8 * near - far) / (12 * d), rtol=0, atol=1e-11)
+    counted = operations("false_euler", end(start)[0])
+    assert counted.additions > operations("false_euler", sw.NBody(force=force)).additions
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_eigenvalue_of_two_continues_its_own_rate(method: str) -> None:
+    """Two real rates: z = e^(λ·dt) but for some (λ·dt)²; taken for each other they would be off by 0.02 and more."""
+    dt = 0.01
+    if sw.method(method).needs_acceleration:
+        systems = [(sw.LinearSystem([[0.0, 3.0], [1.0, 0.0]], velocities=1), [3**0.5, -(3**0.5)])]
+    else:
+        systems = [
+            (sw.Oscillator(1.0, np.array([1.5, 2.0])), [[-1.5 - 1.25**0.5, -2 - 3**0.5], [-1.5 + 1.25**0.5, -2 + 3**0.5]]),
+            (sw.LinearSystem(np.diag([-1.0, -4.0]), velocities=1), [-1.0, -4.0]),
+            (sw.LinearSystem([[-1.0, 1e6], [0.0, -4.0]], velocities=1), [-1.0, -4.0]),
+        ]
+    for system, rates in systems:
+        a = sw.analyse(system, method, dt=dt)
+        np.testing.assert_allclose(np.sort(a.rates.real, axis=0), np.sort(rates, axis=0), rtol=1e-12)
+        np.testing.assert_allclose(a.eigenvalues.real, np.exp(a.rates.real * dt), rtol=0, atol=4 * (4 * dt) ** 2 / 2)
+        assert (a.radius == np.abs(a.eigenvalues).max(axis=0)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("omega", [2.0**-40, 2.0**-20, 2.0**20, 2.0**40])
+def test_units_do_not_matter(method: str, omega: float) -> None:
+    """Rad per microsecond or per year: all scaled by powers of two, so what is found is the same to the bit, or nearly."""
+    phi = np.array([0.01, 0.1, 0.5, 1.0, 1.5, 1.9, 2.1, 3.0])
+    own = sw.analyse(sw.Oscillator(1.0, form="physical"), method, dt=phi)
+    a = sw.analyse(sw.Oscillator(omega, form="physical"), method, dt=phi / omega)
+    assert a.kind.tolist() == own.kind.tolist()
+    np.testing.assert_array_equal(a.radius, own.radius)
+    np.testing.assert_array_equal(a.frequency_ratio, own.frequency_ratio)
+    limit = sw.stability_limit(sw.Oscillator(omega, form="physical"), method) * omega
+    assert limit == pytest.approx(LIMITS[method], rel=1e-14)
+    three = sw.analyse(sw.Chain(3), method, dt=phi)
+    a = sw.analyse(sw.Chain(3, stiffness=omega**2), method, dt=phi / omega)
+    assert a.kind.tolist() == three.kind.tolist()
+    np.testing.assert_allclose(np.abs(a.rates) / omega, np.abs(three.rates), rtol=1e-12)
+    assert sw.stability_limit(sw.Chain(3, stiffness=omega**2), method) * omega == pytest.approx(
+        float(sw.stability_limit(sw.Chain(3), method)), rel=1e-13
+    )
+
+
+def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:
+    """A slow oscillator with negative damping beside a fast one on the circle: growth of 1e-10 a step decides."""
+    a = np.zeros((4, 4))
+    a[2, 0] = a[3, 1] = 1.0
+    a[0, 2], a[1, 3] = -1.0, -(0.01**2)
+    a[1, 1] = 2e-9
+    found = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.1)
+    assert (found.kind, bool(found.stable)) == ("unstable oscillation", False)
+    # e^(½·2e-9·dt) a step, of which |z| has some eps times 1/|wᴴx| = 1/0.01.
+    assert found.radius - 1 == pytest.approx(1e-10, abs=100 * 10 * EPS)
+
+
+def test_the_angle_of_verlet_is_as_exact_as_its_matrix() -> None:
+    """P has 2 − Φ², rounded to 2⁻⁵²: of Φ² a share of 2⁻⁵³·2/Φ² or less, and half of that of Ψ = 2·asin(Φ/2)."""
+    phi = np.array([1e-4, 1e-3, 1e-2, 0.1, 1.0])
+    a = sw.analyse(sw.Oscillator(), "verlet", dt=phi)
+    off = np.abs(a.angle / (2 * np.arcsin(phi / 2)) - 1)
+    assert (off <= EPS / phi**2 + 4 * EPS).all()
+    assert (a.kind == "harmonic").all()
 
 
 @pytest.mark.parametrize("method", ["false_euler", "rk4", "verlet"])
@@ -338,6 +448,16 @@ def test_overflow_is_said() -> None:
         ({"system": sw.NBody(), "dt": 0.1, "at": (0.0, np.zeros(3))}, ShapeError, r"y: expected shape \(3, 2 or 3"),
         ({"system": sw.Oscillator(1.0, 0.1), "method": "verlet", "dt": 0.1}, UnsupportedError, "damping"),
         ({"system": sw.Oscillator([1.0, 2.0]), "dt": [0.1, 0.2, 0.3]}, ShapeError, "broadcast"),
+        (
+            {"system": sw.Pendulum(), "dt": [0.1, 0.2, 0.3], "at": ([0.0, 0.0], 0.0)},
+            ShapeError,
+            r"broadcast.*: dt \(3,\), v \(2,\)",
+        ),
+        ({"system": sw.Pendulum([1.0, 2.0, 3.0]), "dt": 0.1, "at": (0.0, [1.0, 1.0])}, ShapeError, r"system \(3,\), y \(2,\)"),
+        ({"system": sw.Pendulum(), "dt": 0.1, "at": ([0.0] * 2, [0.0] * 3)}, ShapeError, r"v \(2,\), y \(3,\)"),
+        ({"system": sw.Pendulum(), "dt": 0.1, "at": (0.0, 0.0, 0.0)}, DTypeError, r"pair \(v, y\) or a run, got 3 of them"),
+        ({"dt": 0.1, "t": "noon"}, DTypeError, "t: expected real numbers, got 'noon'"),
+        ({"system": sw.Chain(200), "dt": np.broadcast_to(0.1, 10**8)}, TooLargeError, "the matrices of 100000000 members need"),
     ],
 )
 def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Exception], said: str) -> None:
@@ -345,6 +465,38 @@ def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Excep
         sw.analyse(**({"system": sw.Oscillator(), "method": "false_euler"} | arguments))
     with pytest.raises(ArgumentError, match="monodromy"):
         _ = sw.analyse(sw.Oscillator(), "rk4", dt=0.1).monodromy
+
+
+def test_along_runs_that_say_less() -> None:
+    """What can be asked along a run that was made by another method, with another step, or with steps of its own choice."""
+    pendulum = sw.Pendulum([1.0, 2.0])
+    run = sw.integrate(pendulum, "rk4", v=0.0, y=1.0, dt=0.1, steps=4, every=1)
+    assert sw.analyse(pendulum, "rk4", at=run).monodromy.shape == (2, 2, 2)
+    for arguments in ({"method": "rk4", "dt": 0.2}, {"method": "false_euler", "dt": None}):
+        a = sw.analyse(pendulum, at=run, **arguments)
+        with pytest.raises(ArgumentError, match="monodromy: expected an analysis with the run's own method and step"):
+            _ = a.monodromy
+    steps = sw.analyse(pendulum, "rk4", at=run, dt=np.array([[0.1], [0.2]]))
+    assert steps.P.shape == (2, 2, 5, 2, 2)
+    assert steps.rates.shape == (2, 5, 2, 2)
+    np.testing.assert_array_equal(steps.P[:, :, :, 1], sw.analyse(pendulum, "rk4", at=run, dt=0.2).P)
+    paced = sw.integrate(sw.Pendulum(), "fehlberg_5", v=0.0, y=1.0, tolerance=1e-6, at=[1.0, 2.0])
+    with pytest.raises(ArgumentError, match=r"dt: expected the step.* since the run has chosen its own"):
+        sw.analyse(sw.Pendulum(), "fehlberg_5", at=paced)
+    assert sw.analyse(sw.Pendulum(), "fehlberg_5", at=paced, dt=0.1).radius.shape == (2,)
+    with pytest.raises(ShapeError, match=r"system \(3,\), at \(2,\)"):
+        sw.analyse(sw.Pendulum([1.0, 2.0, 3.0]), "rk4", at=run)
+
+
+def test_inputs_of_a_linear_system_at_states() -> None:
+    """Q does not depend on the state; it has the shape of the states all the same."""
+    driven = sw.Oscillator(1.3, 0.2, x=0.5)
+    one = sw.analyse(driven, "rk4", dt=0.1)
+    run = sw.integrate(driven, "rk4", v=0.0, y=np.zeros(2), dt=0.1, steps=2, every=1)
+    for at, shape in (((np.zeros(3), np.ones(3)), (3,)), (run, (3, 2))):
+        a = sw.analyse(driven, "rk4", dt=0.1, at=at)
+        assert a.Q.shape == (2, 2, *shape)
+        np.testing.assert_array_equal(a.Q.reshape(2, 2, -1), np.repeat(one.Q[:, :, np.newaxis], math.prod(shape), axis=2))
 
 
 def test_a_run_of_another_system_is_refused() -> None:
@@ -387,6 +539,69 @@ def test_limits_of_methods_that_are_not_in_the_catalogue(method: Any, limit: flo
     assert sw.stability_limit(sw.Oscillator(), method) == pytest.approx(limit, abs=digits)
 
 
+#: Blanes and Moan 2002, table 2, S₆ of order 4.
+_A, _B = (0.0792036964311957, 0.353172906049774, -0.0420650803577195), (0.209515106613362, -0.143851773179818)
+
+
+@pytest.mark.parametrize(
+    ("kicks", "drifts"),
+    [
+        ((*_B, 0.5 - sum(_B), 0.5 - sum(_B), *_B[::-1]), (*_A, 1 - 2 * sum(_A), *_A[::-1])),
+        ((0.49, 0.51), (0.245, 0.5, 0.255)),
+        ((0.2, 0.199, 0.202, 0.199, 0.2), (0.1, 0.1995, 0.2005, 0.2005, 0.1995, 0.1)),
+    ],
+    ids=["Blanes-Moan", "two uneven halves", "five uneven fifths"],
+)
+def test_growth_for_less_than_a_rung_is_found(kicks: Any, drifts: Any) -> None:
+    """Compositions grow in a narrow window where ½·trace passes ±1 for a moment: of the third from 3.0898 to 3.0905 only.
+
+    The first of these by the trace of a product of shears, on steps of Φ that are 500 times finer, and bisection.
+    """
+
+    def half_trace(phi: Any) -> Any:
+        v = y = np.stack([np.ones_like(phi), np.zeros_like(phi)]), np.stack([np.zeros_like(phi), np.ones_like(phi)])
+        v, y = v
+        for i, drift in enumerate(drifts):
+            y = y + drift * phi * v
+            v = v - (kicks[i] if i < len(kicks) else 0.0) * phi * y
+        return 0.5 * (v[0] + y[1])
+
+    phi = np.arange(1, 200_001) * 4e-5
+    high = phi[np.abs(half_trace(phi)) > 1 + 1e-12][0]
+    low = high - 4e-5
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if abs(half_trace(middle)) > 1 else (middle, high)
+    method = other.method(other.composed(kicks, drifts))
+    # The trace has some roundings, and passes 1 with a slope of 0.1 or more where it has not turned yet.
+    assert sw.stability_limit(sw.Oscillator(), method) == pytest.approx(high, rel=1e-13)
+    batch = sw.stability_limit(sw.Oscillator(np.array([0.5, 1.0])), method)
+    assert batch == pytest.approx([2 * high, high], rel=1e-13)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_limits_of_chains_with_soft_and_stiff_springs(method: str) -> None:
+    """Eight decades of stiffness, four of mass, with walls and without: the fastest mode decides, by the matrix K/√mm."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(2, 9))
+        stiffness, mass = 10.0 ** (rng.uniform(-4, 4, n + 1) + rng.uniform(-3, 6)), 10.0 ** rng.uniform(-2, 2, n)
+        if seed % 2:
+            stiffness[0] = stiffness[-1] = 0.0  # it floats: a double eigenvalue 1
+        k = np.diag(stiffness[:-1] + stiffness[1:]) - np.diag(stiffness[1:-1], 1) - np.diag(stiffness[1:-1], -1)
+        fastest = math.sqrt(np.linalg.eigvalsh(k / np.sqrt(np.outer(mass, mass))).max())
+        limit = sw.stability_limit(sw.Chain(n, stiffness=stiffness, mass=mass), method)
+        # eigvalsh: some eps of the fastest, and the limit some 1e-14 of its own.
+        assert limit == pytest.approx(LIMITS[method] / fastest, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "pefrl", "rk4"])
+def test_limits_of_a_long_chain(method: str) -> None:
+    n = 40
+    fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))
+    assert sw.stability_limit(sw.Chain(n), method) == pytest.approx(LIMITS[method] / fastest, rel=1e-13)
+
+
 def _independent(method: str, damping: float) -> float:
     """The limit of v̇ = −2Dv − y, ẏ = v by Jury's conditions, from p and q written by hand, by bisection."""
     d = damping
@@ -423,10 +638,18 @@ def test_limits_of_the_damped_oscillator(method: str, damping: float) -> None:
 
 @pytest.mark.parametrize(
     ("method", "limit"),
-    [("standard_euler", 2.0), ("standard_heun", 2.0), ("rk4", 2.785293563405282), ("false_euler", 2 * math.sqrt(2) - 2)],
+    [
+        ("standard_euler", 2.0),
+        ("standard_heun", 2.0),
+        ("rk4", 2.785293563405282),
+        ("merson", 3.548322344234674),
+        ("fehlberg", 3.0200175439705026),
+        ("fehlberg_5", 3.6777066213218954),
+        ("false_euler", 2 * math.sqrt(2) - 2),
+    ],
 )
 def test_limits_at_critical_damping(method: str, limit: float) -> None:
-    """A double rate −1: the limits of the real axis (of RK4, the root of z³ + 4z² + 12z + 24 = 0)."""
+    """A double rate −1: the limits of the real axis (of RK4, the root of z³ + 4z² + 12z + 24 = 0), by bisection in fractions."""
     assert sw.stability_limit(sw.Oscillator(1.0, 1.0), method) == pytest.approx(limit, rel=1e-12)
 
 
@@ -506,10 +729,32 @@ def test_limits_from_both_sides(method: str, damping: float) -> None:
     assert grown == pytest.approx(steps * math.log(a.radius[1]), abs=math.log(50))
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_limits_of_a_pendulum_and_of_a_libration_point(method: str) -> None:
+    """Hanging, it is an oscillator; standing, it falls. At L4 two oscillations, of which the frame couples velocities."""
+    pendulum = sw.Pendulum(3.0)
+    assert sw.stability_limit(pendulum, method, at=(0.0, 0.0)) == pytest.approx(LIMITS[method] / 3, rel=1e-13)
+    if sw.method(method).evaluations == 1:  # others look at angles that the swing comes to within the step
+        swung = sw.stability_limit(pendulum, method, at=(0.0, np.array([0.0, 1.0])))  # ω² = 9·cos y
+        assert swung == pytest.approx(LIMITS[method] / 3 / np.sqrt(np.cos([0.0, 1.0])), rel=1e-13)
+    assert sw.stability_limit(pendulum, method, at=(0.0, math.pi)) == 0.0
+    if method in ("rk4", "merson"):
+        mu = 0.012277471
+        at = np.zeros(2), np.array([0.5 - mu, math.sqrt(0.75)])
+        # ω⁴ − ω² + 27μ(1 − μ)/4 = 0; all four rates are imaginary, and both methods are functions of the rates.
+        fastest = math.sqrt(0.5 + math.sqrt(0.25 - 6.75 * mu * (1 - mu)))
+        limit = sw.stability_limit(sw.RestrictedThreeBody(mu), method, at=at)
+        assert limit == pytest.approx(LIMITS[method] / fastest, rel=1e-12)
+
+
 def test_a_limit_at_a_state() -> None:
     """A system that is not linear, taken for linear at a state; bodies that attract each other leave it by themselves."""
     with pytest.raises(UnsupportedError, match="is not linear; give"):
         sw.stability_limit(sw.NBody(), "rk4")
+    with pytest.raises(DTypeError, match=r"at: expected a pair \(v, y\) of blocks, got Run"):
+        sw.stability_limit(sw.Pendulum(), "rk4", at=sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1))
+    with pytest.raises(ShapeError, match=r"v \(2,\), y \(3,\)"):
+        sw.stability_limit(sw.Pendulum(), "rk4", at=(np.zeros(2), np.zeros(3)))
     scene = sw.scenes.clover()
     limit = sw.stability_limit(scene.system, "false_euler", at=(scene.v, scene.y))
     assert limit == 0.0
@@ -529,7 +774,11 @@ RATIOS = {
     "standard_heun": ((2, "1/6"), (4, "-1/20")),
     "false_heun": ((2, "-11/96"),),
     "semi_false_heun": ((2, "-1/12"), (4, "7/160")),
-    "rk4": ((4, "-1/120"),),
+    # The imaginary part of ln(R(z)·e⁻ᶻ), z = iΦ.
+    "rk4": ((4, "-1/120"), (6, "1/336")),
+    "merson": ((4, "-1/720"), (6, "-1/2016")),
+    "fehlberg": ((4, "1/780"), (6, "-1/546")),
+    "fehlberg_5": ((6, "-31/43680"), (8, "5/67392")),
 }
 RADII = {
     "standard_euler": ((2, "1"),),
@@ -541,10 +790,13 @@ RADII = {
     "false_heun": ((2, "-1/2"),),
     "semi_false_heun": ((4, "-1/4"),),
     "rk4": ((6, "-1/72"), (8, "1/576")),
+    "merson": ((8, "-1/1728"), (10, "1/20736")),
+    "fehlberg": ((6, "5/936"), (8, "-11/7488"), (10, "1/10816")),
+    "fehlberg_5": ((6, "17/9360"), (8, "-7/12480"), (10, "11/374400"), (12, "1/4326400")),
 }
 
 
-@known
+@pytest.mark.parametrize("method", sorted(RATIOS))
 def test_series_are_those_of_computer_algebra(method: str) -> None:
     found = series(method)
     assert found.ratio_terms(len(RATIOS[method])) == [(k, Fraction(c)) for k, c in RATIOS[method]]

@@ -11,7 +11,18 @@ import pytest
 import stepwell as sw
 from stepwell.stability import maps, operations, series
 
-METHODS = ["standard_euler", "false_euler", "damped_euler", "standard_heun", "false_heun", "semi_false_heun", "rk4"]
+METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
+SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
+
+#: R(z) = 1 + z + … of the methods that treat both blocks alike.
+TAYLOR = {
+    "standard_euler": (1, 1),
+    "standard_heun": (1, 1, 1 / 2),
+    "rk4": (1, 1, 1 / 2, 1 / 6, 1 / 24),
+    "merson": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 144),
+    "fehlberg": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 104),
+    "fehlberg_5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 2080),
+}
 
 
 def by_hand(method: str, a: Any, n_v: int) -> Any:
@@ -21,16 +32,12 @@ def by_hand(method: str, a: Any, n_v: int) -> Any:
     kick, drift = a.copy(), a.copy()
     kick[n_v:] = 0.0  # what changes v
     drift[:n_v] = 0.0  # what changes y
-    if method == "standard_euler":
-        return one + a
+    if method in TAYLOR:
+        return sum(c * np.linalg.matrix_power(a, k) for k, c in enumerate(TAYLOR[method]))
     if method == "false_euler":
         return (one + drift) @ (one + kick)
     if method == "damped_euler":
         return (one + kick) @ (one + drift)
-    if method == "standard_heun":
-        return one + a + a @ a / 2
-    if method == "rk4":
-        return one + a + a @ a / 2 + a @ a @ a / 6 + a @ a @ a @ a / 24
     dv1 = kick
     first = one + dv1
     dy1 = drift @ first if method == "false_heun" else drift
@@ -114,6 +121,50 @@ def test_runs_stay_bounded_or_grow_as_predicted(method: str, seed: int) -> None:
     assert decided.sum() > 200
     np.testing.assert_array_equal(bounded[decided], found.stable[decided])
     assert 0 < found.stable.sum() < b or method == "standard_euler"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_units_of_the_states_and_of_time_do_not_matter(method: str) -> None:
+    """A similar system, its states in units that are powers of two apart, up to 2⁴⁰, and its time too."""
+    for seed in range(6):
+        _, a, velocities = random_system(seed + 100)
+        rng, n = np.random.default_rng(seed), len(a)
+        units, clock = 2.0 ** rng.integers(-20, 21, n), 2.0 ** rng.integers(-20, 21)
+        plain = sw.LinearSystem(a, velocities=len(velocities))
+        other = sw.LinearSystem(clock * a * units / units[:, np.newaxis], velocities=len(velocities))
+        limit, same = float(sw.stability_limit(plain, method)), float(sw.stability_limit(other, method)) * clock
+        # Roundings are the same, but the eigenvalues of the plain one are found in units that are up to √2 off others.
+        assert same == pytest.approx(limit, rel=1e-11)
+        for step in (0.3, 0.999999, 1.000001) if math.isfinite(limit) else ():
+            one, two = sw.analyse(plain, method, dt=step * limit), sw.analyse(other, method, dt=step * limit / clock)
+            assert (one.kind, bool(one.stable)) == (two.kind, bool(two.stable))
+            assert bool(one.stable) == (step < 1)
+            assert two.radius == pytest.approx(one.radius, rel=1e-11)
+
+
+@pytest.mark.parametrize("method", SECOND_ORDER)
+@pytest.mark.parametrize("seed", range(10))
+def test_limits_and_runs_of_random_springs(method: str, seed: int) -> None:
+    """v̇ = −K·y, ẏ = c·v with frequencies over three decades: Φ of the fastest decides, and runs from both sides say so."""
+    rng = np.random.default_rng([seed, 3])
+    n, speed = int(rng.integers(1, 5)), float(rng.uniform(0.1, 10.0))
+    squares = 10.0 ** rng.uniform(-3, 3, n)
+    shapes = rng.normal(size=(n, n)) + 2 * np.eye(n)
+    k = shapes @ np.diag(squares) @ np.linalg.inv(shapes)
+    a = np.block([[np.zeros((n, n)), -k], [speed * np.eye(n), np.zeros((n, n))]])
+    system = sw.LinearSystem(a, velocities=n)
+    fastest = math.sqrt(speed * squares.max())
+    limit = sw.stability_limit(system, method)
+    # K is wrong by some eps of its norm times the condition of its modes, which is below 1e3 here.
+    assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-11)
+    below, above = (sw.analyse(system, method, dt=f * limit) for f in (0.999, 1.001))
+    assert (below.kind, bool(above.stable)) == ("harmonic", False)
+    for f, bounded in ((0.999, True), (1.001, False)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sw.DivergenceWarning)
+            run = sw.integrate(system, method, v=rng.normal(size=n), y=rng.normal(size=n), dt=f * limit, steps=3000)
+        # Above, r₁ is 1.01 or more, so 3000 steps make 1e13 and more; below, an ellipse of axes 45 for a start, times conditions.
+        assert (float(np.abs(run.y[-1]).max()) < 1e7) == bounded
 
 
 def test_an_empty_block_makes_the_blocks_methods_one() -> None:

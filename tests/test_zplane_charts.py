@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import json
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -402,8 +403,12 @@ def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
         check_page(figure, path)
         texts = [text.get_text() for text in figure.texts]
         assert f"{samples.method.title} ({samples.method.section}): y(t)" in texts
-        said = next(text for text in texts if text.startswith("r₁² = "))
-        assert f"r₁² = {samples.r1_squared:.4g}, Ψ/Φ = {samples.ratio:.4f}: {samples.kind}" in said
+        said = next(text for text in texts if text.startswith("r₁² − 1 = "))
+        change, turn = samples.r1_squared - 1, 100 * (samples.ratio - 1)
+        change = "0" if abs(change) < 1e-13 else f"{change:+.3g}"
+        assert said.startswith(f"r₁² − 1 = {change}, Ψ/Φ − 1 = {turn:+.3g} %: {samples.kind}".replace("-", "−"))
+        # What grows does not look as if it stayed: Fehlberg's 8e-5 a step.
+        assert ("unstable" in said) == change.startswith("+")
 
 
 def test_both_curves_are_in_a_figure_and_what_grows_is_told(figures):
@@ -456,3 +461,15 @@ def test_what_makes_no_figure_is_said(arguments, error, message):
 def test_a_figure_that_is_not_there_is_said():
     with pytest.raises(ArgumentError, match="method: expected one of these figures, rk4, got 'verlet'"):
         sw.charts.figures(["rk4"]).plot(method="verlet")
+
+
+def test_the_pictures_of_the_docs_show_every_method():
+    """A picture has as many rows of panels as its methods need: one that was drawn for fewer is not as high."""
+    from matplotlib.image import imread
+
+    images = Path(__file__).resolve().parent.parent / "docs" / "images"
+    chart = sw.charts.stability(phi=[1.0, 2.0])
+    drawn = {f"stability-{kind}": chart.plot(kind=kind) for kind in ("loci", "curves")} | {"figures": sw.charts.figures().plot()}
+    for name, figure in drawn.items():
+        width, height = (round(figure.dpi * inches) for inches in figure.get_size_inches())
+        assert imread(images / f"{name}.png").shape[:2] == (height, width), f"docs/images/{name}.png is older than the methods"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..stability.criterion import signed
 from .figures import Figures, Samples
 from .style import FONT, GREY, new_figure
 
@@ -22,7 +23,7 @@ COLUMNS = 2
 
 MARKS = (
     "Grey: exact, cos ω₀t. Black: samples, joined by straight lines.",
-    "r₁²: mean factor of the energy in a step. Ψ/Φ: frequency of the samples, divided by the true one.",
+    "r₁² − 1: by what share the energy changes in a step, on average. Ψ/Φ − 1: by what share the samples turn too fast.",
 )
 
 
@@ -30,7 +31,7 @@ def overview(chart: Figures) -> Figure:
     """All methods on one figure."""
     across = min(COLUMNS, len(chart.samples))
     down = -(-len(chart.samples) // across)
-    width, height = 16.0, 2.75 * down + 2.3
+    width, height = 17.0, 2.75 * down + 2.3
     figure = new_figure(width, height)
     from matplotlib import rc_context
 
@@ -44,7 +45,7 @@ def overview(chart: Figures) -> Figure:
             samples = chart.samples[i]
             _samples(axes, chart, samples)
             axes.set_title(f"{samples.method.title} ({samples.method.section})", loc="left", size=13.5, weight="bold")
-            axes.set_title(_said(samples).split(" (")[0], loc="right", size=12)  # the rest has no room
+            axes.set_title(_said(samples, digits=2).split(" (")[0], loc="right", size=11)  # the rest has no room
             if i % across == 0:
                 axes.set_ylabel("y")
             if i + across >= len(chart.samples):
@@ -93,9 +94,10 @@ def _samples(axes: Axes, chart: Figures, samples: Samples) -> None:
     axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
 
 
-def _said(samples: Samples) -> str:
-    ratio = f"Ψ/Φ = {samples.ratio:.4f}" if math.isfinite(samples.ratio) else "no Ψ"
-    return f"r₁² = {samples.r1_squared:.4g}, {ratio}: {samples.kind}"
+def _said(samples: Samples, digits: int = 3) -> str:
+    change = signed(samples.r1_squared - 1.0, digits=digits)
+    ratio = f"Ψ/Φ − 1 = {signed(samples.ratio - 1.0, percent=True, digits=digits)}" if math.isfinite(samples.ratio) else "no Ψ"
+    return f"r₁² − 1 = {change}, {ratio}".replace("-", "−") + f": {samples.kind}"
 
 
 def _start(chart: Figures) -> str:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 #: Points of a map over each of its axes, unless told otherwise.
 SIZE = 512
 
+#: Rounding of a step, in parts of the state.
+ROUNDING = 1000.0 * 2.0**-53
+
 #: Rows of the map that the summary tells, evenly spread from the least damping to the most.
 TOLD = 5
 
@@ -44,6 +47,7 @@ class StabilityMap:
         stable: whether the samples stay bounded, by the eigenvalues, of the same shape.
         nonnormal: how far the transition matrix is from a multiple of the identity, as its largest eigenvalue would have
             it: the Frobenius norm of P − z₁I, of the same shape. What is stable may grow so much before it decays.
+        imaginary: the imaginary part of z₁, of the same shape; 0 where both eigenvalues are real.
         damped: whether the oscillator has a damping term, which some methods cannot do.
     """
 
@@ -53,6 +57,7 @@ class StabilityMap:
     radius: Array
     stable: Truths
     nonnormal: Array
+    imaginary: Array
     damped: bool
 
     @property
@@ -73,9 +78,18 @@ class StabilityMap:
 
         What grows passes T if it has the time. Of a left eigenvector w of z₁ with length 1, wᵀx is multiplied by z₁
         in every step, and of two unit vectors one has a share |wᵀx| of 1/√2 or more. So the state is longer than
-        r₁ᴺ/√2, which is above T for r₁ ≥ 1 + b with b = (√2·T)^(1/N) − 1. Nothing can be said for points with
-        1 < r₁ < 1 + b, and for double eigenvalues on the unit circle, from which samples grow linearly: after N steps they
-        are no longer than those of a stable point with a large transient. Every other point is decided, on the circle too.
+        r₁ᴺ/√2, which is above T for r₁ ≥ 1 + b with b = (√2·T)^(1/N) − 1.
+
+        Of a pair, growth much slower than that is seen by the area between the two states: it is multiplied by q = r₁² in
+        every step, up to rounding, so what has more area after N steps than before grows. With ‖Pᵏ‖ ≤ r₁ᵏ·κ, κ = 1 + K/|Im z₁|,
+        K the norm of P − z₁I of that point, and a step whose rounding is below ρ times the state, the area's share of rounding in
+        a step is below δ = 2ρκ²‖P⁻¹‖ with ‖P⁻¹‖ ≤ (r₁ + K)/q. So a pair with q ≤ 1 ends with an area below (1 + δ)ᴺ, and one with
+        q ≥ 1 + 3δ above it, however few the steps. ρ is 1000·2⁻⁵³: a step of the methods at hand has fewer than a hundred
+        roundings, of numbers no larger than ten times the state.
+
+        Nothing can be said for points that are nearer to 1 than b, or of pairs nearer than 3δ in q, and for double eigenvalues on
+        the unit circle, from which samples grow linearly: after N steps they are no longer than those of a stable point with a
+        large transient. Every other point is decided, on the circle too.
 
         Args:
             steps: N, how many steps are made.
@@ -96,11 +110,15 @@ class StabilityMap:
             warnings.simplefilter("ignore", DivergenceWarning)
             run = integrate(self.system, self.method, dt=1.0, steps=steps, **begin)
         slot = run.v[-1] if run.carry is None else run.carry
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
+            kappa = 1.0 + self.nonnormal / self.imaginary  # infinite for two real ones, whose area says nothing
+            rounding = 2.0 * ROUNDING * kappa**2 * (self.radius + self.nonnormal) / self.radius**2
+            area = slot[0] * run.y[-1][1] - slot[1] * run.y[-1][0]
+            larger = np.abs(area) > np.exp(np.where(np.isfinite(rounding), steps * rounding, np.inf))
             # What is not finite is no number below the threshold.
-            bounded = (np.hypot(slot, run.y[-1]) <= threshold).all(axis=0)
-            decided = self.stable | (self.radius >= 1.0 + band)
-        return Observation(self, steps, threshold, band, bounded, self.stable, decided)
+            bounded = (np.hypot(slot, run.y[-1]) <= threshold).all(axis=0) & ~larger
+            decided = self.stable | (self.radius >= 1.0 + band) | (self.radius**2 >= 1.0 + 3.0 * rounding)
+        return Observation(self, steps, threshold, band, rounding, bounded, self.stable, decided)
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw it, and write it to ``path`` if given; the ending says in which format.
@@ -159,15 +177,18 @@ class Observation:
         steps: how many steps were made.
         threshold: a state that is no longer than this counts as bounded; the starts have length 1.
         band: growing points with r₁ below 1 + band have not the time to pass the threshold.
+        rounding: by this share the area between two states may change in a step for rounding alone, shape (rows, columns);
+            infinite where both eigenvalues are real. A pair whose r₁² is above 1 by three times that is seen to grow by it.
         bounded: whether it stayed bounded, shape (rows, columns).
         predicted: whether it is stable by its eigenvalues, of the same shape.
-        decided: where both must agree, of the same shape: where it is stable, or grows by at least the band.
+        decided: where both must agree, of the same shape: where it is stable, or grows by at least one of these bands.
     """
 
     map: StabilityMap
     steps: int
     threshold: float
     band: float
+    rounding: Array
     bounded: Truths
     predicted: Truths
     decided: Truths
@@ -219,7 +240,7 @@ def stability_map(
     rows = 1 if damping is None else rows
     # One oscillator is refused in fewer words than all.
     fits_together(Oscillator(damping=None if damping is None else most), how)
-    _checks.fits("the matrices", 40, (rows, columns), "ask for fewer points")
+    _checks.fits("the matrices", 48, (rows, columns), "ask for fewer points")
 
     angles = low + (high - low) * np.arange(1, columns + 1) / columns
     ratios = np.linspace(least, most, rows)
@@ -234,6 +255,7 @@ def stability_map(
         radius=found.radius.reshape(shape),
         stable=found.stable.reshape(shape),
         nonnormal=np.sqrt(squares).reshape(shape),
+        imaginary=np.abs(z.imag).reshape(shape),
         damped=damping is not None,
     )
 

@@ -28,8 +28,9 @@ GUIDES = {30: (1.36, 0.79), 90: (0.21, 1.56), 150: (-1.36, 0.79)}
 #: The locus is marked at the multiples of this angle, with the number at this distance, in the units of the plane.
 MARKED, ASIDE = 0.5, 0.17
 
-#: Below this, r₁² − 1 is shown on a linear scale, above on a logarithmic one, between these ends.
-LINEAR, LEAST, MOST = 1e-3, -1.6, 10.0
+#: Below this, r₁² − 1 is shown on a linear scale, above on a logarithmic one, between these ends: what Fehlberg's results grow
+#: by at usual steps must be seen.
+LINEAR, LEAST, MOST = 1e-6, -1.6, 10.0
 
 #: Ψ/Φ is shown up to here.
 TURNS = 2.3
@@ -203,8 +204,8 @@ def _radius(axes: Axes, locus: Locus) -> None:
 
     axes.set_yscale("symlog", linthresh=LINEAR, linscale=0.6)
     axes.set_ylim(LEAST, MOST)
-    ticks = (-1.0, -0.1, -0.01, 0.0, 0.01, 0.1, 1.0, 10.0)
-    axes.set_yticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks])
+    ticks = (-1.0, -1e-2, -1e-4, 0.0, 1e-4, 1e-2, 1.0)
+    axes.set_yticks(ticks, ["−1", "−10⁻²", "−10⁻⁴", "0", "10⁻⁴", "10⁻²", "1"])
     axes.yaxis.set_minor_locator(NullLocator())
     axes.axhspan(0.0, MOST, facecolor="none", edgecolor="#cccccc", hatch="//", linewidth=0.0, zorder=0)
     _lines(axes, locus, locus.r1_squared - 1.0, locus.r1_squared_series - 1.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..charts import figures
 from ..methods import method
+from ..stability.criterion import signed
 from . import show
 
 
@@ -32,9 +33,16 @@ def command(args: argparse.Namespace) -> None:
         return
     show.table(
         f"The undamped oscillator with Φ = {chart.phi:g}",
-        ("method", "r₁²>", "Ψ/Φ>", "what the samples do", "largest |y|>", "file"),
+        ("method", "r₁² − 1>", "Ψ/Φ − 1>", "what the samples do", "largest |y|>", "file"),
         [
-            (s["title"], f"{s['r1_squared']:.6g}", f"{s['ratio']:.5f}", s["kind"], f"{s['largest_y']:.4g}", file)
+            (
+                s["title"],
+                signed(s["r1_squared"] - 1.0),
+                signed(s["ratio"] - 1.0, percent=True),
+                s["kind"],
+                f"{s['largest_y']:.4g}",
+                file,
+            )
             for s, file in zip(chart.summary(), files[1:], strict=True)
         ],
         [f"all in one: {files[0]}"],

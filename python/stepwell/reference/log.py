@@ -1,4 +1,7 @@
-"""Natural logarithm, the same to the last bit as the core's: see ``log.rs`` for its error."""
+"""Natural logarithm, the same to the last bit as the core's: see ``log.rs`` for its error.
+
+Stability analysis has logarithms of numbers that the core never sees, as it has sines of them: see ``trig``.
+"""
 
 import numpy as np
 
@@ -22,9 +25,18 @@ TWO_52 = np.uint64(0x4330000000000000)  # its low bits hold a whole number
 
 def log(x: Array) -> Array:
     """Ln x of a normal number above zero: x = 2ᵏ·(1 + f), then fdlibm's polynomial in f/(2 + f)."""
+    if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
+        return log(x.real) + 1j * (x.imag / x.real)
+    if np.asarray(x).dtype == object:  # numbers without bits, which count what is done to them
+        return _log(np.zeros(()), x)
     u = np.asarray(x, dtype=np.float64).view(np.uint64) + TO_ONE
     k = np.asarray((u >> np.uint64(52)) | TWO_52).view(np.float64) - (4503599627370496.0 + 1023.0)
-    f = np.asarray((u & MANTISSA) + HALF_ROOT).view(np.float64) - 1.0
+    return _log(k, np.asarray((u & MANTISSA) + HALF_ROOT).view(np.float64))
+
+
+def _log(k: Array, mantissa: Array) -> Array:
+    """Ln of 2ᵏ times the mantissa."""
+    f = mantissa - 1.0
     s = f / (2.0 + f)
     z = s * s
     r = z * (L[0] + z * (L[1] + z * (L[2] + z * (L[3] + z * (L[4] + z * (L[5] + z * L[6]))))))

@@ -72,19 +72,23 @@ class Analysis:
         self.Q = Q
         self.slots = _names(method.carry or "v", system.v_shape) + _names("y", system.y_shape)
         self.inputs = system.input_names
-        A = np.broadcast_to(A.reshape(n, n, *(1,) * (len(members) - A.ndim + 2), *A.shape[2:]), P.shape)
+        A = np.broadcast_to(_wide(A, members), P.shape)
         if n <= 2:
             z, exact = eigen.eigenvalues(P), eigen.eigenvalues(A)
+            if n == 2:
+                exact = eigen.matched_of_two(P, z, A, exact, finish)
+            tolerances = np.broadcast_to(eigen.tolerance(P), z.shape)
             single_vector = (z[0] == z[-1]) & ((P[0, -1] != 0) | (P[-1, 0] != 0)) & (n == 2)
             single_vector = np.broadcast_to(single_vector, z.shape)
         else:
-            z, vectors = eigen.eigen(P)
-            exact, exact_vectors = eigen.eigen(A)
-            states = np.einsum("ij...,jk...->ik...", finish, vectors)
-            exact = eigen.matched(z, states / np.sqrt((np.abs(states) ** 2).sum(axis=0)), exact, exact_vectors)
-            z, single_vector = eigen.settled(z, vectors)
-        by_size = eigen.order(z, single_vector)
-        z, exact, single_vector = (np.take_along_axis(a, by_size, axis=0) for a in (z, exact, single_vector))
+            true = eigen.eigen(A)
+            found = eigen.eigen(P, eigen.slot_units(finish, true.units))
+            exact = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), true)
+            z, tolerances, single_vector = eigen.settled(found)
+        by_size = eigen.order(z, tolerances, single_vector)
+        z, exact, tolerances, single_vector = (
+            np.take_along_axis(a, by_size, axis=0) for a in (z, exact, tolerances, single_vector)
+        )
         self.polynomial = _polynomial(P, z)
         self.p: Any = _plain(0.5 * (P[0, 0] + P[1, 1])) if n == 2 else None
         self.q: Any = _plain(P[0, 0] * P[1, 1] - P[0, 1] * P[1, 0]) if n == 2 else None
@@ -93,7 +97,7 @@ class Analysis:
         self.radius = _plain(np.abs(z[0]))
         self.angle = _plain(np.abs(np.angle(z[0])))
         self.true_angle = _plain(np.abs(exact[0].imag) * self.dt)
-        kind = _kind(z[0], single_vector[0], eigen.tolerance(P))
+        kind = _kind(z[0], single_vector[0], tolerances[0])
         self.kind: Any = np.array(KINDS)[kind] if members else KINDS[int(kind)]
         self.stable = _plain(np.isin(kind, (0, 1, 3, 4)))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -127,7 +131,12 @@ class Analysis:
         """
         if self._run is None:
             raise ArgumentError("monodromy: expected an analysis along a run (at=run), got that of single steps")
-        if len(self._run.t) != self._run.steps + 1:
+        if self.method is not self._run.method or not np.all(self.dt == self._run.dt):
+            raise ArgumentError(
+                f"monodromy: expected an analysis with the run's own method and step, {self._run.method.name} and "
+                f"dt = {self._run.dt:g}, got {self.method.name} and {np.ravel(self.dt)[0]:g}"
+            )
+        if self._run.paces is not None or len(self._run.t) != self._run.steps + 1:
             raise ArgumentError(f"monodromy: expected a run of which every step was kept (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
         for k in range(1, self._run.steps):  # the last kept state makes no step in the run
@@ -173,12 +182,16 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         if type(at.system) is not type(system):
             raise ShapeError(f"at: expected a run of {system!r}, got one of {at.system!r}")
         system = system.sized(at.v[0], at.y[0])
+        if dt is None and at.paces is not None:
+            raise ArgumentError("dt: expected the step, in units of time, since the run has chosen its own, got None")
         dt = at.dt if dt is None else dt
     if dt is None:
         raise ArgumentError("dt: expected the step, in units of time, got None")
     step = _checks.numbers("dt", dt, positive=True, unit="units of time")
+    t = _checks.number("t", t)
     members = _checks.batch_shape({"dt": step.shape, "system": system.batch})
     n = sum(maps.size(system))
+    _checks.fits("the matrices", 4 * n * n, members, "ask for fewer")
     if at is None:
         if not system.linear:
             raise ArgumentError(
@@ -195,20 +208,24 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         )
     if isinstance(at, Run):
         return _along(system, how, step, at)
-    v, y = state("at", system, at)
-    P = maps.jacobian(system, how, step, _checks.number("t", t), v, y)
+    v, y = state("at", system, at, "or a run")
+    P = maps.jacobian(system, how, step, t, v, y)
     none = np.zeros((n, 0, *P.shape[2:]))
     Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])
     return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:], t, v, y))
 
 
-def state(argument: str, system: System, at: Any) -> tuple[Array, Array]:
+def state(argument: str, system: System, at: Any, or_what: str = "of blocks") -> tuple[Array, Array]:
     """A state from what users give."""
     if not isinstance(at, (tuple, list)) or len(at) != 2:
-        raise DTypeError(f"{argument}: expected a pair (v, y) or a run, got {type(at).__name__}")
+        raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {_given(at)}")
     v = _checks.block(f"{argument}[0], v", at[0], system.v_shape, system.axes)
     y = _checks.block(f"{argument}[1], y", at[1], system.y_shape, system.axes)
     return v, y
+
+
+def _given(at: Any) -> str:
+    return f"{len(at)} of them" if isinstance(at, (tuple, list)) else type(at).__name__
 
 
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
@@ -216,13 +233,20 @@ def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
     expected = (*system.v_shape, *run.status.shape)
     if run.v.shape[1:] != expected:
         raise ShapeError(f"at: expected a run of {system!r}, states of v of shape {expected}, got {run.v.shape[1:]}")
-    matrices, exact, finish = [], [], []
-    for t, v, y in zip(run.t.tolist(), run.v, run.y, strict=True):
-        matrices.append(maps.jacobian(system, method, dt, t, v, y))
-        exact.append(maps.rates(system, t, v, y))
-        finish.append(maps.finish(system, method, dt, matrices[-1].shape[2:], t, v, y))
-    P, A, F = (np.stack(each, axis=2) for each in (matrices, exact, finish))
-    return Analysis(system, method, dt, P, np.zeros((len(P), 0, *P.shape[2:])), A, F, run)
+    members = _checks.batch_shape({"dt": dt.shape, "system": system.batch, "at": run.status.shape})
+    n = sum(maps.size(system))
+    matrices, exact, finish = (np.empty((n, n, len(run.t), *members)) for _ in range(3))
+    for k, (t, v, y) in enumerate(zip(run.t.tolist(), run.v, run.y, strict=True)):
+        matrices[:, :, k] = maps.jacobian(system, method, dt, t, v, y)
+        exact[:, :, k] = _wide(maps.rates(system, t, v, y), members)
+        finish[:, :, k] = _wide(maps.finish(system, method, dt, members, t, v, y), members)
+    Q = maps.response(system, method, dt, (len(run.t), *members)) if system.linear else np.zeros((n, 0, len(run.t), *members))
+    return Analysis(system, method, dt, matrices, Q, exact, finish, run)
+
+
+def _wide(matrix: Array, members: Shape) -> Array:
+    """A matrix with as many axes of members as there are."""
+    return matrix.reshape(*matrix.shape[:2], *(1,) * (len(members) - matrix.ndim + 2), *matrix.shape[2:])
 
 
 def _polynomial(P: Array, z: Complex) -> Array:

@@ -77,5 +77,8 @@ def operations(method: str | Method, system: System | None = None) -> Operations
             tally["rate_evaluations_y"] += 1
             return self.s.dy(t, v, y)
 
-    how.steps.step(Counted(system.scaled(1.0, ())), 0.0, 1.0, block(system.v_shape), block(system.y_shape))  # type: ignore[arg-type]
+    s: Any = system.scaled(1.0, ())
+    v, y = how.steps.step(Counted(s), 0.0, 1.0, block(system.v_shape), block(system.y_shape))  # type: ignore[arg-type]
+    if hasattr(s, "settle"):  # what is set back onto its energy after a step
+        s.settle(v, y)
     return Operations(**{name: tally[name] for name in Operations._fields})

@@ -118,8 +118,7 @@ class Criteria(tuple[Criterion, ...]):
             limit = f"{float(c.limit):.7g}" if c.limit else "never"
             row = [c.method.title, limit, f"{c.samples_per_period:.4g}" if c.limit else "–", c.r1_squared, c.deviation]
             for at in c.at:
-                change = at.r1_squared - 1.0
-                row += [f"{change:+.3g}" if abs(change) > ROUNDING else "0", f"{100 * at.deviation:+.3g} %"]
+                row += [signed(at.r1_squared - 1.0), signed(at.deviation, percent=True)]
             o = c.operations
             counts = (o.additions, o.multiplications, o.divisions, o.square_roots, o.rate_evaluations)
             rows.append(row + [str(n) for n in counts])
@@ -130,6 +129,13 @@ class Criteria(tuple[Criterion, ...]):
         head, rows = self.table()
         lines = [[h.removesuffix(">") for h in head], ["--:" if h.endswith(">") else "---" for h in head], *rows]
         return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def signed(value: float, *, percent: bool = False, digits: int = 3) -> str:
+    """A difference from what is exact as one writes it, with its sign; what is rounding alone is 0."""
+    if abs(value) <= ROUNDING:
+        return "0"
+    return f"{100 * value:+.{digits}g} %" if percent else f"{value:+.{digits}g}"
 
 
 def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -> Criteria:

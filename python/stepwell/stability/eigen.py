@@ -5,15 +5,52 @@ A matrix has shape (n, n, *members), eigenvalues (n, *members), eigenvectors (n,
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._checks import Array
 
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
+Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 EPS = float(np.finfo(np.float64).eps)
+
+#: Rows and columns are brought to like size in this many rounds at most; a round halves the powers of two that are left.
+ROUNDS = 20
+
+#: And only where their sum becomes smaller by this factor at least (Parlett and Reinsch 1969).
+WORTHWHILE = 0.95
+
+
+class Eigen(NamedTuple):
+    """Eigenvalues and eigenvectors of matrices, in units of the states in which rows and columns are of like size.
+
+    Attributes:
+        values: shape (n, *members); a pair stands with its positive angle first; NaN where the matrix is not finite.
+        vectors: in these units, of unit length, shape (n, n, *members).
+        units: of each state, shape (n, *members): what is x in the matrix's own units is x/units in these.
+        size: the norm of the matrix in these units, shape (*members).
+    """
+
+    values: Complex
+    vectors: Complex
+    units: Array
+    size: Array
+
+    @property
+    def own(self) -> Complex:
+        """The vectors in the matrix's own units."""
+        return self.units[:, np.newaxis] * self.vectors
+
+    def tolerance(self, least: float = 1.0) -> Array:
+        """How far each eigenvalue may be from where it is by rounding, shape (n, *members).
+
+        The elements of a step's matrix are wrong by some eps of the sums that make them, and finding the eigenvalues adds as
+        much: together a matrix of norm below 16·n·eps·max(least, ‖P‖). It moves an eigenvalue by at most 1/|wᴴx| times that, of
+        its left and right vectors of unit length, which is large where two eigenvalues nearly meet.
+        """
+        return 16.0 * len(self.values) * EPS * np.maximum(least, self.size) * _conditions(self.vectors)
 
 
 def eigenvalues(matrix: Array) -> Complex:
@@ -22,7 +59,7 @@ def eigenvalues(matrix: Array) -> Complex:
         return np.asarray(matrix[0], dtype=np.complex128)
     if len(matrix) == 2:
         return _of_two(matrix)
-    return eigen(matrix)[0]
+    return eigen(matrix).values
 
 
 def _of_two(matrix: Array) -> Complex:
@@ -44,42 +81,109 @@ def _of_two(matrix: Array) -> Complex:
     return z
 
 
-def eigen(matrix: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues and eigenvectors of unit length."""
-    stacked = np.moveaxis(matrix, (0, 1), (-2, -1))
-    finite: Any = np.isfinite(stacked).all(axis=(-2, -1), keepdims=True)
-    values, vectors = np.linalg.eig(np.where(finite, stacked, 0.0))
-    values = np.where(finite[..., 0], values, np.nan).astype(np.complex128)
+def eigen(matrix: Array, units: Array | None = None) -> Eigen:
+    """Eigenvalues and eigenvectors, in these units of the states or in such as suit the matrix."""
+    finite: Any = np.isfinite(matrix).all(axis=(0, 1))
+    matrix = np.where(finite, matrix, 0.0)
+    if units is None:
+        units = _units(matrix)
+    scaled = matrix * units / units[:, np.newaxis]
+    values, vectors = np.linalg.eig(np.moveaxis(scaled, (0, 1), (-2, -1)))
     # The positive angle of a pair first: LAPACK gives it so, and what is sorted later keeps it.
-    return np.moveaxis(values, -1, 0), np.moveaxis(vectors.astype(np.complex128), (-2, -1), (0, 1))
+    values = np.where(finite, np.moveaxis(values, -1, 0), np.nan).astype(np.complex128)
+    vectors = np.moveaxis(vectors.astype(np.complex128), (-2, -1), (0, 1))
+    return Eigen(values, vectors, units, np.sqrt((scaled * scaled).sum(axis=(0, 1))))
+
+
+def _units(matrix: Array) -> Array:
+    """Units of the states in which rows and columns of a matrix are of like size, shape (n, *members), all powers of two.
+
+    What is then said of norms and angles does not depend on the units that a user has, and powers of two round nothing. A state
+    that drives no other, or that no other drives, has a row or a column of zeros; the other then becomes 1.
+    """
+    n = len(matrix)
+    size = np.abs(matrix)
+    size[range(n), range(n)] = 0.0
+    units = np.ones(size.shape[1:])
+    for _ in range(ROUNDS):
+        changed = False
+        for i in range(n):
+            row, column = size[i].sum(axis=0), size[:, i].sum(axis=0)
+            with np.errstate(all="ignore"):
+                by = np.sqrt(np.where(row > 0.0, row, 1.0 / column) / np.where(column > 0.0, column, 1.0 / row))
+                by = np.exp2(np.round(np.log2(by)))
+                worth = column * by + row / by < WORTHWHILE * (column + row)
+                by = np.where(worth & np.isfinite(by) & (by > 0.0), by, 1.0)
+            if (by != 1.0).any():
+                changed = True
+                units[i] *= by
+                size[:, i] *= by
+                size[i] /= by
+        if not changed:
+            break
+    return units
+
+
+def slot_units(finish: Array, units: Array) -> Array:
+    """Units of the slots whose states have these units, shape (n, *members): in both, what a slot makes of a state is at most 1.
+
+    A step is looked at in the units of the rates. Those that suit its own matrix may miss what it rounds: near z = −1 velocity
+    and coordinate of a mode leave each other alone, whatever happened between.
+    """
+    with np.errstate(all="ignore"):
+        found = 1.0 / np.abs(finish / units[:, np.newaxis]).max(axis=0)
+        return np.where(np.isfinite(found) & (found > 0.0), np.exp2(np.round(np.log2(found))), 1.0)
+
+
+def _conditions(vectors: Complex) -> Array:
+    """1/|wᴴx| of each eigenvalue's left and right vectors, shape (n, *members); infinite where vectors depend on each other."""
+    stacked = np.moveaxis(vectors, (0, 1), (-2, -1))
+    try:
+        left = np.linalg.inv(stacked)
+    except np.linalg.LinAlgError:  # one of many is enough
+        flat = stacked.reshape(-1, *stacked.shape[-2:])
+        left = np.full_like(flat, np.inf)
+        for i, each in enumerate(flat):
+            try:
+                left[i] = np.linalg.inv(each)
+            except np.linalg.LinAlgError:
+                continue
+        left = left.reshape(stacked.shape)
+    with np.errstate(all="ignore"):
+        conditions = np.sqrt((left.real**2 + left.imag**2).sum(axis=-1))
+    return np.moveaxis(np.where(np.isnan(conditions), np.inf, conditions), -1, 0)
 
 
 def tolerance(matrix: Array) -> Array:
-    """How far an eigenvalue may be from where it is by rounding: 16·n·eps times the square of the matrix's norm.
+    """How far an eigenvalue of one or two states may be from the unit circle by rounding, shape (*members).
 
-    The elements are wrong by some eps of theirs, and so is the determinant, a sum of n-fold products; the eigenvalues of a pair
-    on the unit circle move by as much. Not for double eigenvalues, which move by the square root.
+    The elements of P are wrong by some eps, and so are its trace and its determinant, sums of at most two products, and with them
+    the radius of a pair: 16·n·eps times the square of the norm that P has in units in which b = c. Not for double eigenvalues,
+    which move by the square root.
     """
     n = len(matrix)
-    squares: Array = np.maximum(1.0, (matrix * matrix).sum(axis=(0, 1)))
-    return 16.0 * n * EPS * squares
+    squares = matrix[0, 0] ** 2 if n == 1 else matrix[0, 0] ** 2 + matrix[1, 1] ** 2 + 2.0 * np.abs(matrix[0, 1] * matrix[1, 0])
+    return np.asarray(16.0 * n * EPS * np.maximum(1.0, squares))
 
 
-def matched(values: Complex, vectors: Complex, exact: Complex, exact_vectors: Complex) -> Complex:
+def matched(values: Complex, states: Complex, exact: Eigen) -> Complex:
     """For each eigenvalue of a step the eigenvalue of the rates whose mode it continues.
 
-    Modes are told apart by their shape: the pairs of vectors that overlap most belong together, those of equal overlap (as
-    conjugate vectors of the same real shape) by the sign of their angle.
+    Modes are told apart by their shape, the states of a step's mode as columns: the pairs that overlap most belong together,
+    those of equal overlap (as conjugate vectors of the same real shape) by the sign of their angle.
     """
     n = len(values)
-    overlap = np.abs(np.einsum("ij...,ik...->jk...", vectors.conj(), exact_vectors))
-    same_side = np.sign(values.imag)[:, np.newaxis] * np.sign(exact.imag)[np.newaxis]
+    with np.errstate(all="ignore"):
+        states = states / exact.units[:, np.newaxis]
+        states = states / np.sqrt((np.abs(states) ** 2).sum(axis=0))
+        overlap = np.abs(np.einsum("ij...,ik...->jk...", states.conj(), exact.vectors))
+    same_side = np.sign(values.imag)[:, np.newaxis] * np.sign(exact.values.imag)[np.newaxis]
     score = overlap + 1e-6 * same_side
     score = np.where(np.isfinite(score), score, 0.0)
     found = np.empty_like(values)
     members = score.shape[2:]
     score = score.reshape(n, n, -1)
-    flat, true = found.reshape(n, -1), np.broadcast_to(exact, values.shape).reshape(n, -1)
+    flat, true = found.reshape(n, -1), np.broadcast_to(exact.values, values.shape).reshape(n, -1)
     every = np.arange(score.shape[2])
     for _ in range(n):
         best = score.reshape(n * n, -1).argmax(axis=0)
@@ -90,18 +194,48 @@ def matched(values: Complex, vectors: Complex, exact: Complex, exact_vectors: Co
     return flat.reshape(n, *members)
 
 
+def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex, finish: Array) -> Complex:
+    """``matched`` for two states, without the work of ``eigen``: only two real eigenvalues can belong to the wrong one.
+
+    ``finish`` makes states of slots.
+    """
+
+    def vectors(m: Array, z: Complex) -> Array:
+        """Of z the row of (m − z)·x = 0 with the larger difference, which has the more digits; shape (2, *members)."""
+        (a, b), (c, d) = m
+        by_a, by_d = z.real - a, z.real - d
+        first = np.abs(by_a) >= np.abs(by_d)
+        return np.stack([np.where(first, b, by_d), np.where(first, by_a, c)])
+
+    with np.errstate(all="ignore"):
+        unit = np.sqrt(np.abs(rates[0, 1] / rates[1, 0]))  # of the first state, in which both elements are of like size
+        unit = np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
+
+        def likeness(x: Array, y: Array) -> Array:
+            """How parallel two vectors are, 1 at most."""
+            (a, b), (c, d) = (np.stack([v[0] / unit, v[1]]) for v in (x, y))
+            return np.asarray(np.abs(a * c + b * d) / np.sqrt((a * a + b * b) * (c * c + d * d)))
+
+        states = [np.einsum("ij...,j...->i...", finish, vectors(matrix, z)) for z in values]
+        shapes = [vectors(rates, z) for z in exact]
+        straight = likeness(states[0], shapes[0]) + likeness(states[1], shapes[1])
+        crossed = likeness(states[0], shapes[1]) + likeness(states[1], shapes[0])
+    real = (values.imag == 0.0).all(axis=0) & (exact.imag == 0.0).all(axis=0)
+    return np.where(real & (crossed > straight), exact[::-1], exact)
+
+
 #: Eigenvalues of more than two states that are nearer to each other than this count as one: rounding moves a double eigenvalue
 #: by the square root of its own size.
 NEAR = 1e-6
 
 
-def settled(values: Complex, vectors: Complex) -> tuple[Complex, np.ndarray[Any, np.dtype[np.bool_]]]:
-    """Eigenvalues with double ones put back together, and which of them have one vector only for two values.
+def settled(found: Eigen) -> tuple[Complex, Array, Truths]:
+    """Eigenvalues with double ones put back together, their tolerances, and which of them have one vector only for two values.
 
     The mean of a double eigenvalue is as exact as a single one; its parts are not. A double eigenvalue that has two
     vectors (two equal oscillators that do not touch) is two single ones.
     """
-    values = values.copy()
+    values, tolerances = found.values.copy(), found.tolerance()
     single_vector = np.zeros(values.shape, dtype=np.bool_)
     n = len(values)
     for i in range(n):
@@ -109,20 +243,24 @@ def settled(values: Complex, vectors: Complex) -> tuple[Complex, np.ndarray[Any,
             with np.errstate(invalid="ignore"):
                 near = np.abs(values[i] - values[j]) < NEAR
             if near.any():
-                overlap = np.abs((vectors[:, i].conj() * vectors[:, j]).sum(axis=0))
+                overlap = np.abs((found.vectors[:, i].conj() * found.vectors[:, j]).sum(axis=0))
                 double = near & (overlap > 1.0 - NEAR)
                 mean = 0.5 * (values[i] + values[j])
                 for k in (i, j):
                     values[k] = np.where(double, mean, values[k])
                     single_vector[k] |= double
-    return values, single_vector
+    of_one = 16.0 * n * EPS * np.maximum(1.0, found.size**2)
+    return values, np.where(single_vector, np.minimum(tolerances, of_one), tolerances), single_vector
 
 
-def order(values: Complex, first: Any) -> np.ndarray[Any, np.dtype[np.int64]]:
+def order(values: Complex, tolerances: Array, first: Truths) -> np.ndarray[Any, np.dtype[np.int64]]:
     """The order of eigenvalues in which the one that decides comes first.
 
-    By magnitude; of equal ones those that ``first`` names, then by angle, the fastest first; pairs stay together.
+    What is outside the unit circle by more than its tolerance, then what is on it, then what is inside; by magnitude; of equal
+    ones those that ``first`` names, then by angle, the fastest first; pairs stay together.
     """
     with np.errstate(invalid="ignore"):
-        size, angle = np.round(np.abs(values), 9), np.angle(values)
-    return np.lexsort((-angle, -np.round(np.abs(angle), 9), ~first, -size), axis=0)
+        beyond, angle = np.abs(values) - 1.0, np.angle(values)
+        side = np.where(np.abs(beyond) <= tolerances, 0, np.sign(beyond))
+    size = np.where(side == 0, 0.0, np.round(beyond, 9))
+    return np.lexsort((-angle, -np.round(np.abs(angle), 9), ~first, -size, -side), axis=0)

@@ -36,13 +36,20 @@ RUNGS = 64
 #: eigenvalue 1 with every method at every step, and does not count.
 ZERO = 1e-6
 
-#: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there and shows first with a small exponent
-#: (Standard Heun: 4); a mode that begins to grow at a limit shows within a rung with a large one.
+#: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there: where it first shows it is above its
+#: tolerance by no more than a rung with this exponent makes of it. A mode that begins to grow at a limit is far above at once.
 EXPONENT = 20.0
 
 #: An eigenvalue whose magnitude changes by less than this for a relative change of the step is solved for exactly: rounding of
 #: some eps would move its crossing by more than a hundred eps.
 FLAT = 0.03
+
+#: Two eigenvalues that leave the circle at an angle and as close together as this are solved for exactly too: critical damping
+#: makes them double, and rounding moves a double eigenvalue by the square root of its own size.
+CLOSE = 1e-4
+
+#: What is found by going back to where two eigenvalues meet is believed if it is this near, in parts of the step gone back.
+MET = 1e-3
 
 #: The mode that leaves is looked at this much past its limit; one that is never stable, at this multiple of the fastest rate.
 PAST, NEVER = 1e-4, 0.1
@@ -125,12 +132,13 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     how = find_method(method)
     system = system.sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
+    t = _checks.number("t", t)
     if at is None:
         if not system.linear:
             raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there")
         search = _Search(system, how, None, None, 0.0)
     else:
-        search = _Search(system, how, *state("at", system, at), _checks.number("t", t))
+        search = _Search(system, how, *state("at", system, at), t)
     limits = search.limits()
     modes = search.modes(limits)
     if not search.members:
@@ -147,13 +155,14 @@ class _Search:
         self.system, self.method, self.v, self.y, self.t = system, method, v, y, t
         self.rates = maps.rates(system, t, v, y)
         self.members: Shape = self.rates.shape[2:]
-        self.exact = eigen.eigenvalues(self.rates)
-        size = np.abs(self.exact)
+        self.exact = eigen.eigen(self.rates)
+        rate = self.exact.values if len(self.rates) > 2 else eigen.eigenvalues(self.rates)
+        size = np.abs(rate)
         self.fastest = np.where(size.max(axis=0) > 0.0, size.max(axis=0), np.abs(self.rates).max(axis=(0, 1)))
-        zero = size <= ZERO * self.fastest
-        self.zeros = zero.sum(axis=0)
-        # A double zero (a chain that floats) comes out of rounding as ±√eps of the fastest, hence not what is zero.
-        self.grows_by_itself = np.where(zero, -1.0, self.exact.real - 1e-9 * self.fastest).max(axis=0) > 0.0
+        # What is zero comes out of rounding as some root of eps, and is not what grows.
+        rounding = self.exact.tolerance(0.0)
+        zero = size <= np.maximum(ZERO * self.fastest, rounding)
+        self.grows_by_itself = np.where(zero, -1.0, rate.real - np.maximum(1e-9 * self.fastest, rounding)).max(axis=0) > 0.0
 
     def matrix(self, dt: Array) -> Array:
         """P for steps of shape (…, *members)."""
@@ -164,61 +173,113 @@ class _Search:
             P = maps.jacobian(self.system, self.method, steps, self.t, self.v, self.y)
         return P[:, :, 0]
 
-    def eigenvalues(self, P: Array) -> Complex:
-        """The eigenvalues that count, the others NaN."""
-        z = eigen.eigenvalues(P)
-        if self.zeros.any():
-            rank = np.argsort(np.argsort(np.abs(z - 1.0), axis=0), axis=0)
-            z = np.where(rank < self.zeros, np.nan, z)
-        return z
+    def finish(self, dt: Array) -> Array:
+        """The map from slots to states, for the same steps."""
+        return maps.finish(self.system, self.method, dt, dt.shape, self.t, self.v, self.y)
 
-    def growth(self, dt: Array) -> tuple[Array, Array]:
-        """How far the largest eigenvalue is outside the unit circle, and how far it may seem so by rounding."""
+    def modes_of(self, P: Array, finish: Array) -> eigen.Eigen:
+        """Eigenvalues and eigenvectors of P, in the units of the rates."""
+        units = self.exact.units.reshape(len(P), *(1,) * (finish.ndim - self.exact.units.ndim - 1), *self.members)
+        return eigen.eigen(P, eigen.slot_units(finish, units))
+
+    def eigenvalues(self, dt: Array) -> tuple[Complex, Array]:
+        """Those of P, and how far rounding may have moved them. Past the range of numbers, they are infinite."""
         P = self.matrix(dt)
-        with np.errstate(invalid="ignore"):
-            size = np.abs(self.eigenvalues(P))
-        beyond = np.where(np.isnan(size), -1.0, size).max(axis=0) - 1.0
-        # Past the range of numbers everything grows.
-        return np.where(np.isfinite(P).all(axis=(0, 1)), beyond, np.inf), eigen.tolerance(P)
+        if len(P) > 2:
+            found = self.modes_of(P, self.finish(dt))
+            z, tolerance = found.values, found.tolerance()
+        else:
+            z = eigen.eigenvalues(P)
+            tolerance = np.broadcast_to(eigen.tolerance(P), z.shape)
+        finite = np.isfinite(P).all(axis=(0, 1))
+        return np.where(finite, z, np.inf), np.where(finite, tolerance, 1.0)
+
+    def growth(self, dt: Array) -> tuple[Array, Array, Array]:
+        """Of the eigenvalue that is farthest outside the unit circle: how far it is, how far it may seem so by rounding.
+
+        And where all are: 1 if that one grows, −1 if all damp, 0 if it is on the circle, for all one can see.
+        """
+        z, tolerance = self.eigenvalues(dt)
+        beyond = np.abs(z) - 1.0
+        at = (beyond - tolerance).argmax(axis=0)[np.newaxis]
+        damp = (beyond < -tolerance).all(axis=0)
+        beyond, tolerance = (np.take_along_axis(a, at, axis=0)[0] for a in (beyond, tolerance))
+        return beyond, tolerance, np.where(beyond > tolerance, 1, np.where(damp, -1, 0))
 
     def limits(self) -> Array:
         """The limit of each member."""
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
-        first = np.full(self.members, len(LADDER))
-        before, after = np.full(self.members, np.nan), np.full(self.members, np.nan)
-        previous = np.zeros(self.members)
-        for start in range(0, len(LADDER), RUNGS):
+        none = len(LADDER)
+        first = np.full(self.members, none)
+        low, high = np.zeros(self.members), np.full(self.members, LADDER[-1]) / fastest
+        crept, previous, before = np.zeros(self.members, dtype=bool), np.zeros(self.members), np.zeros(self.members, dtype=int)
+        for start in range(0, none, RUNGS):
             rungs = LADDER[start : start + RUNGS].reshape(-1, *(1,) * len(self.members)) / fastest
-            beyond, tolerance = self.growth(rungs)
+            beyond, tolerance, side = self.growth(rungs)
             for i in range(len(rungs)):
-                new = (first == len(LADDER)) & (beyond[i] > tolerance[i])
-                first = np.where(new, start + i, first)
-                before = np.where(new, previous, before)
-                after = np.where(new, beyond[i], after)
-                previous = np.where(beyond[i] < -tolerance[i], -1.0, 0.0)
-            if (first < len(LADDER)).all():
+                k = start + i
+                new = (first == none) & (side[i] > 0)
+                first = np.where(new, k, first)
+                low, high = np.where(new, previous, low), np.where(new, rungs[i], high)
+                ratio = LADDER[k] / LADDER[k - 1] if k else np.inf
+                crept = np.where(new, (before >= 0) & (beyond[i] <= tolerance[i] * ratio**EXPONENT), crept)
+                previous, before = rungs[i], side[i]
+            if (first < none).all():
                 break
-        found = first < len(LADDER)
-        high = LADDER[np.minimum(first, len(LADDER) - 1)] / fastest
-        low = LADDER[np.maximum(np.minimum(first, len(LADDER) - 1) - 1, 0)] / fastest
-        next_up = self.growth(high * RUNG)[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            exponent = np.log(next_up / after) / np.log(RUNG)
-        # On the coarse rungs only what is damped before can begin to grow.
-        from_the_start = (exponent < EXPONENT) | (LADDER[np.minimum(first, len(LADDER) - 1)] <= FINE)
-        never = self.grows_by_itself | (found & ((first == 0) | ((before == 0.0) & from_the_start)))
-        seek = found & ~never
+        never = self.grows_by_itself | crept
+        if len(self.rates) == 2:
+            low, high, first = self.valleys(fastest, low, high, first, never)
+        seek = (first < none) & ~never
         if seek.any():
             low, high = self.bisected(np.where(seek, low, 0.5 * high), high)
             high = self.crossing(low, high, seek)
-        return np.where(never, 0.0, np.where(found & (self.fastest > 0.0), high, np.inf))
+        return np.where(never, 0.0, np.where((first < none) & (self.fastest > 0.0), high, np.inf))
+
+    def margins(self, dt: Array) -> tuple[Array, Array]:
+        """Of two states, what must not be below zero (1 − q, 1 + q − 2p, 1 + q + 2p), shape (3, …), and their rounding."""
+        P = self.matrix(dt)
+        (a, b), (c, d) = P
+        with np.errstate(all="ignore"):
+            twice_p, q = a + d, a * d - b * c
+            return np.stack([1.0 - q, 1.0 + q - twice_p, 1.0 + q + twice_p]), eigen.tolerance(P)
+
+    def valleys(self, fastest: Array, low: Array, high: Array, first: Any, never: Any) -> tuple[Array, Array, Any]:
+        """The same enclosure, or an earlier one between two rungs, where a method grows for less than a rung's length.
+
+        Of two states stability is three smooth functions that must not be below zero. Where one has a valley on the ladder that
+        may go so deep, its lowest point is looked up.
+        """
+        last = int(np.where(never, 0, np.minimum(first, len(LADDER) - 1)).max(initial=0))
+        done = np.zeros(self.members, dtype=bool)
+        for start in range(0, last - 1, RUNGS):
+            rungs = LADDER[start : min(start + RUNGS + 2, last + 1)].reshape(-1, *(1,) * len(self.members)) / fastest
+            margins, tolerance = self.margins(rungs)
+            left, here, right = margins[:, :-2], margins[:, 1:-1], margins[:, 2:]
+            with np.errstate(invalid="ignore"):
+                bend = (left - here) + (right - here)
+                valley = (here <= left) & (here < right) & (here < bend) & (bend > 16.0 * tolerance[1:-1])
+            for k in np.flatnonzero(valley.any(axis=tuple(a for a in range(valley.ndim) if a != 1))).tolist():
+                for j in range(3):
+                    open_ = valley[j, k] & ~done & ~never & (start + k + 1 < first)
+                    if not open_.any():
+                        continue
+                    a, b = rungs[k], rungs[k + 2]
+                    for _ in range(60):
+                        c, d = a + (b - a) / 3.0, b - (b - a) / 3.0
+                        at_c, at_d = self.margins(c)[0][j], self.margins(d)[0][j]
+                        a, b = np.where(at_c < at_d, a, c), np.where(at_c < at_d, d, b)
+                    lowest = 0.5 * (a + b)
+                    grows = open_ & (self.growth(lowest)[2] > 0)
+                    low, high = np.where(grows, rungs[k], low), np.where(grows, lowest, high)
+                    first = np.where(grows, start + k + 1, first)
+                    done |= grows
+        return low, high, first
 
     def bisected(self, low: Array, high: Array) -> tuple[Array, Array]:
         """The same enclosure, as narrow as numbers allow."""
         for _ in range(60):
             middle = 0.5 * (low + high)
-            beyond, tolerance = self.growth(middle)
-            grows = beyond > tolerance
+            grows = self.growth(middle)[2] > 0
             low, high = np.where(grows, low, middle), np.where(grows, middle, high)
         return low, high
 
@@ -228,16 +289,26 @@ class _Search:
         Bisection stops where growth shows above rounding. The secant through |z| − 1 a little on both sides finds the crossing
         itself, because its errors on both sides cancel to the rounding of one.
         """
-        start = self.eigenvalues(self.matrix(high * (1.0 + 1e-6)))
-        with np.errstate(invalid="ignore"):
-            largest = np.where(np.isnan(start), 0.0, np.abs(start)).argmax(axis=0)
-        leaving = np.take_along_axis(start, largest[np.newaxis], axis=0)[0]
+
+        def modes(dt: Array) -> tuple[Complex, Array, Complex]:
+            if len(self.rates) == 2:
+                z, tolerance = self.eigenvalues(dt)
+                return z, tolerance, np.ones((1, *z.shape), dtype=np.complex128)
+            found = self.modes_of(self.matrix(dt), self.finish(dt))
+            return found.values, found.tolerance(), found.vectors
+
+        start, tolerance, vectors = modes(high * (1.0 + 1e-6))
+        largest = (np.abs(start) - tolerance).argmax(axis=0)[np.newaxis]
+        leaving = np.take_along_axis(start, largest, axis=0)[0]
+        shape = np.take_along_axis(vectors, largest[np.newaxis], axis=1)[:, 0]
 
         def beyond(dt: Array) -> Array:
-            z = self.eigenvalues(self.matrix(dt))
-            with np.errstate(invalid="ignore"):
-                distance = np.where(np.isnan(z), np.inf, np.abs(z - leaving))
-            return np.asarray(np.abs(np.take_along_axis(z, distance.argmin(axis=0)[np.newaxis], axis=0)[0]) - 1.0)
+            """Of the same mode. Another of any shape may be as near to z, as all slow ones are at 1."""
+            z, _, vectors = modes(dt)
+            other = 1.0 - np.abs((shape.conj()[:, np.newaxis] * vectors).sum(axis=0))
+            distance = np.abs(z - leaving) + other
+            nearest = np.where(np.isnan(distance), np.inf, distance).argmin(axis=0)
+            return np.asarray(np.abs(np.take_along_axis(z, nearest[np.newaxis], axis=0)[0]) - 1.0)
 
         a, b = high * (1.0 - 1e-5), high * (1.0 + 1e-5)
         below, above = beyond(a), beyond(b)
@@ -256,11 +327,28 @@ class _Search:
             b, above = np.where(inside, b, c), np.where(inside, above, value)
             if not at_an_angle.any():
                 break
-        flat = seek & (np.abs(slope) < FLAT)
-        return self.exactly(np.where(at_an_angle, c, high), flat)
+        found = np.where(at_an_angle, c, high)
+        if len(self.rates) > 2:
+            # The logarithm of the growth of two eigenvalues that met goes like the root of the excess; its square, a smooth
+            # function, is followed back to zero. Bisection stops early, where rounding of what nearly meets hides growth.
+            excess = 1e-5 * np.arange(1.0, 4.0)
+            one, two, three = (np.log1p(beyond(high * (1.0 + x))) ** 2 for x in excess)
+            bend = (one - 2.0 * two + three) / 2.0  # of the parabola through the three, over the number of the point, from 1 on
+            rise = two - one - 3.0 * bend
+            level = one - rise - bend
+            with np.errstate(divide="ignore", invalid="ignore"):
+                k = -level / rise
+                k = k - (level + k * (rise + k * bend)) / (rise + 2.0 * k * bend)
+            met = seek & ~at_an_angle & (np.abs(k) < MET)
+            found = np.where(met, high * (1.0 + excess[0] * k), found)
+        doubtful = seek & (np.abs(slope) < FLAT)
+        if len(self.rates) == 2:
+            z, _ = self.eigenvalues(found)
+            doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < CLOSE)
+        return self.exactly(found, doubtful)
 
     def exactly(self, limits: Array, flat: Any) -> Array:
-        """The limits of two states that leave the circle at so flat an angle that rounding moves them.
+        """The limits of two states that leave the circle at so flat an angle, or so close together, that rounding moves them.
 
         Of z² − 2pz + q, whose p and q are exact polynomials in dt, a pair is on the circle where q = 1, and a single eigenvalue
         where 1 + q ∓ 2p = 0. Newton's steps from the crossing found go to the nearest of these.
@@ -284,21 +372,21 @@ class _Search:
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         known = np.isfinite(limits) & (limits > 0.0)
         at = np.where(known, limits, NEVER / fastest)
-        P = self.matrix(np.stack([at, np.where(known, at * (1.0 + PAST), at)]))
-        z, vectors = eigen.eigen(P)
-        counted = self.eigenvalues(P)
-        finish = maps.finish(self.system, self.method, np.stack([at, at]), (2, *self.members), self.t, self.v, self.y)
-        states = np.einsum("ij...,jk...->ik...", finish, vectors)[:, :, 1]
-        exact = eigen.matched(z[:, 1], states / np.sqrt((np.abs(states) ** 2).sum(axis=0)), *eigen.eigen(self.rates))
+        steps = np.stack([at, np.where(known, at * (1.0 + PAST), at)])
+        z, tolerance = self.eigenvalues(steps)
+        finish = self.finish(steps)
+        found = self.modes_of(self.matrix(steps), finish)
+        states = np.einsum("ij...,jk...->ik...", finish, found.own)[:, :, 1]
+        exact = eigen.matched(found.values[:, 1], states, self.exact)
 
         modes = np.empty(self.members, dtype=object)
         for index in np.ndindex(self.members):
             if limits[index] == np.inf:
                 continue
-            on, past = counted[(slice(None), 0, *index)], counted[(slice(None), 1, *index)]
-            leaving = past[np.nanargmax(np.abs(past))]
-            crossing = on[np.nanargmin(np.abs(on - leaving))] if known[index] else np.complex128(1.0)
-            which = int(np.abs(z[(slice(None), 1, *index)] - leaving).argmin())
+            on, past = z[(slice(None), 0, *index)], z[(slice(None), 1, *index)]
+            leaving = past[np.argmax(np.abs(past) - tolerance[(slice(None), 1, *index)])]
+            crossing = on[np.argmin(np.abs(on - leaving))] if known[index] else np.complex128(1.0)
+            which = int(np.abs(found.values[(slice(None), 1, *index)] - leaving).argmin())
             rate, shape = exact[(which, *index)], states[(slice(None), which, *index)]
             if rate.imag < 0.0:  # of a pair, the one that turns forwards
                 rate, shape, crossing = rate.conj(), shape.conj(), crossing.conj()

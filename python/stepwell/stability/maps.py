@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import engine
+from .. import _checks, engine
 from .._checks import Array, Shape
 from ..methods import Method
 from ..reference.types import Blocks
@@ -47,7 +47,8 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
     for j, name in enumerate(system.input_names):
         held = system.with_pulse(name, np.ones(1), 1.0)
         if dt.ndim == 0:
-            q[:, j] = engine.one_step(engine.Plan(held, method, held.batch, float(dt)))
+            one = engine.one_step(engine.Plan(held, method, held.batch, float(dt)))
+            q[:, j] = one.reshape(n, *(1,) * (len(members) - one.ndim + 1), *one.shape[1:])
         else:
             v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))
             q[:, j] = rows(system, *_step(held, method, dt, (1, *members), v, y))[:, 0]
@@ -55,12 +56,16 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
 
 
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
-    """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots."""
-    members = _members(system, dt, v, y)
+    """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
+
+    If the system is set back onto its energy after a step, that belongs to it.
+    """
+    members = together(system, dt, v, y)
     slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y) if method.carry else v
     s: Any = _scaled(system, dt, (sum(size(system)), *members))
     h: Any = float(dt) if dt.ndim == 0 else dt
-    return _derivative(system, members, slot, y, lambda v, y: method.steps.step(s, t, h, v, y))
+    settle: Callable[[Any, Any], Blocks] = getattr(s, "settle", lambda v, y: (v, y))
+    return _derivative(system, members, slot, y, lambda v, y: settle(*method.steps.step(s, t, h, v, y)))
 
 
 def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | None = None) -> Array:
@@ -74,7 +79,7 @@ def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | Non
         system = system.without_inputs()
         members = system.batch
         return rows(system, *both(*unit(system, members)))
-    members = _members(system, np.asarray(1.0), v, y)
+    members = together(system, np.asarray(1.0), v, y)
     return _derivative(system, members, v, y, both)
 
 
@@ -122,8 +127,10 @@ def _step(system: System, method: Method, dt: Array, batch: Shape, v: Array, y: 
         return method.steps.step(_scaled(system, dt, batch), 0.0, 0.0, v, y)
 
 
-def _members(system: System, dt: Array, v: Array, y: Array) -> Shape:
-    return np.broadcast_shapes(dt.shape, system.batch, v.shape[len(system.v_shape) :], y.shape[len(system.y_shape) :])
+def together(system: System, dt: Array, v: Array, y: Array) -> Shape:
+    """The shape to which steps, parameters and states broadcast."""
+    batches = {"v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    return _checks.batch_shape({"dt": dt.shape, "system": system.batch} | batches)
 
 
 def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[[Any, Any], Blocks]) -> Array:

@@ -44,6 +44,11 @@ class Counting:
         """NumPy calls this for the square root of an object."""
         return self._count("square_roots")
 
+    def __lt__(self, other: object) -> bool:
+        """Whatever is held within bounds is."""
+        return False
+
+    __gt__ = __lt__
     __radd__ = __sub__ = __rsub__ = __add__
     __rmul__ = __mul__
     __rtruediv__ = __truediv__
@@ -114,11 +119,16 @@ class Polynomial:
     def root_near(self, x: float) -> float:
         """The root to which Newton's steps from ``x`` lead, with values that are exact; infinite if they lead nowhere."""
         slope = Polynomial(*(k * c for k, c in enumerate(self.coefficients) if k))
-        for _ in range(4):
+        for _ in range(64):  # a few, and one for each bit where the root is a double one
             at = Fraction(x)
-            if not slope(at):
+            value, rise = self(at), slope(at)
+            if not value:
+                break
+            if not rise:
                 return math.inf
-            x = float(at - self(at) / slope(at))
+            if (following := float(at - value / rise)) == x:
+                break
+            x = following
         return x
 
     def __repr__(self) -> str:
