@@ -6,6 +6,7 @@ Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method,
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,12 @@ from PIL import Image
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-IMAGES = Path(__file__).resolve().parent / "images"
+DOCS = Path(__file__).resolve().parent
+IMAGES = DOCS / "images"
+
+#: Errors in the table of the cheapest.
+ERRORS = (0.1, 1e-2, 1e-4, 1e-6, 1e-9)
+PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL)
 
 #: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades want more.
 COLOURS, SHADES = 64, 256
@@ -34,11 +40,25 @@ def write(name: str, figure: Figure, colours: int = COLOURS) -> None:
     print(f"docs/images/{name}")
 
 
+def write_best(panel: sw.charts.Panel) -> None:
+    """Write the table of the cheapest on each scene: steps, or with a tolerance attempts, repeat to the last."""
+    head = ["scene", *(f"{error:g}" for error in ERRORS)]
+    lines = [head, ["---"] * len(head)]
+    for chart in panel.charts:
+        found = [chart.best(error) for error in ERRORS]
+        lines.append([f"`{chart.scene.name}`", *(f"{row['method']}: {row['cost']:.3g}" if row else "—" for row in found)])
+    made = "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    page = DOCS / "work-precision.md"
+    page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
+    print("docs/work-precision.md")
+
+
 if __name__ == "__main__":
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
-    panel = sw.charts.panel(["oscillator", "clover", "kepler", "figure_eight", "chain", "energy_control"])
+    panel = sw.charts.panel(each.name for each in sw.scenes.scenes())
     write("work-precision.png", panel.plot())
+    write_best(panel)
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))

@@ -162,7 +162,7 @@ def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     begins = [(k, float(c)) for k, c in series(method).radius_terms(1) if c > 0]
     least = [(1.1 * 3 * 2 * ROUNDING * 9 / c) ** (1 / k) for k, c in begins]
     assert max(least, default=0.0) < 0.05
-    agree(observation, (sum(least) + observation.band / 2) / 4)
+    agree(observation, (sum(least) + observation.band / 2) / chart.phi[-1])
     below = np.count_nonzero(chart.phi < method.limit * (1 - 1e-12))
     assert observation.bounded[0, :below].all()
     # A growth like Φ⁶ is lost in rounding where it begins; a limit is not.

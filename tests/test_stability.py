@@ -35,6 +35,7 @@ Q: dict[str, Any] = {
     "merson": lambda f: 1 - f**8 / 1728 + f**10 / 20736,
     "fehlberg": lambda f: 1 + 5 * f**6 / 936 - 11 * f**8 / 7488 + f**10 / 10816,
     "fehlberg_5": lambda f: 1 + 17 * f**6 / 9360 - 7 * f**8 / 12480 + 11 * f**10 / 374400 + f**12 / 4326400,
+    "dop853": lambda f: np.array([(CLOSED_FORMS["dop853"](x)[0] ** 2).sum() for x in f]),
     "pefrl": lambda f: 1.0 + 0 * f,
 }
 P: dict[str, Any] = {
@@ -44,6 +45,7 @@ P: dict[str, Any] = {
     "merson": lambda f: 1 - f**2 / 2 + f**4 / 24,
     "fehlberg": lambda f: 1 - f**2 / 2 + f**4 / 24,
     "fehlberg_5": lambda f: 1 - f**2 / 2 + f**4 / 24 - f**6 / 2080,
+    "dop853": lambda f: np.array([CLOSED_FORMS["dop853"](x)[0, 0] for x in f]),
     "pefrl": lambda f: np.array([CLOSED_FORMS["pefrl"](x).trace() / 2 for x in f]),
 }
 LIMITS = {
@@ -59,6 +61,7 @@ LIMITS = {
     "merson": 2 * math.sqrt(3),
     "fehlberg": 0.0,
     "fehlberg_5": 0.0,
+    "dop853": 5.96035981170278,  # of the polynomial in truths, in 40 digits
     "pefrl": 2.989449545906729,  # where 1 + p = 0, by bisection of the product of nine shears in fractions
 }
 known = pytest.mark.parametrize("method", sorted(LIMITS))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.stability import maps, operations, series
+from truths import DOP853_TAIL
 
 METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
@@ -22,6 +23,7 @@ TAYLOR = {
     "merson": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 144),
     "fehlberg": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 104),
     "fehlberg_5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 2080),
+    "dop853": (*(1 / math.factorial(k) for k in range(9)), *map(float, DOP853_TAIL)),
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..stability.criterion import signed
 from .figures import Figures, Samples
-from .style import FONT, GREY, new_figure
+from .style import FONT, GREY, named, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ def overview(chart: Figures) -> Figure:
                 continue
             samples = chart.samples[i]
             _samples(axes, chart, samples)
-            axes.set_title(f"{samples.method.title} ({samples.method.section})", loc="left", size=13.5, weight="bold")
+            axes.set_title(named(samples.method), loc="left", size=13.5, weight="bold")
             axes.set_title(_said(samples, digits=2).split(" (")[0], loc="right", size=11)  # the rest has no room
             if i % across == 0:
                 axes.set_ylabel("y")

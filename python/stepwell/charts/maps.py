@@ -19,6 +19,7 @@ from ..methods import method as find_method
 from ..stability import analyse
 from ..systems import Oscillator
 from .files import write_csv, write_json
+from .zplane import largest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,7 +209,7 @@ class Observation:
 def stability_map(
     method: Method | str,
     *,
-    phi: tuple[float, float] = (0.0, 4.0),
+    phi: tuple[float, float] | None = None,
     damping: tuple[float, float] | None = (0.0, 2.0),
     size: int | tuple[int, int] = SIZE,
 ) -> StabilityMap:
@@ -217,6 +218,7 @@ def stability_map(
     Args:
         method: its name, or what ``stepwell.method`` returns.
         phi: from where to where Φ = ω₀·dt goes, in radians, 0 or more; the first point is one spacing above the lower end.
+            If None, from 0 to 4, or past the method's limit.
         damping: from where to where the damping ratio D goes, without a unit, both ends included; None for the undamped
             oscillator over Φ alone, which every method can do.
         size: how many points over each axis, or a pair: over Φ, over D.
@@ -229,7 +231,7 @@ def stability_map(
         UnsupportedError: if the method cannot do a damped oscillator.
     """
     how = find_method(method)
-    low, high = _ends("phi", phi, "rad")
+    low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")
     if low < 0.0:
         raise ArgumentError(f"phi: expected angles of 0 rad or more, got {low:g}")
     pair = size if isinstance(size, tuple) else (size, size)

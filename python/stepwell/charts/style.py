@@ -52,6 +52,11 @@ def look(method: Method) -> dict[str, Any]:
     }
 
 
+def named(method: Method) -> str:
+    """Its title, and its section if it is in the document."""
+    return f"{method.title} ({method.section})" if method.section.startswith("§") else method.title
+
+
 def peer_look(number: int) -> dict[str, Any]:
     """Keywords for a line of another program, the first being 0."""
     return {
