@@ -140,7 +140,7 @@ def _wrong(strip: Axes, chart: WorkPrecision, cost: str) -> None:
             strip.plot(x, [row] * len(x), **(style | mark))
         if 0.0 < curve.largest_stable_step < math.inf:
             strip.plot([_at_edge(curve, cost)], [row], **style)
-    strip.set_ylim(len(chart.curves) - 0.2, -0.7)
+    strip.set_ylim(len(chart.curves) + 0.3, -0.7)  # below the last row there is room for the first label of the errors
     strip.set_yticks([])
     strip.tick_params(labelbottom=False, bottom=False)
     strip.grid(axis="x", color="#dddddd", linewidth=0.8)
