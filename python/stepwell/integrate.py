@@ -69,7 +69,8 @@ def integrate(
         steps: how many steps, one or more.
         tolerance: in place of ``steps``: every member chooses its own steps so that the estimated error of each stays below this,
             relative to the length of each block and beside it (error ≤ tolerance·(1 + length)); or a pair (relative,
-            absolute). Each broadcasts over the batch. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5, dop853.
+            absolute). Each broadcasts over the batch. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5,
+            dop853.
         at: with a tolerance, the times at which to keep the state, ascending, from t0 on. They are reached exactly.
         max_steps: with a tolerance, the most steps of a member, rejected ones counted.
         every: keep the state every so many steps, with the first and the last; None keeps the last alone.
