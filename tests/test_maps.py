@@ -204,7 +204,7 @@ def test_threshold_and_band_are_as_derived(false_euler):
     assert np.array_equal(found.decided, false_euler.stable | seen)
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
+@pytest.mark.parametrize("method", [m for m in METHODS if m.name in CLOSED_FORMS], ids=lambda m: m.name)
 def test_the_area_of_a_pair_changes_as_its_determinant_says(method):
     """Of the states after 1000 steps, against the closed form of q in fractions. What it is off by must be less than δ a step."""
     phi = [Fraction(k, 64) for k in (1, 3, 6, 19, 32, 64, 80)]

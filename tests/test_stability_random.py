@@ -12,7 +12,6 @@ import stepwell as sw
 from stepwell.stability import maps, operations, series
 from truths import DOP853_TAIL
 
-METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 SECOND_ORDER = [m.name for m in sw.methods() if m.needs_acceleration]
 
 #: R(z) = 1 + z + … of the methods that treat both blocks alike.
@@ -25,6 +24,9 @@ TAYLOR = {
     "fehlberg_5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 2080),
     "dop853": (*(1 / math.factorial(k) for k in range(9)), *map(float, DOP853_TAIL)),
 }
+
+#: Those whose P is written by hand here.
+METHODS = [*TAYLOR, "false_euler", "damped_euler", "false_heun", "semi_false_heun"]
 
 
 def by_hand(method: str, a: Any, n_v: int) -> Any:

@@ -1,9 +1,10 @@
 """``stability_limit``: the largest step below which nothing grows that should not, and the mode that then does.
 
 The step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
-enclose the limit, bisection finds it, and where an eigenvalue crosses the unit circle at an angle, the crossing itself is
-solved for. An eigenvalue that leaves the circle after a collision with another (False Euler at Φ = 2) does so with the square
-root of the excess, so there bisection alone is exact to rounding.
+enclose the limit, of two states also a narrow window between rungs. Bisection finds it, and where an eigenvalue crosses the unit
+circle at an angle, the crossing itself is solved for. An eigenvalue that leaves the circle after a collision with another (False
+Euler at Φ = 2) does so with the square root of the excess, so there bisection alone is exact to rounding for two states; for
+more, the square of the growth is followed back to where it began.
 """
 
 from __future__ import annotations
@@ -111,8 +112,10 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     Stable means that what should not grow does not: every eigenvalue of the transition matrix stays in or on the unit circle for
     all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
     linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
-    neither is a system that grows by itself. Limits are exact to some 1e-15; damping of less than a millionth of critical
-    damping counts as none.
+    neither is a system that grows by itself. Limits of two states are exact to some 1e-15, of more to some 1e-14 times the
+    condition of the mode that leaves, whatever the units; damping of less than a millionth of critical damping counts as none.
+    Where a method grows in a window of steps and is stable beyond, the window is found for two states, however narrow; for more,
+    one that is less than 2 % of the step wide may be missed.
 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: they add to the samples what stays bounded.
