@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,9 +12,8 @@ from .._checks import Array
 from ..charts.measure import ASKED
 from ..errors import ArgumentError
 from ..scenes import Scene
+from ..scenes.table import Exact, tabled
 from ..scenes.truth import AGREES, with_truth
-
-Exact = Callable[[Array], tuple[Array, Array]]
 
 #: Without a frame a run has at least so many steps.
 FEWEST = 4
@@ -23,11 +21,8 @@ FEWEST = 4
 #: A true motion without a formula is known this many times better than the tolerance, and a table of it that many times.
 BETTER, FINER = 10.0, 1000.0
 
-#: A table of it has so many intervals at first, so many at most, and in each a polynomial through so many of its times, where
-#: Chebyshev has them, that is as close as this in the blocks' largest lengths; it is looked at once between each two.
-PIECES, MOST_PIECES, CLOSE = 200, 20_000, 1e-9
-NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 12))
-BETWEEN = 0.5 * (NODES[1:] + NODES[:-1])
+#: A table of it is as close to it as this at least, in the blocks' largest lengths.
+CLOSE = 1e-9
 
 #: A trial compares so many states at even times with the true ones, and as many at even lengths of the true motion's path, so
 #: that a short encounter is not passed over.
@@ -179,54 +174,3 @@ def looked_up(exact: Exact, times: Array) -> Exact:
         return blocks[0][place], blocks[1][place]
 
     return answer
-
-
-def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
-    """A quicker function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
-
-    Intervals are halved until that is so; where it would take too many, it is the same function.
-    """
-    begins, length, number = np.linspace(0.0, until, PIECES, endpoint=False), until / PIECES, 0
-    good: list[tuple[Array, Array, Array, Array]] = []
-    while len(begins):
-        number += len(begins)
-        if number > MOST_PIECES:
-            return exact
-        # At the nodes and between them, to see how good it is.
-        asked = begins[:, np.newaxis] + length * np.concatenate([NODES, BETWEEN])
-        blocks = [block.reshape(*asked.shape, *block.shape[1:]) for block in exact(np.minimum(asked, until).ravel())]
-        close_enough = np.ones(len(begins), dtype=bool)
-        for block, scale in zip(blocks, scales, strict=True):
-            found = np.tensordot(_shares(BETWEEN), block[:, : len(NODES)], axes=(1, 1)).swapaxes(0, 1)
-            missed = np.abs(found - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
-            close_enough &= missed <= close * scale
-        v, y = (block[close_enough, : len(NODES)] for block in blocks)
-        good.append((begins[close_enough], np.full(len(v), length), v, y))
-        left, length = begins[~close_enough], 0.5 * length
-        begins = np.sort(np.concatenate([left, left + length]))
-    starts, lengths, v, y = (np.concatenate(each) for each in zip(*good, strict=True))
-    order = np.argsort(starts)
-    starts, lengths, tables = starts[order], lengths[order], (v[order], y[order])
-
-    def answer(t: Array) -> tuple[Array, Array]:
-        piece = np.clip(np.searchsorted(starts, t, "right") - 1, 0, len(starts) - 1)
-        shares = _shares((t - starts[piece]) / lengths[piece])
-        found = []
-        for table in tables:
-            value = np.zeros((len(t), *table.shape[2:]))
-            for j in range(len(NODES)):
-                value += shares[:, j].reshape(-1, *(1,) * (table.ndim - 2)) * table[piece, j]
-            found.append(value)
-        return found[0], found[1]
-
-    return answer
-
-
-def _shares(u: Array) -> Array:
-    """What each node counts for in the polynomial through all at places u within an interval, shape (places, nodes)."""
-    shares = np.ones((len(u), len(NODES)))
-    for j in range(len(NODES)):
-        for m in range(len(NODES)):
-            if m != j:
-                shares[:, j] *= (u - NODES[m]) / (NODES[j] - NODES[m])
-    return shares

@@ -167,9 +167,10 @@ class Search:
 
     def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
         """The least k that is good enough, from the last doubling that was not, or the one before it, to a little more than k."""
-        low = max(candidate.first, k // back, self.regular(candidate, k))
-        failed = 0
-        for rung in self.closer(candidate, rungs(low, 4 * k)):
+        regular = self.regular(candidate, k)
+        low = max(candidate.first, k // back, regular)
+        failed, ladder = 0, rungs(low, 4 * k)
+        for rung in ladder if regular else self.closer(candidate, ladder):
             if not self.affordable(candidate, rung, failed or low):
                 return None
             if self.good(candidate, rung):
