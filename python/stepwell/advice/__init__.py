@@ -21,7 +21,7 @@ from ..methods import methods as every_method
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from . import predict
-from .candidates import Candidate, Fixed, Paced
+from .candidates import SHARE, Candidate, Fixed, Paced
 from .motion import Grid, motion_of
 from .paced import PacedTrials
 from .result import Advice, Rejected, Row, Shortfall
@@ -85,7 +85,7 @@ def advise(
     known = motion_of(scene, frame, tolerance)
     trials = Trials(known)
     most = MOST / max(1.0, trials.numbers / 8)
-    paced = PacedTrials(known, tolerance, most)
+    paced = PacedTrials(known, SHARE * tolerance, most)
     candidates: list[Candidate] = []
     rejected = []
     for method in chosen:
@@ -219,7 +219,7 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     too_dear = f"costs over {DOMINATED:g} times the least"
     needs = f"; by its order it needs about {candidate.said(missed.expected)}" if missed.expected else ""
     unstable = "still unstable" if candidate.by == "step" else "stops early"
-    if trial.error <= search.tolerance:
+    if trial.error <= search.allowed(candidate):
         reason = f"good enough {tried}, which {too_dear}"
     elif missed.kind == "unstable":
         reason = f"{unstable} {tried}, and more {too_dear}" if missed.dear else f"{unstable} {tried}, the most tried"

@@ -20,6 +20,11 @@ COARSEST = 64
 LEAST_TOLERANCE = 1e-16
 
 
+#: A run with a tolerance is not looked at everywhere, and asked at other times it is another run: this share of the error that is
+#: allowed is all that it may have.
+SHARE = 0.8
+
+
 class Candidate(Protocol):
     """A method, and how its steps are chosen.
 
@@ -28,12 +33,14 @@ class Candidate(Protocol):
         by: ``"step"`` or ``"tolerance"``.
         name: the method's, and that it goes by tolerance: ``"merson, tolerance"``.
         first: the least k.
+        share: of the error that is allowed, what the run may have.
     """
 
     method: Method
     by: str
     name: str
     first: int
+    share: float
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
@@ -52,6 +59,7 @@ class Fixed:
     """Steps of one length: k of them in a span of the grid."""
 
     by = "step"
+    share = 1.0
 
     def __init__(self, method: Method, trials: Trials, grid: Grid) -> None:
         self.method, self.name = method, method.name
@@ -79,6 +87,7 @@ class Paced:
 
     by = "tolerance"
     first = COARSEST
+    share = SHARE
 
     def __init__(self, method: Method, trials: PacedTrials) -> None:
         assert method.error_order is not None

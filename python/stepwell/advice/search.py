@@ -30,9 +30,9 @@ NEAR, FEW, RISES, FAR, MANY = 2.5, 6, 1.3, 8.0, 8
 #: An error below this is taken to fall with the order of the method at most; above it a run may be wrong in other ways.
 FALLS = 0.3
 
-#: Where errors fall by one power over two doublings, within EVEN, and not by LESS than the order, nothing below the share BEFORE
-#: of what it asks for is tried.
-EVEN, LESS, BEFORE = 1.0, 1.3, 0.75
+#: Where errors below SMALL fall by one power over two doublings, within EVEN, and not by LESS than the order, nothing below the
+#: share BEFORE of what it asks for is tried; if runs make more than the share LONG of the evaluations that they may make.
+SMALL, EVEN, LESS, BEFORE, LONG = 0.02, 1.0, 1.3, 0.75, 1 / 256
 
 #: But what the order tells is off by up to this factor in steps.
 DOUBT = 3.0
@@ -90,13 +90,17 @@ class Search:
         """Of a span, in a run that was made."""
         return self.prices[candidate.name] * candidate.look(k).steps / self.spans
 
+    def allowed(self, candidate: Candidate) -> float:
+        """The error that its runs may have."""
+        return self.tolerance * candidate.share
+
     def good(self, candidate: Candidate, k: int) -> bool:
         """Whether a run is good enough."""
-        return candidate.look(k).error <= self.tolerance
+        return candidate.look(k).error <= self.allowed(candidate)
 
     def confirmed(self, candidate: Candidate, k: int) -> bool:
         """Whether it is so at every step."""
-        return self.good(candidate, k) and candidate.confirm(k).error <= self.tolerance
+        return self.good(candidate, k) and candidate.confirm(k).error <= self.allowed(candidate)
 
     def affordable(self, candidate: Candidate, k: int, known: int) -> bool:
         """Whether the run is short enough to be made, by one that was."""
@@ -143,7 +147,7 @@ class Search:
             _, i, k = heapq.heappop(waiting)
             candidate = candidates[i]
             trial, cost = candidate.look(k), self.cost(candidate, k)
-            if trial.error <= self.tolerance:
+            if self.good(candidate, k):
                 found[candidate.name] = k
                 best = min(best, cost)
                 continue
@@ -163,7 +167,7 @@ class Search:
         """The k that the order of the method asks for, if the error is small enough to tell."""
         if not trial.error < FALLS:
             return None
-        return math.ceil(k * min(1e12, float((trial.error / self.tolerance) ** (1.0 / candidate.method.order))))
+        return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
     def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
         """The least k that is good enough, from the last doubling that was not, or the one before it, to a little more than k."""
@@ -182,29 +186,33 @@ class Search:
         return None
 
     def regular(self, candidate: Candidate, k: int) -> int:
-        """Where looking need not begin before, if errors fall by one power over the two doublings up to k; 0 if they do not."""
-        if k < 4 * candidate.first:
+        """Where looking need not begin before, if errors fall by one power over the two doublings up to k; 0 if they do not.
+
+        It is not asked where runs are quick, for errors that fall evenly at the doublings may still dip between them.
+        """
+        if k < 4 * candidate.first or candidate.look(k).steps * candidate.method.evaluations < LONG * self.most:
             return 0
         first, second, third = (candidate.look(n).error for n in (k // 4, k // 2, k))
-        if not FALLS > first > second > self.tolerance >= third > 0.0:
+        allowed = self.allowed(candidate)
+        if not SMALL > first > second > allowed >= third > 0.0:
             return 0
         powers = math.log2(first / second), math.log2(second / third)
         if abs(powers[0] - powers[1]) > EVEN or min(powers) < candidate.method.order - LESS:
             return 0
-        return int(BEFORE * k / 2 * 2.0 ** (math.log2(second / self.tolerance) / powers[1]))
+        return int(BEFORE * k / 2 * 2.0 ** (math.log2(second / allowed) / powers[1]))
 
     def closer(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
         """The ladder, with rungs between where the next may be good enough by chance.
 
         That is where an error just misses, and where errors rise with more steps: of a chaotic motion they are a lottery.
         """
-        least = math.inf
+        least, allowed = math.inf, self.allowed(candidate)
         for rung, following in zip(ladder, [*ladder[1:], ladder[-1]], strict=True):
             yield rung
             error = candidate.look(rung).error
-            ragged = RISES * least < error and least <= FAR * self.tolerance
+            ragged = RISES * least < error and least <= FAR * allowed
             least = min(least, error)
-            if ragged or error <= NEAR * self.tolerance:
+            if ragged or error <= NEAR * allowed:
                 yield from range(rung + 1, following, max(1, (following - rung) // (MANY if ragged else FEW)))
 
     def halved(self, candidate: Candidate, k: int) -> int | None:
