@@ -6,6 +6,7 @@ that is the method's order. The search knows no more of them.
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 from ..methods import Method
@@ -86,14 +87,17 @@ class Paced:
     """Steps chosen to a tolerance: it is the power of 1/k with which the method estimates its error."""
 
     by = "tolerance"
-    first = COARSEST
     share = SHARE
 
     def __init__(self, method: Method, trials: PacedTrials) -> None:
         assert method.error_order is not None
         self.method, self.name = method, f"{method.name}, tolerance"
         self.trials, self.power = trials, method.error_order
-        self.least = LEAST_TOLERANCE * min(1.0, max(trials.scene.scales))
+        scale = max(trials.scene.scales)
+        self.least = LEAST_TOLERANCE * min(1.0, scale)
+        # A single step may be wrong by the tolerance, and by that share of the length: where that is more than is allowed, it is luck.
+        most = min(1.0, trials.allowed * scale / (1.0 + scale))
+        self.first = math.ceil(COARSEST * most ** (-1.0 / self.power))
 
     def tolerance(self, k: int) -> float:
         """The tolerance of that k, in two digits, so that what is told is what was run."""

@@ -87,11 +87,13 @@ class PacedTrials:
         """Times between, so many or fewer sets of them; first those that were bad before."""
         if method.name in self._bad:
             yield np.unique(self._bad[method.name][-LEAST:])
-        number = max(1, math.ceil(len(self.marks) / max(LEAST, round(SHARE * trial.steps))))
         # What takes long is done less often.
-        wanted = min(runs, number, max(LOOKS, int(0.25 * self.most / (trial.steps * method.evaluations))))
-        for first in np.unique(np.linspace(0, number, wanted, endpoint=False).astype(int)):
-            yield self.marks[first::number]
+        runs = min(runs, max(LOOKS, int(0.25 * self.most / (trial.steps * method.evaluations))))
+        # Many times at once find what is short, few leave the run as it is.
+        for times, part in ((max(LEAST, round(SHARE * trial.steps)), runs - runs // 2), (LEAST, runs // 2)):
+            number = max(1, math.ceil(len(self.marks) / times))
+            for first in np.unique(np.linspace(0, number, min(part, number), endpoint=False).astype(int)):
+                yield self.marks[first::number]
 
     def _run(self, method: Method, tolerance: float) -> Trial:
         """The run that is judged, as wrong as it is where it is asked for its state."""

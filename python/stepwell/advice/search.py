@@ -24,8 +24,9 @@ DOMINATED = 10.0
 RUNGS = 8
 
 #: Where an error misses the tolerance by less than the factor NEAR, FEW more numbers of steps are tried before the next rung;
-#: where it is by the factor RISES above that of fewer steps, and that missed by less than the factor FAR, MANY.
-NEAR, FEW, RISES, FAR, MANY = 2.5, 6, 1.3, 8.0, 8
+#: where it is by the factor RISES above that of fewer steps, and that missed by less than the factor FAR, MANY: the least of
+#: these, or as many up to the most as together make the share QUICK of the evaluations that one run may make.
+NEAR, FEW, RISES, FAR, MANY, QUICK = 2.5, 6, 1.3, 8.0, (8, 64), 1 / 128
 
 #: An error below this is taken to fall with the order of the method at most; above it a run may be wrong in other ways.
 FALLS = 0.3
@@ -213,15 +214,19 @@ class Search:
             ragged = RISES * least < error and least <= FAR * allowed
             least = min(least, error)
             if ragged or error <= NEAR * allowed:
-                yield from range(rung + 1, following, max(1, (following - rung) // (MANY if ragged else FEW)))
+                yield from range(
+                    rung + 1, following, max(1, (following - rung) // (self.many(candidate, rung) if ragged else FEW))
+                )
+
+    def many(self, candidate: Candidate, k: int) -> int:
+        """How many more are tried between two rungs where errors are a lottery: the more, the quicker the runs."""
+        made = candidate.look(k).steps * candidate.method.evaluations
+        return max(MANY[0], min(MANY[1], int(QUICK * self.most / made)))
 
     def halved(self, candidate: Candidate, k: int) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""
         least = k if k == candidate.first else self.between(candidate, k // 2, k)
-        for n in (least, k):
-            if self.confirmed(candidate, n):
-                return n
-        return self.finest(candidate, k, 1)
+        return next((n for n in rungs(least, k) if self.confirmed(candidate, n)), None) or self.finest(candidate, k, 1)
 
     def between(self, candidate: Candidate, low: int, high: int) -> int:
         """A k above ``low``, which is not good enough, up to ``high``, which is: halved thrice."""
