@@ -46,7 +46,8 @@ class Limit(NamedTuple):
 
     Attributes:
         dt: the step beyond which something grows, in units of time; 0 for never stable, infinite for always; None if unknown.
-        how: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still.
+        how: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
+            steps that are chosen to a tolerance.
         mode: what grows there, in words; None if nothing or unknown.
         frequency: in rad per unit of time, of that mode, or None.
     """

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from .._checks import Array
 from ..charts.data import finite
+from ..errors import ArgumentError
+from ..integrate import integrate
 from ..methods import Method
+from ..result import Run
 from ..scenes import Scene
+from .motion import grid_of
 
 #: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
 LINES = 6
@@ -21,32 +26,36 @@ COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "n
 
 @dataclass(frozen=True)
 class Row:
-    """A method with the largest step found that is good enough; its run was made.
+    """A method with the largest step, or tolerance, found that is good enough; its run was made.
 
     Attributes:
         method: which.
-        substeps: steps in a frame; None if any step will do.
-        steps: steps over the horizon.
-        dt: the step, in units of time.
+        substeps: steps in a frame; None if any step will do, or steps are chosen to a tolerance.
+        steps: steps over the horizon; with a tolerance all that were tried.
+        dt: the step, in units of time; with a tolerance the mean of all that were tried.
         error: the largest state error of the run, confirmed.
         predicted: what was expected of it without the run, or None where prediction makes no sense.
-        predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with a longer step and the order.
+        predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with longer steps and the order.
         frequency_error: Ψ/Φ − 1 of the mode that drifts most, or None.
         damping_error: damping that the method adds to that mode, in 1 per unit of time; below zero it grows. Or None.
-        evaluations_per_frame: rate evaluations in a frame; None without a frame.
+        evaluations_per_frame: rate evaluations in a frame, in the mean; None without a frame.
         evaluations_per_time: rate evaluations in a unit of time.
         ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
-        seconds_per_frame: measured, in a frame; None without a frame.
+        seconds_per_frame: measured, in a frame, in the mean; None without a frame.
         seconds_per_time: measured, in a unit of time.
-        objects: how many such objects the budget suffices for; None without a budget.
+        objects: how many such objects the budget suffices for, in the frame that takes longest; None without a budget.
         limit: the step beyond which something grows, by the eigenvalues: 0 for never stable, infinite for none, None if they
-            do not say.
-        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation along the true motion, as if that stood still.
+            do not say, and with a tolerance.
+        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation along the true motion, as if that stood still;
+            ``"none"``, with a tolerance.
         mode: what grows beyond the limit, in words, or None.
         mode_frequency: its frequency in the exact solution, in rad per unit of time, or None.
         observed_limit: the largest step whose run over the horizon does not grow; infinite if none that was tried does.
-        robust: from this many steps (in a frame, or over the horizon) on, all that were tried are good enough too; None if errors
-            are above the tolerance up to twice as many.
+        robust: from this many steps (in a frame, or over the horizon) on, or from this tolerance down, all that were tried are
+            good enough too; None if errors are above the tolerance up to twice as many.
+        tolerance: to which the steps are chosen, as ``integrate`` takes it; None for fixed steps.
+        rejected_steps: of the steps, those that were rejected.
+        worst_evaluations: rate evaluations in the frame that has the most; None without a frame.
     """
 
     method: Method
@@ -58,7 +67,7 @@ class Row:
     predicted_by: str | None
     frequency_error: float | None
     damping_error: float | None
-    evaluations_per_frame: int | None
+    evaluations_per_frame: float | None
     evaluations_per_time: float
     ns_per_step: float
     seconds_per_frame: float | None
@@ -69,23 +78,42 @@ class Row:
     mode: str | None
     mode_frequency: float | None
     observed_limit: float
-    robust: int | None
+    robust: float | None
+    tolerance: float | None = None
+    rejected_steps: int = 0
+    worst_evaluations: int | None = None
+
+    @property
+    def by(self) -> str:
+        """``"step"`` or ``"tolerance"``, what the steps are chosen by."""
+        return "step" if self.tolerance is None else "tolerance"
+
+    @property
+    def name(self) -> str:
+        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
+        return named(self.method.name, self.by)
 
     @property
     def margin(self) -> float:
-        """How many times as long a step may be before the method blows up: by the exact limit, or else by the observed one."""
+        """How many times as long a step may be before the method blows up: by the exact limit, or else by the observed one.
+
+        Infinite with a tolerance, which never takes such a step.
+        """
         exact = self.limit_by == "linear" and self.limit
         return (self.limit if exact and self.limit else self.observed_limit) / self.dt
 
     @property
     def is_robust(self) -> bool:
         """Whether a few more steps are good enough too."""
+        if self.tolerance is not None:
+            return self.robust is not None and self.robust >= self.tolerance
         return self.robust is not None and self.robust <= (self.steps if self.substeps is None else self.substeps)
 
     def data(self) -> dict[str, Any]:
         """The same for programs, the method by its name."""
         names = [name for name in self.__dataclass_fields__ if name != "method"]
-        return {"method": self.method.name} | {name: getattr(self, name) for name in names} | {"margin": self.margin}
+        first = {"method": self.method.name, "by": self.by}
+        return first | {name: getattr(self, name) for name in names} | {"margin": self.margin}
 
 
 @dataclass(frozen=True)
@@ -97,11 +125,18 @@ class Rejected:
         kind: ``"refused"`` by the system; ``"unstable"`` or ``"inaccurate"`` at the most steps that were tried; ``"dominated"``,
             more than ten times as dear as the best; ``"budget"``, good enough but too dear.
         reason: the same in words and numbers.
+        by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
     """
 
     method: str
     kind: str
     reason: str
+    by: str = "step"
+
+    @property
+    def name(self) -> str:
+        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
+        return named(self.method, self.by)
 
 
 @dataclass(frozen=True)
@@ -113,7 +148,8 @@ class Shortfall:
         method: by which method, or None.
         substeps: with how many steps in a frame (over the horizon without one), or None.
         needed_budget: seconds in a frame (in a unit of time without one) that the tolerance needs, or None if nothing meets it.
-        needed_method: by which method, or None.
+        needed_method: by which, ``"merson, tolerance"`` if it chooses its steps, or None.
+        tolerance: to which the steps of the least error are chosen, or None.
     """
 
     least_error: float
@@ -121,6 +157,7 @@ class Shortfall:
     substeps: int | None
     needed_budget: float | None
     needed_method: str | None
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -137,6 +174,7 @@ class Advice:
         rejected: the other methods, and why.
         shortfall: what would have to give; None if something fits.
         runs: how many runs were made to find it.
+        cut: whether the scene's horizon is longer, and its true motion not known so far.
     """
 
     scene: Scene
@@ -148,6 +186,7 @@ class Advice:
     rejected: tuple[Rejected, ...]
     shortfall: Shortfall | None
     runs: int
+    cut: bool = False
 
     @property
     def best(self) -> Row | None:
@@ -168,6 +207,7 @@ class Advice:
             "rejected": [asdict(each) for each in self.rejected],
             "shortfall": asdict(self.shortfall) if self.shortfall else None,
             "runs": self.runs,
+            "cut": self.cut,
         }
         found: dict[str, Any] = finite(whole)
         return found
@@ -179,27 +219,69 @@ class Advice:
             Path(path).write_text(text + "\n", encoding="utf-8")
         return text
 
+    @property
+    def asked(self) -> Array:
+        """Times at which the runs with a tolerance gave their state: the frames, or ten even ones, in units of time."""
+        return grid_of(self.scene.horizon, self.frame).asked
+
+    def run(self, row: Row | None = None) -> Run:
+        """The run of a row, in full.
+
+        Args:
+            row: of ``ranked``; the best if None.
+
+        Returns:
+            A ``Run`` that keeps every step, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` tells how
+            wrong it is.
+
+        Raises:
+            ArgumentError: if there is no row.
+        """
+        row = self.best if row is None else row
+        if row is None:
+            raise ArgumentError("row: nothing fits, so there is nothing to run")
+        if row.tolerance is None:
+            return self.scene.run(row.method, row.dt, steps=row.steps, every=1)
+        most = row.steps + 1
+        scene = self.scene
+        return integrate(scene.system, row.method, v=scene.v, y=scene.y, tolerance=row.tolerance, at=self.asked, max_steps=most)
+
     def summary(self) -> list[str]:
         """The advice in sentences, a line each."""
         per = "a frame" if self.frame is not None else "a unit of time"
         best = self.best
         if best is None:
-            return self._what_would_have_to_give(per)
-        count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
-        lines = [
-            f"Use {best.method.name} with {count}, dt = {best.dt:.4g}: error {best.error:.2g} in the run of {best.steps} steps."
-        ]
+            return [*self._cut(), *self._what_would_have_to_give(per)]
+        if best.tolerance is not None:
+            run = f"error {best.error:.2g} in the run of {best.steps} steps, {best.rejected_steps} of them rejected"
+            lines = [f"Use {best.method.name} with steps chosen to a tolerance of {best.tolerance:g}: {run}."]
+        else:
+            count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
+            run = f"error {best.error:.2g} in the run of {best.steps} steps"
+            lines = [f"Use {best.method.name} with {count}, dt = {best.dt:.4g}: {run}."]
+        lines += self._cut()
         ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
-        lines.append(f"Cost {per}: {evaluations:.4g} rate evaluations, {ns:.3g} ns measured in a batch on one thread.")
+        worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
+        lines.append(f"Cost {per}: {evaluations:.4g} rate evaluations{worst}; {ns:.3g} ns measured in a batch on one thread.")
         if best.objects is not None:
-            lines.append(f"The budget of {self.budget:.3g} s {per} suffices for {best.objects} such objects.")
+            lines.append(
+                f"The budget of {self.budget:.3g} s {per} suffices for {best.objects} such objects{', also then' * bool(worst)}."
+            )
         lines.append(_margin(best))
         if not best.is_robust:
-            unit = "steps a frame" if self.frame is not None else "steps"
-            where = f"from {best.robust} {unit} on" if best.robust else "nowhere near"
-            lines.append(f"Errors are not even here: {where} a few steps more are good enough too.")
+            lines.append(self._uneven(best))
         return lines
+
+    def _cut(self) -> list[str]:
+        if not self.cut:
+            return []
+        return [f"It is judged up to t = {self.scene.horizon:.4g} only: beyond, the true motion is not known well enough."]
+
+    def _uneven(self, row: Row) -> str:
+        unit = "steps a frame" if self.frame is not None else "steps"
+        where = f"from {row.robust:g} {unit} on" if row.tolerance is None else f"from a tolerance of {row.robust or 0:g} down"
+        return f"Errors are not even here: {where if row.robust else 'nowhere near'} all that were tried are good enough too."
 
     def _what_would_have_to_give(self, per: str) -> list[str]:
         gap, unit = self.shortfall, "steps a frame" if self.frame is not None else "steps"
@@ -208,13 +290,14 @@ class Advice:
         lines = ["Nothing fits."]
         if gap.method is not None:
             within = "within the budget" if self.budget is not None else "found"
-            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method} with {gap.substeps} {unit}.")
+            how = f"{gap.substeps} {unit}" if gap.tolerance is None else f"a tolerance of {gap.tolerance:g}"
+            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method} with {how}.")
         elif self.budget is not None:
             lines.append(f"The budget of {self.budget:.3g} s {per} does not suffice for one step of any method.")
         if gap.needed_budget is not None:
             lines.append(f"The tolerance needs a budget of {gap.needed_budget:.3g} s {per}, by {gap.needed_method}.")
         else:
-            lines.append("No number of steps that was tried meets the tolerance: allow a larger error, or a shorter horizon.")
+            lines.append("Nothing that was tried meets the tolerance: allow a larger error, or a shorter horizon.")
         return lines
 
     def table(self) -> list[tuple[str, ...]]:
@@ -222,11 +305,12 @@ class Advice:
         rows: list[tuple[str, ...]] = []
         for row in self.ranked:
             framed = row.seconds_per_frame is not None and row.evaluations_per_frame is not None
+            steps = f"{row.steps / self._frames:.3g}" if framed and row.substeps is None else str(row.substeps or row.steps)
             rows.append(
                 (
-                    row.method.name,
-                    str(row.substeps or row.steps) + ("" if row.is_robust else "*"),
-                    f"{row.dt:.4g}",
+                    row.method.name if row.tolerance is None else f"{row.method.name} to {row.tolerance:g}",
+                    steps + ("" if row.is_robust else "*"),
+                    ("" if row.tolerance is None else "~") + f"{row.dt:.4g}",
                     f"{row.error:.2g}",
                     "–" if row.predicted is None else f"{row.predicted:.2g}",
                     f"{row.evaluations_per_frame if framed else row.evaluations_per_time:.4g}",
@@ -236,6 +320,17 @@ class Advice:
                 )
             )
         return rows
+
+    @property
+    def _frames(self) -> int:
+        return grid_of(self.scene.horizon, self.frame).spans
+
+    def rejections(self) -> list[str]:
+        """Why the others are rejected, a line for each reason."""
+        lines: dict[str, list[str]] = {}
+        for each in self.rejected:
+            lines.setdefault(each.reason, []).append(each.name)
+        return [f"{'; '.join(names)}: {reason}" for reason, names in lines.items()]
 
     @property
     def title(self) -> str:
@@ -254,18 +349,24 @@ class Advice:
                 lines.append(f"and {len(self.ranked) - LINES} more")
         if self.rejected:
             lines.append("")
-            kinds = dict.fromkeys(each.kind for each in self.rejected)
-            for kind in kinds:
-                these = [each for each in self.rejected if each.kind == kind]
-                lines += [f"{each.method}: {each.reason}" for each in these[:2]]
+            for kind in dict.fromkeys(each.kind for each in self.rejected):
+                these = replace(self, rejected=tuple(each for each in self.rejected if each.kind == kind)).rejections()
+                lines += these[:2]
                 if len(these) > 2:
-                    lines.append(f"{kind} likewise: {', '.join(each.method for each in these[2:])}")
+                    lines.append(f"{kind} likewise: {'; '.join(line.split(':')[0] for line in these[2:])}")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
         best = self.best
-        said = "nothing fits" if best is None else f"{best.method.name}, dt = {best.dt:g}, error {best.error:.2g}"
-        return f"<advice for {self.scene.name}: {said}>"
+        if best is None:
+            return f"<advice for {self.scene.name}: nothing fits>"
+        how = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
+        return f"<advice for {self.scene.name}: {best.method.name}, {how}, error {best.error:.2g}>"
+
+
+def named(method: str, by: str) -> str:
+    """The method's name, and that it goes by tolerance."""
+    return method if by == "step" else f"{method}, tolerance"
 
 
 def _aligned(cell: str, i: int, widths: list[int]) -> str:
@@ -274,6 +375,8 @@ def _aligned(cell: str, i: int, widths: list[int]) -> str:
 
 def _blows(row: Row) -> str:
     """Where a row blows up, in a few letters."""
+    if row.tolerance is not None:
+        return "–"
     if row.limit_by == "linear" and row.limit is not None:
         return "grows always" if row.limit == 0.0 else ("never" if math.isinf(row.limit) else f"{row.limit:.4g}")
     return "not seen" if math.isinf(row.observed_limit) else f"~{row.observed_limit:.3g}"
@@ -281,6 +384,8 @@ def _blows(row: Row) -> str:
 
 def _margin(row: Row) -> str:
     """How far a row is from blowing up, in a sentence."""
+    if row.tolerance is not None:
+        return "There is no step at which it blows up: what is too long is rejected."
     seen = "" if math.isinf(row.observed_limit) else f" Runs up to the horizon are stable to dt = {row.observed_limit:.3g}."
     turns = "" if not row.mode_frequency else f" of {row.mode_frequency:.4g} rad per unit of time"
     if row.limit_by == "linear" and row.limit is not None:

@@ -1,4 +1,4 @@
-"""The search: for each method the fewest steps whose run is good enough, from coarse to fine, the cheapest first.
+"""The search: for each candidate the fewest steps whose run is good enough, from coarse to fine, the cheapest first.
 
 Errors do not fall evenly with the step: they dip where parts cancel, and rise at resonances. So nothing is chosen that was not
 run. The order of a method only says where looking is no use.
@@ -11,38 +11,43 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from ..methods import Method
-from .trials import Grid, Trial, Trials
+from .candidates import Candidate
+from .trials import Trial
 
 #: No run makes more rate evaluations than this, for it would take too long; a system of more than eight numbers, fewer.
 MOST = 16_000_000
 
-#: A method that costs more than this many times the cheapest is not looked at any further.
+#: A candidate that costs more than this many times the cheapest is not looked at any further.
 DOMINATED = 10.0
 
 #: Rungs of the fine ladder in a factor of two: 9 % between one and the next.
 RUNGS = 8
 
 #: Where an error misses the tolerance by less than the factor NEAR, FEW more numbers of steps are tried before the next rung;
-#: where it is by the factor RISES above that of fewer steps, and that missed by less than the factor FAR, MANY.
-NEAR, FEW, RISES, FAR, MANY = 2.5, 6, 1.3, 8.0, 8
+#: where it is by the factor RISES above that of fewer steps, and that missed by less than the factor FAR, MANY: the least of
+#: these, or as many up to the most as together make the share QUICK of the evaluations that one run may make.
+NEAR, FEW, RISES, FAR, MANY, QUICK = 2.5, 6, 1.3, 8.0, (8, 64), 1 / 128
 
 #: An error below this is taken to fall with the order of the method at most; above it a run may be wrong in other ways.
 FALLS = 0.3
+
+#: Where errors below SMALL fall by one power over two doublings, within EVEN, and not by LESS than the order, nothing below the
+#: share BEFORE of what it asks for is tried; if runs make more than the share LONG of the evaluations that they may make.
+SMALL, EVEN, LESS, BEFORE, LONG = 0.02, 1.0, 1.3, 0.75, 1 / 256
 
 #: But what the order tells is off by up to this factor in steps.
 DOUBT = 3.0
 
 
 class Found(NamedTuple):
-    """The fewest steps of a method that are good enough.
+    """The fewest steps of a candidate that are good enough.
 
     Attributes:
-        k: how many in a span of the grid.
+        k: the candidate's.
         trial: the confirming run.
-        robust: from here on all numbers of steps that were tried, up to twice as many, are good enough too; k itself as a rule,
-            and None if there is no such number.
-        expected: error that the order tells from a run with a longer step, or None.
+        robust: from here on every k that was tried, up to twice as large, is good enough too; k itself as a rule, and None if
+            there is no such k.
+        expected: error that the order tells from a run with longer steps, or None.
     """
 
     k: int
@@ -52,13 +57,13 @@ class Found(NamedTuple):
 
 
 class Missed(NamedTuple):
-    """Why a method was given up: ``unstable``, ``inaccurate`` or ``dominated``.
+    """Why a candidate was given up: ``unstable``, ``inaccurate`` or ``dominated``.
 
     Attributes:
         kind: which.
-        k: the most steps in a span that were run.
+        k: the largest that was run.
         trial: that run.
-        expected: steps in a span that the order says it takes, or None.
+        expected: k that the order says it takes, or None.
         dear: whether more steps were not tried because they cost too much, beside the best.
     """
 
@@ -70,161 +75,186 @@ class Missed(NamedTuple):
 
 
 class Search:
-    """The search of one scene and one tolerance."""
+    """The search of one scene and one tolerance.
 
-    def __init__(self, trials: Trials, grid: Grid, tolerance: float, prices: Mapping[str, float]) -> None:
-        self.trials, self.grid, self.tolerance = trials, grid, tolerance
-        #: What a step costs, by method.
-        self.prices = prices
-        self.most = MOST / max(1.0, trials.numbers / 8)
+    Args:
+        tolerance: the error that is allowed.
+        spans: the cost is that of one of so many parts of a run.
+        prices: what a step costs, by the candidate's name.
+        most: rate evaluations that a run may make.
+    """
 
-    def cost(self, method: Method, k: int) -> float:
-        """Of a span."""
-        return self.prices[method.name] * k
+    def __init__(self, tolerance: float, spans: int, prices: Mapping[str, float], most: float) -> None:
+        self.tolerance, self.spans, self.prices, self.most = tolerance, spans, prices, most
 
-    def look(self, method: Method, k: int) -> Trial:
-        """A run."""
-        return self.trials.look(method, self.grid.dt(k), self.grid.steps(k))
+    def cost(self, candidate: Candidate, k: int) -> float:
+        """Of a span, in a run that was made."""
+        return self.prices[candidate.name] * candidate.look(k).steps / self.spans
 
-    def good(self, method: Method, k: int) -> bool:
+    def allowed(self, candidate: Candidate) -> float:
+        """The error that its runs may have."""
+        return self.tolerance * candidate.share
+
+    def good(self, candidate: Candidate, k: int) -> bool:
         """Whether a run is good enough."""
-        return self.look(method, k).error <= self.tolerance
+        return candidate.look(k).error <= self.allowed(candidate)
 
-    def confirmed(self, method: Method, k: int) -> bool:
+    def confirmed(self, candidate: Candidate, k: int) -> bool:
         """Whether it is so at every step."""
-        if not self.good(method, k):
-            return False
-        return self.trials.confirm(method, self.grid.dt(k), self.grid.steps(k)).error <= self.tolerance
+        return self.good(candidate, k) and candidate.confirm(k).error <= self.allowed(candidate)
 
-    def affordable(self, method: Method, k: int) -> bool:
-        """Whether the run is short enough to be made."""
-        return self.grid.steps(k) * method.evaluations <= self.most
+    def affordable(self, candidate: Candidate, k: int, known: int) -> bool:
+        """Whether the run is short enough to be made, by one that was."""
+        made = candidate.look(known)
+        return candidate.possible(k) and made.steps * candidate.method.evaluations * (k / known) <= self.most
 
-    def run(self, methods: Sequence[Method]) -> tuple[dict[str, Found], dict[str, Missed]]:
-        """What was found, and what was given up, by method."""
-        octaves, missed = self.octaves(methods)
-        by_name = {method.name: method for method in methods}
+    def run(self, candidates: Sequence[Candidate]) -> tuple[dict[str, Found], dict[str, Missed]]:
+        """What was found, and what was given up, by the candidate's name."""
+        octaves, missed = self.octaves(candidates)
+        by_name = {candidate.name: candidate for candidate in candidates}
         found: dict[str, Found] = {}
         best = math.inf
         for name in sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name])):
-            method, k = by_name[name], octaves[name]
-            if self.cost(method, k) > 2.0 * DOMINATED * best:
-                missed[name] = Missed("dominated", k, self.look(method, k), None)
+            candidate, k = by_name[name], octaves[name]
+            cost = self.cost(candidate, k)
+            if cost > 2.0 * DOMINATED * best:
+                missed[name] = Missed("dominated", k, candidate.look(k), None)
                 continue
             # Two octaves back if that might be the cheapest of all, for a dip may hide there; else the one it must be in.
             # One that cannot be the cheapest is halved, as if errors were even.
-            runner_up = self.cost(method, k) > 4.0 * best
-            least = (
-                self.halved(method, k) if runner_up else self.finest(method, k, 4 if self.cost(method, k) <= 3.0 * best else 2)
-            )
+            runner_up = cost > 4.0 * best
+            least = self.halved(candidate, k) if runner_up else self.finest(candidate, k, 4 if cost <= 3.0 * best else 2)
             if least is None:
-                missed[name] = Missed("inaccurate", k, self.look(method, k), None)
+                missed[name] = Missed("inaccurate", k, candidate.look(k), None)
                 continue
-            best = min(best, self.cost(method, least))
-            found[name] = Found(least, self.trials.confirm(method, self.grid.dt(least), self.grid.steps(least)), least, None)
+            best = min(best, self.cost(candidate, least))
+            found[name] = Found(least, candidate.confirm(least), least, None)
         for name in list(found):
-            method, k = by_name[name], found[name].k
-            if self.cost(method, k) > DOMINATED * best:
+            candidate, k = by_name[name], found[name].k
+            if self.cost(candidate, k) > DOMINATED * best:
                 missed[name] = Missed("dominated", k, found.pop(name).trial, None)
             else:
-                found[name] = found[name]._replace(robust=self.robust(method, k), expected=self.expected(method, k))
+                found[name] = found[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
         return found, missed
 
-    def octaves(self, methods: Sequence[Method]) -> tuple[dict[str, int], dict[str, Missed]]:
-        """For each method the first k in a ladder of doublings that is good enough; the cheapest run is always made next."""
+    def octaves(self, candidates: Sequence[Candidate]) -> tuple[dict[str, int], dict[str, Missed]]:
+        """For each candidate the first k in a ladder of doublings that is good enough; the cheapest run is always made next."""
         found: dict[str, int] = {}
         missed: dict[str, Missed] = {}
         best = math.inf
-        waiting = [(self.cost(method, self.grid.first), i, self.grid.first) for i, method in enumerate(methods)]
+        waiting = [(self.prices[each.name] * each.first, i, each.first) for i, each in enumerate(candidates)]
         heapq.heapify(waiting)
         while waiting:
-            cost, i, k = heapq.heappop(waiting)
-            method = methods[i]
-            trial = self.look(method, k)
-            if trial.error <= self.tolerance:
-                found[method.name] = k
+            _, i, k = heapq.heappop(waiting)
+            candidate = candidates[i]
+            trial, cost = candidate.look(k), self.cost(candidate, k)
+            if self.good(candidate, k):
+                found[candidate.name] = k
                 best = min(best, cost)
                 continue
-            wanted = self.wanted(method, k, trial)
-            least = max(2.0 * k, (wanted or 0) / DOUBT)
-            if self.grid.spans * least * method.evaluations > self.most:
-                missed[method.name] = Missed("unstable" if trial.unstable else "inaccurate", k, trial, wanted)
-            elif self.prices[method.name] * least > DOMINATED * best:
-                missed[method.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, dear=True)
+            wanted = self.wanted(candidate, k, trial)
+            least = max(2.0, (wanted or 0) / k / DOUBT)
+            kind = "unstable" if trial.unstable else "inaccurate"
+            # What a run with a tolerance cost that stopped early says nothing of one that does not.
+            if not candidate.possible(2 * k) or trial.steps * candidate.method.evaluations * least > self.most:
+                missed[candidate.name] = Missed(kind, k, trial, wanted)
+            elif cost * least > DOMINATED * best and not (trial.unstable and candidate.by == "tolerance"):
+                missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, dear=True)
             else:
-                heapq.heappush(waiting, (self.cost(method, 2 * k), i, 2 * k))
+                heapq.heappush(waiting, (2.0 * cost, i, 2 * k))
         return found, missed
 
-    def wanted(self, method: Method, k: int, trial: Trial) -> int | None:
+    def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
         """The k that the order of the method asks for, if the error is small enough to tell."""
         if not trial.error < FALLS:
             return None
-        return math.ceil(k * min(1e12, float((trial.error / self.tolerance) ** (1.0 / method.order))))
+        return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
-    def finest(self, method: Method, k: int, back: int) -> int | None:
+    def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
         """The least k that is good enough, from the last doubling that was not, or the one before it, to a little more than k."""
-        low = max(self.grid.first, k // back)
-        failed = 0
-        for rung in self.closer(method, rungs(low, 4 * k)):
-            if not self.affordable(method, rung):
+        regular = self.regular(candidate, k)
+        low = max(candidate.first, k // back, regular)
+        failed, ladder = 0, rungs(low, 4 * k)
+        for rung in ladder if regular else self.closer(candidate, ladder):
+            if not self.affordable(candidate, rung, failed or low):
                 return None
-            if self.good(method, rung):
-                least = self.between(method, failed, rung) if failed else rung
+            if self.good(candidate, rung):
+                least = self.between(candidate, failed, rung) if failed else rung
                 for chosen in (least, rung):
-                    if self.confirmed(method, chosen):
+                    if self.confirmed(candidate, chosen):
                         return chosen
             failed = rung
         return None
 
-    def closer(self, method: Method, ladder: list[int]) -> Iterator[int]:
+    def regular(self, candidate: Candidate, k: int) -> int:
+        """Where looking need not begin before, if errors fall by one power over the two doublings up to k; 0 if they do not.
+
+        It is not asked where runs are quick, for errors that fall evenly at the doublings may still dip between them.
+        """
+        if k < 4 * candidate.first or candidate.look(k).steps * candidate.method.evaluations < LONG * self.most:
+            return 0
+        first, second, third = (candidate.look(n).error for n in (k // 4, k // 2, k))
+        allowed = self.allowed(candidate)
+        if not SMALL > first > second > allowed >= third > 0.0:
+            return 0
+        powers = math.log2(first / second), math.log2(second / third)
+        if abs(powers[0] - powers[1]) > EVEN or min(powers) < candidate.method.order - LESS:
+            return 0
+        return int(BEFORE * k / 2 * 2.0 ** (math.log2(second / allowed) / powers[1]))
+
+    def closer(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
         """The ladder, with rungs between where the next may be good enough by chance.
 
         That is where an error just misses, and where errors rise with more steps: of a chaotic motion they are a lottery.
         """
-        least = math.inf
+        least, allowed = math.inf, self.allowed(candidate)
         for rung, following in zip(ladder, [*ladder[1:], ladder[-1]], strict=True):
             yield rung
-            error = self.look(method, rung).error
-            ragged = RISES * least < error and least <= FAR * self.tolerance
+            error = candidate.look(rung).error
+            ragged = RISES * least < error and least <= FAR * allowed
             least = min(least, error)
-            if ragged or error <= NEAR * self.tolerance:
-                yield from range(rung + 1, following, max(1, (following - rung) // (MANY if ragged else FEW)))
+            if ragged or error <= NEAR * allowed:
+                yield from range(
+                    rung + 1, following, max(1, (following - rung) // (self.many(candidate, rung) if ragged else FEW))
+                )
 
-    def halved(self, method: Method, k: int) -> int | None:
+    def many(self, candidate: Candidate, k: int) -> int:
+        """How many more are tried between two rungs where errors are a lottery: the more, the quicker the runs."""
+        made = candidate.look(k).steps * candidate.method.evaluations
+        return max(MANY[0], min(MANY[1], int(QUICK * self.most / made)))
+
+    def halved(self, candidate: Candidate, k: int) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""
-        least = k if k == self.grid.first else self.between(method, k // 2, k)
-        for n in (least, k):
-            if self.confirmed(method, n):
-                return n
-        return self.finest(method, k, 1)
+        least = k if k == candidate.first else self.between(candidate, k // 2, k)
+        return next((n for n in rungs(least, k) if self.confirmed(candidate, n)), None) or self.finest(candidate, k, 1)
 
-    def between(self, method: Method, low: int, high: int) -> int:
+    def between(self, candidate: Candidate, low: int, high: int) -> int:
         """A k above ``low``, which is not good enough, up to ``high``, which is: halved thrice."""
         for _ in range(3):
             middle = (low + high) // 2
             if middle in (low, high):
                 break
-            low, high = (low, middle) if self.good(method, middle) else (middle, high)
+            low, high = (low, middle) if self.good(candidate, middle) else (middle, high)
         return high
 
-    def robust(self, method: Method, k: int) -> int | None:
+    def robust(self, candidate: Candidate, k: int) -> int | None:
         """From where on a few more steps are good enough too."""
-        above = [rung for rung in rungs(k, 2 * k) if rung > k and self.affordable(method, rung)]
+        above = [rung for rung in rungs(k, 2 * k) if rung > k and self.affordable(candidate, rung, k)]
         near = sorted({k + 1, *above[:2]})
-        if all(self.good(method, n) for n in near if self.affordable(method, n)):
+        if all(self.good(candidate, n) for n in near if self.affordable(candidate, n, k)):
             return k
-        bad = [rung for rung in sorted({k + 1, *above}) if not self.good(method, rung)]
+        bad = [rung for rung in sorted({k + 1, *above}) if not self.good(candidate, rung)]
         return next((rung for rung in above if rung > bad[-1]), None)
 
-    def expected(self, method: Method, k: int) -> float | None:
+    def expected(self, candidate: Candidate, k: int) -> float | None:
         """The error that the order tells from the finest doubling below k whose error falls."""
-        rung = self.grid.first
+        rung = candidate.first
         while 2 * rung < k:
             rung *= 2
         if rung >= k:
             return None
-        error = self.look(method, rung).error
-        return error * (rung / k) ** method.order if error < FALLS else None
+        error = candidate.look(rung).error
+        return error * (rung / k) ** candidate.method.order if error < FALLS else None
 
 
 def rungs(low: int, high: int) -> list[int]:

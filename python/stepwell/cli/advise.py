@@ -26,6 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing in a frame (default: the frame)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
+    parser.add_argument("--fixed", action="store_true", help="fixed steps only, none of chosen length")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write all of it: .json")
     show.json_option(parser)
 
@@ -39,14 +40,14 @@ def command(args: argparse.Namespace) -> None:
     if not args.json:
         show.need_rich()
 
-    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost)
+    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed)
     if args.output is not None:
         found.to_json(args.output)
     if args.json:
         show.print_json(found.data())
         return
     written = [f"written: {args.output}"] if args.output is not None else []
-    rejected = [f"{each.method}: {each.reason}" for each in found.rejected]
+    rejected = found.rejections()
     if found.ranked:
         per = "a frame" if frame is not None else "a unit of time"
         head = [name.replace("evaluations", f"evaluations {per}").replace("ns>", f"ns {per}>") for name in COLUMNS]

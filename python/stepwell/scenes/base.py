@@ -109,7 +109,7 @@ class Scene:
         exact, known = self._solution(run.t)
         with np.errstate(all="ignore"):
             errors = [
-                _length(block - true, shape) / scale
+                _relative(_length(block - true, shape), scale)
                 for block, true, shape, scale in zip((run.v, run.y), exact, self._shapes, self.scales, strict=True)
             ]
         error = np.maximum(*errors)
@@ -133,7 +133,7 @@ class Scene:
         """The larger of both blocks' lengths in each kept state, shape (saved,), in the exact solution's ``scales``."""
         with np.errstate(all="ignore"):
             lengths = [
-                _length(block, shape) / scale
+                _relative(_length(block, shape), scale)
                 for block, shape, scale in zip((run.v, run.y), self._shapes, self.scales, strict=True)
             ]
         return np.maximum(*lengths)
@@ -168,6 +168,11 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<scene {self.name}: {self.title}, dt = {self.dt:g}, horizon {self.horizon:g}>"
+
+
+def _relative(length: Array, scale: float) -> Array:
+    """Lengths in a scale; in that of a block that is always zero, or empty, zero is zero and all else infinite."""
+    return length / scale if scale else np.where(length == 0.0, 0.0, np.inf)
 
 
 def _length(block: Array, shape: Shape) -> Array:

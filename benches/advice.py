@@ -1,0 +1,229 @@
+"""Advice beside brute force: ``python -m benches.advice [SCENE …]``.
+
+Prints for each scene and tolerance what is advised, how wrong that is, and what it costs beside the best. Brute force knows
+nothing of the search. It makes the runs of all methods over a ladder of numbers of steps, and of all tolerances, in the order of
+what they cost, until one is good enough.
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import math
+import sys
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import stepwell as sw
+from stepwell.advice import Advice, Row
+from stepwell.errors import ControlWarning, DivergenceWarning, ToleranceWarning, UnsupportedError
+from stepwell.methods import Method
+from stepwell.scenes import Scene
+from stepwell.scenes.table import tabled
+from stepwell.scenes.truth import with_truth
+
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+#: Numbers of steps are this far apart, tolerances that far: 4 % and 3 % in cost. No rung of the search's ladders is meant.
+STEPS, LADDER = 1.04, 10 ** (1 / 14)
+
+#: States of a run that are compared with the truth: a few are enough to refuse it, many to take it.
+SOME, ALL = 200, 50_000
+
+#: A run with a tolerance is asked for its state at so many even times, and in so many further runs at as many others, which are
+#: even in the path's length.
+ASKED, OTHERS = 10, 24
+
+#: The table of the true motion is as close to it as this, in the largest lengths.
+CLOSE = 1e-9
+
+
+#: So many rows of an advice are run in full.
+CHECKED = 3
+
+
+class Try(NamedTuple):
+    """A run: by which method, with so many steps or that tolerance, what it costs in rate evaluations, and how wrong it is."""
+
+    method: str
+    steps: int
+    tolerance: float | None
+    evaluations: int
+    error: float
+
+
+class Brute:
+    """All that can be tried on a scene, with any steps or in frames."""
+
+    def __init__(self, scene: Scene, frame: float | None = None, ratio: float = STEPS) -> None:
+        known = with_truth(scene)
+        assert known.exact is not None
+        horizon = min(known.horizon, known.until)
+        if frame is not None and horizon < known.horizon:
+            horizon = math.floor(horizon / frame) * frame
+        self.frames = None if frame is None else math.ceil(horizon / frame - 1e-9)
+        self.end = horizon if frame is None or self.frames is None else frame * self.frames
+        self.frame, self.ratio = frame, ratio
+        exact, last = known.exact, min(self.end, known.until)
+        scales = replace(known, horizon=horizon).scales
+        table = tabled(exact, last, scales, CLOSE)
+        self.scene = replace(known, exact=lambda t: table(np.minimum(t, last)), until=math.inf, horizon=horizon)
+        times = np.random.default_rng(5).uniform(0.0, last, 500)
+        for a, b, scale in zip(table(times), exact(times), scales, strict=True):
+            assert np.abs(a - b).max(initial=0.0) <= 10 * CLOSE * scale
+        self._errors: dict[tuple[Any, ...], float] = {}
+        self._paced: dict[str, list[Try]] = {}
+
+    # ---- fixed steps
+
+    def error(self, method: str, dt: float, steps: int, samples: int = ALL) -> float:
+        """The largest state error of a run with fixed steps, of which so many states are compared."""
+        key = (method, dt, steps, samples)
+        if key not in self._errors:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DivergenceWarning)
+                warnings.simplefilter("ignore", ControlWarning)
+                run = self.scene.run(method, dt, steps=steps, every=max(1, steps // samples))
+            self._errors[key] = float(self.scene.state_error(run).max())
+        return self._errors[key]
+
+    def counts(self, evaluations: int, most: float) -> Iterator[tuple[float, int]]:
+        """Steps and how many, up to that many rate evaluations."""
+        if self.frame is not None and self.frames is not None:
+            for k in range(1, int(most / evaluations / self.frames) + 1):
+                yield self.frame / k, k * self.frames
+            return
+        last, power = 0, 0
+        while (n := round(4 * self.ratio**power)) * evaluations <= most:
+            if n > last:
+                yield self.end / n, n
+            last, power = n, power + 1
+
+    def _ladder(self, i: int, method: Method, most: float) -> Iterator[tuple[int, int, float, int]]:
+        return ((n * method.evaluations, i, dt, n) for dt, n in self.counts(method.evaluations, most))
+
+    def fixed(self, tolerance: float, most: float) -> Try | None:
+        """The cheapest with fixed steps: runs are made in the order of their cost until one is good enough."""
+        able = [each for each in sw.methods() if self._able(each)]
+        ladders = [self._ladder(i, method, most) for i, method in enumerate(able)]
+        for cost, i, dt, n in heapq.merge(*ladders):
+            name = able[i].name
+            if all(self.error(name, dt, n, samples) <= tolerance for samples in (SOME, ALL)):
+                return Try(name, n, None, cost, self.error(name, dt, n))
+        return None
+
+    # ---- steps of chosen length
+
+    def asked(self) -> Any:
+        """When a run with a tolerance is asked for its state: at the frames, or at ten even times."""
+        if self.frame is not None and self.frames is not None:
+            return self.frame * np.arange(1.0, self.frames + 1)
+        return np.linspace(0.0, self.end, ASKED + 1)[1:]
+
+    def paced(self, method: str, tolerance: float, others: int = OTHERS) -> Try:
+        """A run with a tolerance, and what is between the times at which it is asked, in further runs."""
+        asked = self.asked()
+        run = self._integrated(method, tolerance, asked)
+        assert run.paces is not None
+        cost = int(run.paces.evaluations)
+        tried = int(run.paces.accepted + run.paces.rejected)
+        error = math.inf if run.status else float(self.scene.state_error(run).max())
+        between = self._between()
+        for i in range(others if error < math.inf else 0):
+            run = self._integrated(method, tolerance, np.union1d(asked, between[i::OTHERS]))
+            error = max(error, float(self.scene.state_error(run).max()))
+        return Try(method, tried, tolerance, cost, error)
+
+    def _between(self) -> Any:
+        assert self.scene.exact is not None
+        t = np.linspace(0.0, self.scene.horizon, 20_001)
+        length = np.zeros(20_000)
+        for block, scale in zip(self.scene.exact(t), self.scene.scales, strict=True):
+            change = np.diff(block.reshape(len(t), -1), axis=0)
+            length += np.sqrt((change * change).sum(axis=1)) / (scale or 1.0)
+        reached = np.concatenate([[0.0], np.cumsum(length)])
+        return np.interp((np.arange(OTHERS * ASKED) + 0.5) / (OTHERS * ASKED) * reached[-1], reached, t)
+
+    def _integrated(self, method: str, tolerance: float, at: Any) -> sw.Run:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ToleranceWarning)
+            return sw.integrate(self.scene.system, method, v=self.scene.v, y=self.scene.y, tolerance=tolerance, at=at)
+
+    def chosen(self, tolerance: float, most: float) -> Try | None:
+        """The cheapest with a tolerance, of those that cost no more than ``most``."""
+        found: list[Try] = []
+        for method in sw.methods():
+            if method.error_order is None or self.scene.control is not None:
+                continue
+            kept = self._paced.setdefault(method.name, [])
+            while LADDER ** -len(kept) > 1e-15 and (not kept or kept[-1].evaluations <= most or kept[-1].error == math.inf):
+                kept.append(self.paced(method.name, LADDER ** -len(kept)))
+            found += [each for each in kept if each.error <= tolerance and each.evaluations <= most]
+        return min(found, key=lambda each: each.evaluations, default=None)
+
+    # ---- both
+
+    def best(self, tolerance: float, most: float) -> Try | None:
+        """The cheapest of all that costs no more than ``most`` rate evaluations, or None."""
+        paced = self.chosen(tolerance, most)
+        return self.fixed(tolerance, most if paced is None else paced.evaluations) or paced
+
+    def advised(self, row: Row) -> float:
+        """The error of a row of advice, run in full."""
+        if row.tolerance is None:
+            return self.error(row.method.name, row.dt, row.steps)
+        return self.paced(row.method.name, row.tolerance).error
+
+    def _able(self, method: Method) -> bool:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                self.scene.run(method, 1e-4 * self.scene.dt, steps=1)
+            except UnsupportedError:
+                return False
+        return True
+
+
+def cost_of(advice: Advice) -> float:
+    """Rate evaluations of the run of what is advised."""
+    assert advice.best is not None
+    return float(advice.best.method.evaluations * advice.best.steps)
+
+
+def cell(brute: Brute, tolerance: float) -> str:
+    """What is advised, the largest error of the first rows over the tolerance, and the cost over the least there is."""
+    begin = time.perf_counter()
+    advice = sw.advise(brute.scene, frame=brute.frame, tolerance=tolerance, cost="evaluations")
+    seconds = time.perf_counter() - begin
+    best = advice.best
+    if best is None:
+        return "nothing fits"
+    error = max(brute.advised(row) for row in advice.ranked[:CHECKED])
+    cheapest = brute.best(tolerance, cost_of(advice))
+    ratio = cost_of(advice) / (cheapest.evaluations if cheapest else cost_of(advice))
+    how = f"{best.substeps or best.steps}" if best.tolerance is None else f"to {best.tolerance:g}"
+    said = f"{best.method.name} {how}, error {error / tolerance:.3f}, cost {ratio:.3f}, {seconds:.1f} s"
+    print(f"{brute.scene.name} {tolerance:g}: {said}; {cheapest}", file=sys.stderr, flush=True)
+    return f"{best.method.name} {how}<br>{error / tolerance:.2f}, {ratio:.2f}"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Search, try, show."""
+    parser = argparse.ArgumentParser(prog="python -m benches.advice", description=__doc__)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="which scenes (default: all)")
+    parser.add_argument("--frame", type=float, help="frame in units of time (default: any step)")
+    given = parser.parse_args(arguments)
+    scenes = [sw.scenes.scene(name) for name in given.scenes] or sw.scenes.scenes()
+    print("| scene | " + " | ".join(f"{tolerance:g}" for tolerance in TOLERANCES) + " |")
+    print("|---" * (1 + len(TOLERANCES)) + "|")
+    for scene in scenes:
+        brute = Brute(scene, given.frame)
+        print(f"| {scene.name} | " + " | ".join(cell(brute, tolerance) for tolerance in TOLERANCES) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
