@@ -14,6 +14,7 @@ import pytest
 import stepwell as sw
 from stepwell import cli
 from stepwell.errors import ArgumentError, DivergenceWarning, DTypeError
+from stepwell.result import Status
 from stepwell.scenes import Scene
 from stepwell.scenes.truth import with_truth
 
@@ -61,6 +62,18 @@ def good(scene: Scene, method: str, dt: float, steps: int, tolerance: float) -> 
     return all(error_of(scene, method, dt, steps, samples) <= tolerance for samples in (SOME, ALL))
 
 
+def paced(scene: Scene, method: str, tolerance: float, at: Any, most: int) -> tuple[float, int]:
+    """The largest state error of a run with a tolerance, infinite if it did not get there; and all steps that were tried."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.ToleranceWarning)
+        run = sw.integrate(scene.system, method, v=scene.v, y=scene.y, tolerance=tolerance, at=at, max_steps=max(1, most))
+    assert run.paces is not None
+    tried = int(run.paces.accepted + run.paces.rejected)
+    with np.errstate(invalid="ignore"):
+        error = float(scene.state_error(run).max())
+    return error if run.status == Status.OK else math.inf, tried
+
+
 def cheaper(scene: Scene, advice: sw.advice.Advice, ratio: float = RATIO) -> list[tuple[float, str, int]]:
     """All that brute force finds good enough at less than the advised evaluations over ``WORTH``: cost, method and steps."""
     found = []
@@ -81,16 +94,34 @@ def cheaper(scene: Scene, advice: sw.advice.Advice, ratio: float = RATIO) -> lis
             if good(scene, method.name, dt, steps, advice.tolerance):
                 found.append((method.evaluations / dt, method.name, steps))
                 break
+        if method.error_order is None or scene.control is not None:
+            continue
+        end = advice.asked[-1]
+        for j in range(100):  # six tolerances in each factor of ten, until a run is too dear
+            tolerance = 10 ** (-j / 6)
+            most = int(min(bound * end / method.evaluations, 1e6))
+            error, tried = paced(scene, method.name, tolerance, advice.asked, most)
+            if error <= advice.tolerance:
+                found.append((method.evaluations * tried / end, f"{method.name}, tolerance {tolerance:.1e}", tried))
+            if error <= advice.tolerance or (tried >= most and tolerance < advice.tolerance):
+                break
     return sorted(found)
 
 
 def assert_true(scene: Scene, advice: sw.advice.Advice) -> None:
     """Every ranked row, run in full, is as wrong as it says and no more than allowed."""
     for row in advice.ranked:
-        error = error_of(scene, row.method.name, row.dt, row.steps)
+        if row.tolerance is not None:
+            error, tried = paced(scene, row.method.name, row.tolerance, advice.asked, row.steps + 1)
+            assert tried == row.steps
+            assert row.evaluations_per_time == pytest.approx(row.method.evaluations * tried / advice.asked[-1], rel=1e-12)
+        else:
+            error = error_of(scene, row.method.name, row.dt, row.steps)
+            assert row.evaluations_per_time == row.method.evaluations / row.dt
         assert error <= advice.tolerance
         assert error <= row.error * (1 + 1e-6) + 1e-9
-        assert row.evaluations_per_time == row.method.evaluations / row.dt
+        if row.tolerance is not None:
+            continue
         if advice.frame is not None:
             assert row.substeps is not None
             assert row.dt == advice.frame / row.substeps
@@ -118,8 +149,11 @@ def test_the_advice_is_true_and_near_the_cheapest(name: str, tolerance: float) -
     assert advice.best is not None
     assert_true(scene, advice)
     assert cheaper(scene, advice) == []
-    listed = [row.method.name for row in advice.ranked] + [each.method for each in advice.rejected]
-    assert sorted(listed) == sorted(m.name for m in sw.methods())
+    listed = [(row.method.name, row.by) for row in advice.ranked] + [(each.method, each.by) for each in advice.rejected]
+    assert len(listed) == len(set(listed))
+    assert {(m.name, "step") for m in sw.methods()} <= set(listed)
+    if scene.control is None:
+        assert {(m.name, "tolerance") for m in sw.methods() if m.error_order} <= set(listed)
 
 
 @pytest.mark.parametrize("name", [*QUICK, "chain", "figure_eight"])
@@ -130,7 +164,8 @@ def test_the_advice_for_a_frame_is_true_and_near_the_cheapest(name: str, toleran
     assert_true(truth_of(name), advice)
     assert cheaper(truth_of(name), advice) == []
     for row in advice.ranked:
-        assert row.evaluations_per_frame == row.method.evaluations * (row.substeps or 0)
+        if row.tolerance is None:
+            assert row.evaluations_per_frame == row.method.evaluations * (row.substeps or 0)
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("pythagorean", 1e-1), ("energy_control", 1e-2), ("plummer", 1e-4)])
@@ -147,10 +182,10 @@ def test_ranking_by_time_is_by_measured_time() -> None:
     seconds = [row.seconds_per_frame for row in advice.ranked]
     assert advice.cost == "time"
     assert seconds == sorted(seconds)  # type: ignore[type-var]
-    for row in advice.ranked:
+    for row in (row for row in advice.ranked if row.tolerance is None):
         assert row.substeps is not None
-        assert row.seconds_per_frame == 1e-9 * row.ns_per_step * row.substeps
-        assert row.seconds_per_time == 1e-9 * row.ns_per_step / row.dt
+        assert row.seconds_per_frame == pytest.approx(1e-9 * row.ns_per_step * row.substeps, rel=1e-12)
+        assert row.seconds_per_time == pytest.approx(1e-9 * row.ns_per_step / row.dt, rel=1e-12)
         assert row.objects == int(0.3 / row.seconds_per_frame)
 
 
@@ -211,7 +246,7 @@ def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: st
 def test_modes_predict_the_error(name: str) -> None:
     """A free linear system does what its modes say; some hundred roundings of each of a few thousand steps may differ."""
     advice = sw.advise(name, frame=None, tolerance=1e-3, cost="evaluations")
-    for row in advice.ranked:
+    for row in (row for row in advice.ranked if row.tolerance is None):
         assert row.predicted_by == "modes"
         assert row.predicted == pytest.approx(row.error, rel=0.01)
 
@@ -239,6 +274,9 @@ def test_the_margin_is_where_it_blows_up(name: str) -> None:
     advice = sw.advise(scene, frame=None, tolerance=1e-1, cost="evaluations")
     tried = 0
     for row in advice.ranked:
+        if row.tolerance is not None:
+            assert (row.limit, row.limit_by, row.margin) == (None, "none", math.inf)
+            continue
         assert row.limit_by == "linear"
         if not row.limit or not math.isfinite(row.limit):
             continue
@@ -260,7 +298,7 @@ def test_the_margin_is_where_it_blows_up(name: str) -> None:
 def test_the_observed_limit_is_where_runs_begin_to_grow() -> None:
     advice = sw.advise("clover", frame=None, tolerance=1e-2, cost="evaluations")
     scene = truth_of("clover")
-    for row in advice.ranked[:3]:
+    for row in [row for row in advice.ranked if row.tolerance is None][:3]:
         assert row.limit_by == "frozen"
         assert row.dt <= row.observed_limit
         assert row.margin == row.observed_limit / row.dt
@@ -302,7 +340,7 @@ def test_nothing_meets_the_tolerance() -> None:
     scene = truth_of("oscillator")
     steps = math.ceil(scene.horizon / 0.5 - 1e-9) * gap.substeps
     assert error_of(scene, gap.method, 0.5 / gap.substeps, steps, 1000) <= 2 * gap.least_error < 1e-9
-    assert "No number of steps that was tried meets the tolerance" in str(advice)
+    assert "Nothing that was tried meets the tolerance" in str(advice)
 
 
 def test_methods_that_the_system_refuses_are_named() -> None:

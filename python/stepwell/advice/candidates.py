@@ -95,7 +95,7 @@ class Paced:
         self.trials, self.power = trials, method.error_order
         scale = max(trials.scene.scales)
         self.least = LEAST_TOLERANCE * min(1.0, scale)
-        # A single step may be wrong by the tolerance, and by that share of the length: where that is more than is allowed, it is luck.
+        # A single step may be wrong by the tolerance and by that share of the length; more than what is allowed is luck.
         most = min(1.0, trials.allowed * scale / (1.0 + scale))
         self.first = math.ceil(COARSEST * most ** (-1.0 / self.power))
 

@@ -14,7 +14,7 @@ from ..stability import Mode, analyse, maps, stability_limit
 from .trials import Trials
 
 #: Times at which a prediction is compared with the exact modes.
-SAMPLES = 1000
+SAMPLES = 10_000
 
 #: Modes that are nearer to each other than this lets one tell give no prediction.
 CONDITION = 1e8

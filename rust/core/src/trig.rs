@@ -38,34 +38,3 @@ pub fn sin(x: f64) -> f64 {
     let s = r + (r * z) * (S[0] + z * (odd + z * even));
     f64::from_bits(s.to_bits() ^ (y.to_bits() << 63)) // sin(r + nπ) = (−1)ⁿ·sin r
 }
-
-#[cfg(test)]
-mod tests {
-    use super::sin;
-
-    #[test]
-    fn agrees_with_libm() {
-        // Both are within 1 ulp of the true sine, an ulp of 1 is 2⁻⁵² and results are at most 1: 2 ulp apart at most.
-        let mut x = -1.0e3;
-        while x < 1.0e3 {
-            assert!((sin(x) - f64::sin(x)).abs() <= 2.0 * f64::EPSILON, "sin({x})");
-            x += 0.0137;
-        }
-        for big in [1.0e5, 123_456.789, -9.9e5, 1.0e6] {
-            assert!((sin(big) - f64::sin(big)).abs() <= 2.0 * f64::EPSILON, "sin({big})");
-        }
-    }
-
-    #[test]
-    fn error_grows_no_faster_than_the_argument_is_known() {
-        for big in [1.0e7, 3.3e9, 1.0e12] {
-            // Half an ulp of the argument moves the sine by up to |x|·2⁻⁵³; the reduction's roundings are a few of those.
-            assert!((sin(big) - f64::sin(big)).abs() <= 4.0 * big * f64::EPSILON, "sin({big})");
-        }
-    }
-
-    #[test]
-    fn not_a_number_stays_one() {
-        assert!(sin(f64::NAN).is_nan() && sin(f64::INFINITY).is_nan());
-    }
-}
