@@ -93,15 +93,12 @@ class Brute:
 
     def counts(self, evaluations: int, most: float) -> Iterator[tuple[float, int]]:
         """Steps and how many, up to that many rate evaluations."""
-        if self.frame is not None and self.frames is not None:
-            for k in range(1, int(most / evaluations / self.frames) + 1):
-                yield self.frame / k, k * self.frames
-            return
+        first, span, spans = (4, self.end, 1) if self.frame is None or self.frames is None else (1, self.frame, self.frames)
         last, power = 0, 0
-        while (n := round(4 * self.ratio**power)) * evaluations <= most:
-            if n > last:
-                yield self.end / n, n
-            last, power = n, power + 1
+        while (k := round(first * self.ratio**power)) * spans * evaluations <= most:
+            if k > last:
+                yield span / k, k * spans
+            last, power = k, power + 1
 
     def _ladder(self, i: int, method: Method, most: float) -> Iterator[tuple[int, int, float, int]]:
         return ((n * method.evaluations, i, dt, n) for dt, n in self.counts(method.evaluations, most))

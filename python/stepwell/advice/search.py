@@ -28,6 +28,9 @@ RUNGS = 8
 #: these, or as many up to the most as together make the share QUICK of the evaluations that one run may make.
 NEAR, FEW, RISES, FAR, MANY, QUICK = 2.5, 6, 1.3, 8.0, (8, 64), 1 / 128
 
+#: A dip of the error is followed so many times, each time within half as much.
+HALVINGS = 8
+
 #: An error below this is taken to fall with the order of the method at most; above it a run may be wrong in other ways.
 FALLS = 0.3
 
@@ -120,10 +123,9 @@ class Search:
             if cost > 2.0 * DOMINATED * best:
                 missed[name] = Missed("dominated", k, candidate.look(k), None)
                 continue
-            # Two octaves back if that might be the cheapest of all, for a dip may hide there; else the one it must be in.
-            # One that cannot be the cheapest is halved, as if errors were even.
-            runner_up = cost > 4.0 * best
-            least = self.halved(candidate, k) if runner_up else self.finest(candidate, k, 4 if cost <= 3.0 * best else 2)
+            # Three octaves back if that might be the cheapest of all, for a dip may hide there.
+            # One that cannot be is halved, as if errors were even.
+            least = self.halved(candidate, k) if cost > 4.0 * best else self.finest(candidate, k, 8)
             if least is None:
                 missed[name] = Missed("inaccurate", k, candidate.look(k), None)
                 continue
@@ -171,7 +173,7 @@ class Search:
         return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
     def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
-        """The least k that is good enough, from the last doubling that was not, or the one before it, to a little more than k."""
+        """The least k that is good enough, from so many times less than a good one to a little more."""
         regular = self.regular(candidate, k)
         low = max(candidate.first, k // back, regular)
         failed, ladder = 0, rungs(low, 4 * k)
@@ -179,7 +181,7 @@ class Search:
             if not self.affordable(candidate, rung, failed or low):
                 return None
             if self.good(candidate, rung):
-                least = self.between(candidate, failed, rung) if failed else rung
+                least = self.between(candidate, failed, rung) if 0 < failed < rung else rung
                 for chosen in (least, rung):
                     if self.confirmed(candidate, chosen):
                         return chosen
@@ -203,20 +205,37 @@ class Search:
         return int(BEFORE * k / 2 * 2.0 ** (math.log2(second / allowed) / powers[1]))
 
     def closer(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
-        """The ladder, with rungs between where the next may be good enough by chance.
+        """The ladder, with more k where the next may be good enough by chance.
 
-        That is where an error just misses, and where errors rise with more steps: of a chaotic motion they are a lottery.
+        That is where an error just misses, where errors rise with more steps, for of a chaotic motion they are a lottery, and
+        where they had a dip before that, for there an error may change its sign.
         """
-        least, allowed = math.inf, self.allowed(candidate)
+        allowed = self.allowed(candidate)
+        least, before, last = math.inf, (0, math.inf), (0, math.inf)
         for rung, following in zip(ladder, [*ladder[1:], ladder[-1]], strict=True):
             yield rung
             error = candidate.look(rung).error
+            if candidate.by == "step" and before[1] > last[1] <= FAR * allowed and error > RISES * last[1] and before[0]:
+                yield from self.dip(candidate, before[0], last[0], rung)
+            before, last = last, (rung, error)
             ragged = RISES * least < error and least <= FAR * allowed
             least = min(least, error)
             if ragged or error <= NEAR * allowed:
                 yield from range(
                     rung + 1, following, max(1, (following - rung) // (self.many(candidate, rung) if ragged else FEW))
                 )
+
+    def dip(self, candidate: Candidate, low: int, middle: int, high: int) -> Iterator[int]:
+        """Towards the least error between two k, from one between them where it is less."""
+        for _ in range(HALVINGS):
+            inner = sorted({(low + middle) // 2, (middle + high) // 2} - {low, middle, high})
+            if not inner:
+                return
+            yield from inner
+            ladder = sorted({low, middle, high, *inner})
+            errors = [candidate.look(k).error for k in ladder]
+            i = min(max(1, errors.index(min(errors))), len(ladder) - 2)
+            low, middle, high = ladder[i - 1 : i + 2]
 
     def many(self, candidate: Candidate, k: int) -> int:
         """How many more are tried between two rungs where errors are a lottery: the more, the quicker the runs."""
