@@ -40,7 +40,7 @@ lint: .venv/test
 	$(BIN)/python -m mypy.stubtest stepwell._core --concise
 
 rust-test:
-	cargo test --workspace --quiet
+	cargo test --release --workspace --quiet
 
 python-test: .venv/test
 	$(BIN)/python -m pytest -q
