@@ -237,11 +237,12 @@ def test_the_control_that_is_given_is_not_changed() -> None:
 @pytest.mark.parametrize("method", STEPPED)
 @pytest.mark.parametrize("force", FORCES)
 def test_scaling_keeps_the_energy_to_rounding(force: str, method: str) -> None:
-    """E is a sum of six terms below 10 in size: some roundings of 1e-15 each. Every method leaves it by more alone."""
+    """E is a sum of six terms below 10 in size: some roundings of 1e-15 each. Methods of order up to 5 leave it by more alone."""
     options: dict[str, Any] = {"dt": 0.01, "steps": 100, "every": 1}
     run = sw.integrate(sw.NBody(force=force), method, **START, **options, control=sw.Projection())
     assert np.ptp(run.energy) < 2e-14
-    assert np.ptp(sw.integrate(sw.NBody(force=force), method, **START, **options).energy) > 4e-13
+    alone = np.ptp(sw.integrate(sw.NBody(force=force), method, **START, **options).energy)
+    assert alone > 4e-13 or sw.method(method).order > 5
 
 
 @pytest.mark.parametrize("method", STEPPED)
