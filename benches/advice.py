@@ -8,12 +8,13 @@ what they cost, until one is good enough.
 from __future__ import annotations
 
 import argparse
+import functools
 import heapq
 import math
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -28,8 +29,9 @@ from stepwell.scenes.truth import with_truth
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
-#: Numbers of steps are this far apart, tolerances that far: 4 % and 3 % in cost. No rung of the search's ladders is meant.
-STEPS, LADDER = 1.04, 10 ** (1 / 14)
+#: Numbers of steps are this far apart, and tolerances by this power of it, which costs as much with a method of that order. No
+#: rung of the search's ladders is meant. Tolerances go down to the last.
+RATIO, POWER, LAST = 1.04, 5, 1e-15
 
 #: States of a run that are compared with the truth: a few are enough to refuse it, many to take it.
 SOME, ALL = 200, 50_000
@@ -47,27 +49,40 @@ CHECKED = 3
 
 
 class Try(NamedTuple):
-    """A run: by which method, with so many steps or that tolerance, what it costs in rate evaluations, and how wrong it is."""
+    """A run: by which method, with so many steps, chosen to that tolerance or fixed, what it costs, and how wrong it is."""
 
     method: str
     steps: int
     tolerance: float | None
-    evaluations: int
+    cost: float
     error: float
 
 
 class Brute:
-    """All that can be tried on a scene, with any steps or in frames."""
+    """All that can be tried on a scene, with any steps or in frames.
 
-    def __init__(self, scene: Scene, frame: float | None = None, ratio: float = STEPS) -> None:
-        known = with_truth(scene)
-        assert known.exact is not None
-        horizon = min(known.horizon, known.until)
-        if frame is not None and horizon < known.horizon:
-            horizon = math.floor(horizon / frame) * frame
+    A step costs its rate evaluations, or what ``prices`` say by the name of a row, ``"merson"`` or ``"merson, tolerance"``.
+    """
+
+    def __init__(
+        self, scene: Scene, frame: float | None = None, ratio: float = RATIO, prices: Mapping[str, float] | None = None
+    ) -> None:
+        self.prices: dict[str, float] = {}
+        for method in sw.methods():
+            self.prices |= dict.fromkeys((method.name, f"{method.name}, tolerance"), float(method.evaluations))
+        self.prices |= prices or {}
+        horizon = scene.horizon
         self.frames = None if frame is None else math.ceil(horizon / frame - 1e-9)
         self.end = horizon if frame is None or self.frames is None else frame * self.frames
-        self.frame, self.ratio = frame, ratio
+        known = with_truth(replace(scene, horizon=max(horizon, self.end)))
+        assert known.exact is not None
+        if known.until < self.end and frame is not None:
+            self.frames = math.floor(known.until / frame)
+            self.end = frame * self.frames
+        else:
+            self.end = min(self.end, known.until)
+        horizon = min(horizon, self.end)
+        self.given, self.frame, self.ratio = scene, frame, ratio
         exact, last = known.exact, min(self.end, known.until)
         scales = replace(known, horizon=horizon).scales
         table = tabled(exact, last, scales, CLOSE)
@@ -91,17 +106,18 @@ class Brute:
             self._errors[key] = float(self.scene.state_error(run).max())
         return self._errors[key]
 
-    def counts(self, evaluations: int, most: float) -> Iterator[tuple[float, int]]:
-        """Steps and how many, up to that many rate evaluations."""
+    def counts(self, price: float, most: float) -> Iterator[tuple[float, int]]:
+        """Steps and how many, up to that cost."""
         first, span, spans = (4, self.end, 1) if self.frame is None or self.frames is None else (1, self.frame, self.frames)
         last, power = 0, 0
-        while (k := round(first * self.ratio**power)) * spans * evaluations <= most:
+        while (k := round(first * self.ratio**power)) * spans * price <= most:
             if k > last:
                 yield span / k, k * spans
             last, power = k, power + 1
 
-    def _ladder(self, i: int, method: Method, most: float) -> Iterator[tuple[int, int, float, int]]:
-        return ((n * method.evaluations, i, dt, n) for dt, n in self.counts(method.evaluations, most))
+    def _ladder(self, i: int, method: Method, most: float) -> Iterator[tuple[float, int, float, int]]:
+        price = self.prices[method.name]
+        return ((n * price, i, dt, n) for dt, n in self.counts(price, most))
 
     def fixed(self, tolerance: float, most: float) -> Try | None:
         """The cheapest with fixed steps: runs are made in the order of their cost until one is good enough."""
@@ -121,20 +137,19 @@ class Brute:
             return self.frame * np.arange(1.0, self.frames + 1)
         return np.linspace(0.0, self.end, ASKED + 1)[1:]
 
-    def paced(self, method: str, tolerance: float, others: int = OTHERS) -> Try:
+    def paced(self, method: str, tolerance: float) -> Try:
         """A run with a tolerance, and what is between the times at which it is asked, in further runs."""
         asked = self.asked()
         run = self._integrated(method, tolerance, asked)
         assert run.paces is not None
-        cost = int(run.paces.evaluations)
         tried = int(run.paces.accepted + run.paces.rejected)
         error = math.inf if run.status else float(self.scene.state_error(run).max())
-        between = self._between()
-        for i in range(others if error < math.inf else 0):
-            run = self._integrated(method, tolerance, np.union1d(asked, between[i::OTHERS]))
+        for i in range(OTHERS if error <= 1.0 else 0):
+            run = self._integrated(method, tolerance, np.union1d(asked, self._between[i::OTHERS]))
             error = max(error, float(self.scene.state_error(run).max()))
-        return Try(method, tried, tolerance, cost, error)
+        return Try(method, tried, tolerance, tried * self.prices[f"{method}, tolerance"], error)
 
+    @functools.cached_property
     def _between(self) -> Any:
         assert self.scene.exact is not None
         t = np.linspace(0.0, self.scene.horizon, 20_001)
@@ -157,17 +172,20 @@ class Brute:
             if method.error_order is None or self.scene.control is not None:
                 continue
             kept = self._paced.setdefault(method.name, [])
-            while LADDER ** -len(kept) > 1e-15 and (not kept or kept[-1].evaluations <= most or kept[-1].error == math.inf):
-                kept.append(self.paced(method.name, LADDER ** -len(kept)))
-            found += [each for each in kept if each.error <= tolerance and each.evaluations <= most]
-        return min(found, key=lambda each: each.evaluations, default=None)
+            while not kept or kept[-1].cost <= most or kept[-1].error == math.inf:
+                following = self.ratio ** (-POWER * len(kept))
+                if following < LAST:
+                    break
+                kept.append(self.paced(method.name, following))
+            found += [each for each in kept if each.error <= tolerance and each.cost <= most]
+        return min(found, key=lambda each: each.cost, default=None)
 
     # ---- both
 
     def best(self, tolerance: float, most: float) -> Try | None:
-        """The cheapest of all that costs no more than ``most`` rate evaluations, or None."""
+        """The cheapest of all that costs no more than ``most``, or None."""
         paced = self.chosen(tolerance, most)
-        return self.fixed(tolerance, most if paced is None else paced.evaluations) or paced
+        return self.fixed(tolerance, most if paced is None else paced.cost) or paced
 
     def advised(self, row: Row) -> float:
         """The error of a row of advice, run in full."""
@@ -184,24 +202,22 @@ class Brute:
                 return False
         return True
 
-
-def cost_of(advice: Advice) -> float:
-    """Rate evaluations of the run of what is advised."""
-    assert advice.best is not None
-    return float(advice.best.method.evaluations * advice.best.steps)
+    def cost(self, advice: Advice) -> float:
+        """That of the whole run of what is advised; without end if nothing is."""
+        return math.inf if advice.best is None else self.prices[advice.best.name] * advice.best.steps
 
 
 def cell(brute: Brute, tolerance: float) -> str:
     """What is advised, the largest error of the first rows over the tolerance, and the cost over the least there is."""
     begin = time.perf_counter()
-    advice = sw.advise(brute.scene, frame=brute.frame, tolerance=tolerance, cost="evaluations")
+    advice = sw.advise(brute.given, frame=brute.frame, tolerance=tolerance, cost="evaluations")
     seconds = time.perf_counter() - begin
     best = advice.best
     if best is None:
         return "nothing fits"
     error = max(brute.advised(row) for row in advice.ranked[:CHECKED])
-    cheapest = brute.best(tolerance, cost_of(advice))
-    ratio = cost_of(advice) / (cheapest.evaluations if cheapest else cost_of(advice))
+    cheapest = brute.best(tolerance, brute.cost(advice))
+    ratio = brute.cost(advice) / cheapest.cost if cheapest else 1.0
     how = f"{best.substeps or best.steps}" if best.tolerance is None else f"to {best.tolerance:g}"
     said = f"{best.method.name} {how}, error {error / tolerance:.3f}, cost {ratio:.3f}, {seconds:.1f} s"
     print(f"{brute.scene.name} {tolerance:g}: {said}; {cheapest}", file=sys.stderr, flush=True)

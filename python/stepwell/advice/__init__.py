@@ -104,8 +104,16 @@ def advise(
     found, missed = search.run(candidates)
 
     spent = _Spending(known.grid, paced, times)
+    broken = [each for each in candidates if each.name in found and not spent.fits(each, found[each.name].k, budget)]
+    if budget is not None and any(each.by == "tolerance" for each in broken):
+        # What is cheap in the mean but not in its worst frame must not stand in the way of what is dearer and even.
+        rest = [each for each in candidates if each not in broken]
+        useful = max(2.0 * budget, min(spent.longest(each, found[each.name].k) for each in broken))
+        again, _ = search.run(rest, {each.name: spent.steps(each, useful) for each in rest})
+        found |= again
+        missed = {name: why for name, why in missed.items() if name not in again}
     enough = [each for each in candidates if each.name in found]
-    fits = [each for each in enough if budget is None or spent.longest(each, found[each.name].k) <= budget]
+    fits = [each for each in enough if spent.fits(each, found[each.name].k, budget)]
     fits.sort(key=lambda each: search.cost(each, found[each.name].k))
     for each in candidates:
         if each.name in missed:
@@ -163,6 +171,16 @@ class _Spending:
             if self.grid.framed
             else self.mean(candidate, candidate.look(k))
         )
+
+    def fits(self, candidate: Candidate, k: int, budget: float | None) -> bool:
+        """Whether it keeps the budget."""
+        return budget is None or self.longest(candidate, k) <= budget
+
+    def steps(self, candidate: Candidate, budget: float | None) -> float:
+        """The steps in a span for which the budget suffices."""
+        if budget is None:
+            return math.inf
+        return budget / (1e-9 * self.times[candidate.name]) * (1.0 if self.grid.framed else self.grid.end)
 
     def most(self, candidate: Candidate, k: int) -> int:
         """The most steps in a frame."""
@@ -238,7 +256,7 @@ def _shortfall(
     for each in candidates:
         for k in _tries(each, search, spent, budget):
             error = each.look(k).error
-            if error < least and (budget is None or spent.longest(each, k) <= budget):
+            if error < least and spent.fits(each, k, budget):
                 least, best = error, (each, k)
     needs = [(spent.longest(each, found[each.name].k), each.name) for each in candidates if each.name in found]
     needed, by = min(needs) if needs else (None, None)
@@ -258,8 +276,5 @@ def _tries(candidate: Candidate, search: Search, spent: _Spending, budget: float
             k *= 2
             yield k
         return
-    grid = spent.grid
-    most = search.most / (candidate.method.evaluations * grid.spans)
-    if budget is not None:
-        most = min(most, budget / (1e-9 * spent.times[candidate.name]) * (1.0 if grid.framed else grid.end))
+    most = min(search.most / (candidate.method.evaluations * spent.grid.spans), spent.steps(candidate, budget))
     yield from {k for k in (int(most), int(most / 2), int(most / 4)) if k >= candidate.first}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,9 @@ from .motion import grid_of
 
 #: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
 LINES = 6
+
+#: And says of so many rejected ones of each kind why, and names the others.
+REASONS = 2
 
 #: The columns of the table; those whose name ends in ``>`` are flush right.
 COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "ns>", "objects>", "blows up at dt>")
@@ -280,8 +283,11 @@ class Advice:
 
     def _uneven(self, row: Row) -> str:
         unit = "steps a frame" if self.frame is not None else "steps"
-        where = f"from {row.robust:g} {unit} on" if row.tolerance is None else f"from a tolerance of {row.robust or 0:g} down"
-        return f"Errors are not even here: {where if row.robust else 'nowhere near'} all that were tried are good enough too."
+        if row.robust is None:
+            where = "nowhere near"
+        else:
+            where = f"from {row.robust:g} {unit} on" if row.tolerance is None else f"from a tolerance of {row.robust:g} down"
+        return f"Errors are not even here: {where} all that were tried are good enough too."
 
     def _what_would_have_to_give(self, per: str) -> list[str]:
         gap, unit = self.shortfall, "steps a frame" if self.frame is not None else "steps"
@@ -325,18 +331,27 @@ class Advice:
     def _frames(self) -> int:
         return grid_of(self.scene.horizon, self.frame).spans
 
-    def rejections(self) -> list[str]:
-        """Why the others are rejected, a line for each reason."""
-        lines: dict[str, list[str]] = {}
-        for each in self.rejected:
-            lines.setdefault(each.reason, []).append(each.name)
-        return [f"{'; '.join(names)}: {reason}" for reason, names in lines.items()]
+    def rejections(self, most: int | None = None) -> list[str]:
+        """Why the others are rejected, a line for each reason; of each kind no more than ``most``, the others by name."""
+        lines = []
+        for kind in dict.fromkeys(each.kind for each in self.rejected):
+            reasons: dict[str, list[str]] = {}
+            for each in self.rejected:
+                if each.kind == kind:
+                    reasons.setdefault(each.reason, []).append(each.name)
+            said = ["; ".join(names) for names in reasons.values()]
+            lines += [f"{names}: {reason}" for names, reason in zip(said[:most], reasons, strict=False)]
+            if most is not None and len(said) > most:
+                lines.append(f"{kind} likewise: {'; '.join(said[most:])}")
+        return lines
 
     @property
     def title(self) -> str:
         """What was asked."""
         frame = "any step" if self.frame is None else f"frame {self.frame:.4g}"
-        return f"{self.scene.title}: error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
+        per = "a unit of time" if self.frame is None else "a frame"
+        asked = f"error of {self.tolerance:g} or less up to t = {self.scene.horizon:.4g}, {frame}"
+        return f"{self.scene.title}: {asked}; costs are for {per}"
 
     def __str__(self) -> str:
         lines = [self.title, *self.summary()]
@@ -348,12 +363,7 @@ class Advice:
             if len(self.ranked) > LINES:
                 lines.append(f"and {len(self.ranked) - LINES} more")
         if self.rejected:
-            lines.append("")
-            for kind in dict.fromkeys(each.kind for each in self.rejected):
-                these = replace(self, rejected=tuple(each for each in self.rejected if each.kind == kind)).rejections()
-                lines += these[:2]
-                if len(these) > 2:
-                    lines.append(f"{kind} likewise: {'; '.join(line.split(':')[0] for line in these[2:])}")
+            lines += ["", *self.rejections(REASONS)]
         return "\n".join(lines)
 
     def __repr__(self) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from .candidates import Candidate
@@ -111,9 +112,11 @@ class Search:
         made = candidate.look(known)
         return candidate.possible(k) and made.steps * candidate.method.evaluations * (k / known) <= self.most
 
-    def run(self, candidates: Sequence[Candidate]) -> tuple[dict[str, Found], dict[str, Missed]]:
-        """What was found, and what was given up, by the candidate's name."""
-        octaves, missed = self.octaves(candidates)
+    def run(
+        self, candidates: Sequence[Candidate], ceilings: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[dict[str, Found], dict[str, Missed]]:
+        """What was found, and what was given up, by the candidate's name; ``ceilings`` are the most steps in a span, if any."""
+        octaves, missed = self.octaves(candidates, ceilings)
         by_name = {candidate.name: candidate for candidate in candidates}
         found: dict[str, Found] = {}
         best = math.inf
@@ -139,7 +142,7 @@ class Search:
                 found[name] = found[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
         return found, missed
 
-    def octaves(self, candidates: Sequence[Candidate]) -> tuple[dict[str, int], dict[str, Missed]]:
+    def octaves(self, candidates: Sequence[Candidate], ceilings: Mapping[str, float]) -> tuple[dict[str, int], dict[str, Missed]]:
         """For each candidate the first k in a ladder of doublings that is good enough; the cheapest run is always made next."""
         found: dict[str, int] = {}
         missed: dict[str, Missed] = {}
@@ -158,7 +161,8 @@ class Search:
             least = max(2.0, (wanted or 0) / k / DOUBT)
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
-            if not candidate.possible(2 * k) or trial.steps * candidate.method.evaluations * least > self.most:
+            made, ceiling = trial.steps * candidate.method.evaluations, ceilings.get(candidate.name, math.inf)
+            if not candidate.possible(2 * k) or made * least > self.most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
             elif cost * least > DOMINATED * best and not (trial.unstable and candidate.by == "tolerance"):
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, dear=True)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..advice import COSTS, advise
-from ..advice.result import COLUMNS
+from ..advice.result import COLUMNS, REASONS
 from ..errors import ArgumentError
 from ..methods import method
 from ..scenes import scene
@@ -47,11 +47,9 @@ def command(args: argparse.Namespace) -> None:
         show.print_json(found.data())
         return
     written = [f"written: {args.output}"] if args.output is not None else []
-    rejected = found.rejections()
+    rejected = found.rejections(REASONS)
     if found.ranked:
-        per = "a frame" if frame is not None else "a unit of time"
-        head = [name.replace("evaluations", f"evaluations {per}").replace("ns>", f"ns {per}>") for name in COLUMNS]
-        show.table(found.title, head, found.table(), [*found.summary(), "", *rejected, *written])
+        show.table(found.title, COLUMNS, found.table(), [*found.summary(), "", *rejected, *written])
     else:
         print("\n".join([found.title, *found.summary(), "", *rejected, *written]))
 
