@@ -194,7 +194,8 @@ impl<'a> Worker<'a> {
         let mut from = 0;
         while from < members {
             let left = members - from;
-            let narrow = left < self.wide.lanes() && self.narrow.pays_for(left);
+            let lanes = self.wide.lanes();
+            let narrow = left < lanes && self.narrow.pays_for(left, lanes);
             let group = if narrow { &mut self.narrow } else { &mut self.wide };
             let count = left.min(group.lanes());
             let mut job = Job { plan: self.plan, group: group.as_mut(), part: &mut part, from, count, good: &mut self.good };

@@ -125,8 +125,8 @@ pub trait Group: Send + Sync {
     /// How many members it steps together.
     fn lanes(&self) -> usize;
 
-    /// Whether a narrow group is better for so few members than a wide one.
-    fn pays_for(&self, members: usize) -> bool {
+    /// Whether this narrow group, one run of it after another, is better for so few members than one of so many lanes.
+    fn pays_for(&self, members: usize, _lanes: usize) -> bool {
         members <= NARROW
     }
 

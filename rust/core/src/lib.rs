@@ -10,6 +10,7 @@
 //!
 //! [`table::group`] turns the names of a system and a method into a group.
 
+pub mod abreast;
 pub mod adaptive;
 pub mod batch;
 pub mod block;

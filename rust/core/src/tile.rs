@@ -6,9 +6,10 @@
 
 use std::{array::from_fn, marker::PhantomData};
 
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 
 use crate::{
+    abreast::Abreast,
     block::Work,
     group::{Clock, Group, Row, Spec, Table, Width},
     isa::{Baseline, Isa, Task, with_isa},
@@ -125,30 +126,59 @@ impl<'a, const L: usize> View<'a, L> {
     }
 }
 
-struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool> {
+/// Numbers that begin at a cache line. A vector that lies across two lines takes two reads: without this, the same kernel was a fifth
+/// slower or not, as the allocator and the stack had it.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct AtALine<T>(T);
+
+struct Tile<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const W: usize, const PACED: bool> {
     clock: Clock,
     isa: I,
     family: S,
-    constants: [[f64; L]; C],
+    constants: AtALine<[[f64; L]; C]>,
     inputs: Vec<Samples<L>>,
-    v: [[f64; L]; P],
-    y: [[f64; L]; Q],
+    v: AtALine<[[f64; L]; P]>,
+    y: AtALine<[[f64; L]; Q]>,
     stepper: PhantomData<fn() -> St>,
 }
 
+/// The numbers of a lane.
+#[inline(always)]
+fn column<const R: usize, const L: usize>(rows: &[[f64; L]; R], lane: usize) -> SVector<f64, R> {
+    SVector::from_fn(|i, _| rows[i][lane])
+}
+
+/// Puts them back.
+#[inline(always)]
+fn put<const R: usize, const L: usize>(rows: &mut [[f64; L]; R], lane: usize, numbers: &SVector<f64, R>) {
+    for i in 0..R {
+        rows[i][lane] = numbers[i];
+    }
+}
+
+/// One step of a system.
+#[inline(always)]
+fn step<M: System, St: Stepper>(mut s: M, t: f64, h: f64, v: &mut M::V, y: &mut M::Y) {
+    let mut work = Work::new(St::RECORD.evaluations, v, y);
+    St::step(&mut s, t, h, v, y, &mut work);
+    s.settle(v, y);
+}
+
 /// The kernel: `n` steps of every lane.
-struct Steps<'a, S, St, const P: usize, const Q: usize, const C: usize, const L: usize> {
+struct Steps<'a, S, St, const P: usize, const Q: usize, const C: usize, const L: usize, const W: usize> {
     clock: Clock,
     k: i64,
     n: i64,
-    constants: &'a [[f64; L]; C],
+    constants: &'a AtALine<[[f64; L]; C]>,
     inputs: &'a [Samples<L>],
-    v: &'a mut [[f64; L]; P],
-    y: &'a mut [[f64; L]; Q],
+    v: &'a mut AtALine<[[f64; L]; P]>,
+    y: &'a mut AtALine<[[f64; L]; Q]>,
     family: PhantomData<fn() -> (S, St)>,
 }
 
-impl<S, St, const P: usize, const Q: usize, const C: usize, const L: usize> Task for Steps<'_, S, St, P, Q, C, L>
+impl<S, St, const P: usize, const Q: usize, const C: usize, const L: usize, const W: usize> Task
+    for Steps<'_, S, St, P, Q, C, L, W>
 where
     S: Small<P, Q, C>,
     St: Stepper,
@@ -160,18 +190,26 @@ where
         let (h, inputs) = (self.clock.h, View::all(self.inputs));
         for k in self.k..self.k + self.n {
             let t = self.clock.at(k);
-            for l in 0..L {
-                let mut s = S::member(h, from_fn(|c| constants[c][l]), &inputs, l);
-                let mut vl = SVector::from_fn(|i, _| v[i][l]);
-                let mut yl = SVector::from_fn(|i, _| y[i][l]);
-                let mut work = Work::new(St::RECORD.evaluations, &vl, &yl);
-                St::step(&mut s, t, h, &mut vl, &mut yl, &mut work);
-                s.settle(&mut vl, &mut yl);
-                for i in 0..P {
-                    v[i][l] = vl[i];
+            let member = |l: usize| S::member(h, from_fn(|c| constants.0[c][l]), &inputs, l);
+            if const { W == 1 } {
+                for l in 0..L {
+                    let (mut vl, mut yl) = (column(&v.0, l), column(&y.0, l));
+                    step::<_, St>(member(l), t, h, &mut vl, &mut yl);
+                    put(&mut v.0, l, &vl);
+                    put(&mut y.0, l, &yl);
                 }
-                for i in 0..Q {
-                    y[i][l] = yl[i];
+                continue;
+            }
+            // Lane l goes with l + L/W, l + 2·L/W and so on: neighbours stay neighbours, and are one vector.
+            const { assert!(L.is_multiple_of(W)) };
+            for l in 0..L / W {
+                let lane = |w: usize| l + w * (L / W);
+                let mut vl = SMatrix::<f64, P, W>::from_columns(&from_fn::<_, W, _>(|w| column(&v.0, lane(w))));
+                let mut yl = SMatrix::<f64, Q, W>::from_columns(&from_fn::<_, W, _>(|w| column(&y.0, lane(w))));
+                step::<_, St>(Abreast(from_fn(|w| member(lane(w)))), t, h, &mut vl, &mut yl);
+                for w in 0..W {
+                    put(&mut v.0, lane(w), &vl.column(w).into_owned());
+                    put(&mut y.0, lane(w), &yl.column(w).into_owned());
                 }
             }
         }
@@ -184,10 +222,10 @@ struct Attempts<'a, S, St, const P: usize, const Q: usize, const C: usize, const
     paces: &'a mut [[f64; L]; NUMBERS],
     budget: f64,
     attempts: u32,
-    constants: &'a [[f64; L]; C],
+    constants: &'a AtALine<[[f64; L]; C]>,
     inputs: &'a [Samples<L>],
-    v: &'a mut [[f64; L]; P],
-    y: &'a mut [[f64; L]; Q],
+    v: &'a mut AtALine<[[f64; L]; P]>,
+    y: &'a mut AtALine<[[f64; L]; Q]>,
     family: PhantomData<fn() -> (S, St)>,
 }
 
@@ -202,18 +240,13 @@ where
         let inputs = View::all(self.inputs);
         for _ in 0..self.attempts {
             for l in 0..L {
-                let mut s = Stretched::new(S::member(1.0, from_fn(|c| constants[c][l]), &inputs, l));
-                let mut vl = SVector::from_fn(|i, _| v[i][l]);
-                let mut yl = SVector::from_fn(|i, _| y[i][l]);
+                let mut s = Stretched::new(S::member(1.0, from_fn(|c| constants.0[c][l]), &inputs, l));
+                let (mut vl, mut yl) = (column(&v.0, l), column(&y.0, l));
                 let mut trial = Trial::new(St::RECORD.evaluations, &vl, &yl);
                 let mut pace = Pace::load(&paces, l);
                 pace::attempt::<S::Member<'_, L>, St>(&mut pace, self.budget, &mut s, &mut vl, &mut yl, &mut trial);
-                for i in 0..P {
-                    v[i][l] = vl[i];
-                }
-                for i in 0..Q {
-                    y[i][l] = yl[i];
-                }
+                put(&mut v.0, l, &vl);
+                put(&mut y.0, l, &yl);
                 for (row, number) in paces.iter_mut().zip(pace.numbers()) {
                     row[l] = number;
                 }
@@ -223,8 +256,8 @@ where
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool>
-    Tile<S, St, I, P, Q, C, L, PACED>
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const W: usize, const PACED: bool>
+    Tile<S, St, I, P, Q, C, L, W, PACED>
 where
     S: Small<P, Q, C>,
     St: Stepper,
@@ -238,10 +271,10 @@ where
             clock: *clock,
             isa,
             family,
-            constants: [[0.0; L]; C],
+            constants: AtALine([[0.0; L]; C]),
             inputs: Vec::new(),
-            v: [[0.0; L]; P],
-            y: [[0.0; L]; Q],
+            v: AtALine([[0.0; L]; P]),
+            y: AtALine([[0.0; L]; Q]),
             stepper: PhantomData,
         })
     }
@@ -254,20 +287,17 @@ where
     ) {
         let inputs = View::all(&self.inputs);
         for l in 0..L {
-            let mut s = S::member(self.clock.h, from_fn(|c| self.constants[c][l]), &inputs, l);
-            let mut v = SVector::from_fn(|i, _| self.v[i][l]);
-            let y = SVector::from_fn(|i, _| self.y[i][l]);
+            let mut s = S::member(self.clock.h, from_fn(|c| self.constants.0[c][l]), &inputs, l);
+            let (mut v, y) = (column(&self.v.0, l), column(&self.y.0, l));
             let mut work = Work::new(St::RECORD.evaluations, &v, &y);
             f(&mut s, &mut v, &y, &mut work);
-            for i in 0..P {
-                self.v[i][l] = v[i];
-            }
+            put(&mut self.v.0, l, &v);
         }
     }
 }
 
-impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const PACED: bool> Group
-    for Tile<S, St, I, P, Q, C, L, PACED>
+impl<S, St, I, const P: usize, const Q: usize, const C: usize, const L: usize, const W: usize, const PACED: bool> Group
+    for Tile<S, St, I, P, Q, C, L, W, PACED>
 where
     S: Small<P, Q, C>,
     St: Stepper,
@@ -277,12 +307,13 @@ where
         L
     }
 
-    fn pays_for(&self, members: usize) -> bool {
-        members <= L
+    fn pays_for(&self, members: usize, lanes: usize) -> bool {
+        // A lane of a narrow group is a sixth as fast as one of a wide one, or faster.
+        members <= L || 6 * members.next_multiple_of(L) <= lanes
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        prepare(&self.family, self.clock.h, spec, (first, count), &mut self.constants, &mut self.inputs);
+        prepare(&self.family, self.clock.h, spec, (first, count), &mut self.constants.0, &mut self.inputs);
     }
 
     fn adapts(&self) -> bool {
@@ -290,7 +321,7 @@ where
     }
 
     fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
-        prepare_lane(&self.family, spec, lane, member, &mut self.constants, &mut self.inputs);
+        prepare_lane(&self.family, spec, lane, member, &mut self.constants.0, &mut self.inputs);
     }
 
     fn adapt(&mut self, paces: &mut [f64], budget: f64, attempts: u32) {
@@ -311,11 +342,11 @@ where
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
-        (self.v.as_flattened(), self.y.as_flattened())
+        (self.v.0.as_flattened(), self.y.0.as_flattened())
     }
 
     fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
-        (self.v.as_flattened_mut(), self.y.as_flattened_mut())
+        (self.v.0.as_flattened_mut(), self.y.0.as_flattened_mut())
     }
 
     fn start(&mut self, k: i64) {
@@ -330,7 +361,7 @@ where
         if const { PACED } {
             return;
         }
-        self.isa.run(Steps::<S, St, P, Q, C, L> {
+        self.isa.run(Steps::<S, St, P, Q, C, L, W> {
             clock: self.clock,
             k,
             n,
@@ -406,8 +437,8 @@ fn prepare_lane<S: Small<P, Q, C>, const P: usize, const Q: usize, const C: usiz
     }
 }
 
-/// A group of a family of small systems: `WIDE` lanes under AVX-512, `HALF` below it, a narrow one of `FEW`, or `OWN` lanes that go at
-/// a pace of their own each. An attempt is long, so a vector or two of those keep the machine busy.
+/// A group of a family of small systems: `WIDE` lanes under AVX-512, so many of them `ABREAST`, `HALF` below it, a narrow one of
+/// `FEW`, or `OWN` lanes that go at a pace of their own each. An attempt is long, so a vector or two of those keep the machine busy.
 pub fn group<
     S,
     St,
@@ -418,6 +449,7 @@ pub fn group<
     const HALF: usize,
     const FEW: usize,
     const OWN: usize,
+    const ABREAST: usize,
 >(
     family: S,
     clock: &Clock,
@@ -430,9 +462,9 @@ where
     if const { St::RECORD.error_order.is_some() } {
         match width {
             // One member has few numbers to put side by side: no level brought more than a tenth when tried.
-            Width::Lone => return Tile::<S, St, _, P, Q, C, 1, true>::boxed(family, Baseline, clock),
+            Width::Lone => return Tile::<S, St, _, P, Q, C, 1, 1, true>::boxed(family, Baseline, clock),
             Width::Paced => {
-                return with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, OWN, true>::boxed(family, isa, clock));
+                return with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, OWN, 1, true>::boxed(family, isa, clock));
             }
             _ => {}
         }
@@ -440,9 +472,9 @@ where
     match width {
         Width::Wide => with_isa!(
             clock.level,
-            |isa| Tile::<S, St, _, P, Q, C, WIDE, false>::boxed(family, isa, clock),
-            Tile::<S, St, _, P, Q, C, HALF, false>::boxed(family, isa, clock)
+            |isa| Tile::<S, St, _, P, Q, C, WIDE, ABREAST, false>::boxed(family, isa, clock),
+            Tile::<S, St, _, P, Q, C, HALF, 1, false>::boxed(family, isa, clock)
         ),
-        _ => with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, FEW, false>::boxed(family, isa, clock)),
+        _ => with_isa!(clock.level, |isa| Tile::<S, St, _, P, Q, C, FEW, 1, false>::boxed(family, isa, clock)),
     }
 }

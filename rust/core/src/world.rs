@@ -52,7 +52,7 @@ impl World {
             let mut group = model.group(&clock, Width::Wide)?;
             if members - first < group.lanes() {
                 let narrow = model.group(&clock, Width::Narrow)?;
-                if narrow.pays_for(members - first) {
+                if narrow.pays_for(members - first, group.lanes()) {
                     group = narrow;
                 }
             }

@@ -42,7 +42,7 @@ pub struct Either;
 impl Form for Canonical {
     #[inline(always)]
     fn speed(c: &[f64; CONSTANTS], _h: f64) -> f64 {
-        c[0]
+        -c[0]
     }
 }
 
@@ -82,7 +82,7 @@ fn factors(variables: Variables, h: f64, omega: f64) -> [f64; 3] {
 
 /// What acts on the oscillator besides its spring, times h.
 pub trait Force {
-    /// h·v̇ from the spring's part.
+    /// h·v̇ from what the spring adds to it.
     fn total(&self, spring: f64, t: f64, v: f64) -> f64;
 }
 
@@ -101,27 +101,27 @@ pub struct Driven<X> {
 impl Force for Free {
     #[inline(always)]
     fn total(&self, spring: f64, _t: f64, _v: f64) -> f64 {
-        -spring
+        spring
     }
 }
 
 impl Force for Damped {
     #[inline(always)]
     fn total(&self, spring: f64, _t: f64, v: f64) -> f64 {
-        -spring - self.drag * v
+        spring - self.drag * v
     }
 }
 
 impl<X: Signal> Force for Driven<X> {
     #[inline(always)]
     fn total(&self, spring: f64, t: f64, v: f64) -> f64 {
-        (-spring - self.drag * v) + self.input.at(t)
+        (spring - self.drag * v) + self.input.at(t)
     }
 }
 
 /// The oscillator of one member, scaled to the step.
 pub struct Oscillator<F, W> {
-    stiffness: f64,
+    spring: f64,
     speed: f64,
     force: W,
     form: PhantomData<F>,
@@ -133,7 +133,7 @@ impl<F: Form, W: Force> System for Oscillator<F, W> {
 
     #[inline(always)]
     fn dv(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V) {
-        out[0] = self.force.total(self.stiffness * F::pull(y[0]), t, v[0]);
+        out[0] = self.force.total(self.spring * F::pull(y[0]), t, v[0]);
     }
 
     #[inline(always)]
@@ -286,7 +286,7 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
         let [stiffness, by_x, by_a] = factors(self.variables, h, p[0]);
         let mut c = [0.0; CONSTANTS];
-        c[0] = stiffness;
+        c[0] = -stiffness; // negated once, and not in every step
         c[1] = (2.0 * p[1]) * (h * p[0]);
         c[SPEED] = if self.variables == Variables::Canonical { stiffness } else { h };
         let mut slot = 2;
@@ -315,12 +315,12 @@ impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
         inputs: &[View<'a, L>; INPUTS],
         lane: usize,
     ) -> Self::Member<'a, L> {
-        Oscillator { stiffness: c[0], speed: F::speed(&c, h), force: D::force(&c, inputs, lane), form: PhantomData }
+        Oscillator { spring: c[0], speed: F::speed(&c, h), force: D::force(&c, inputs, lane), form: PhantomData }
     }
 }
 
 /// A group of this form and this force.
-pub(super) fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize>(
+pub(super) fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const HALF: usize, const ABREAST: usize>(
     inputs: [Option<Kind>; 2],
     variables: Variables,
     clock: &Clock,
@@ -330,9 +330,9 @@ pub(super) fn of_force<F: Form, D: Drive, St: Stepper, const WIDE: usize, const 
     // Many stages are long enough for two vectors of lanes to keep the machine busy; more kernels of them would only make the core
     // larger, by half.
     if const { St::RECORD.evaluations > 4 } {
-        tile::group::<_, St, 1, 1, CONSTANTS, 16, 16, 16, 16>(family, clock, width)
+        tile::group::<_, St, 1, 1, CONSTANTS, 16, 16, 16, 16, 1>(family, clock, width)
     } else {
-        tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW, 16>(family, clock, width)
+        tile::group::<_, St, 1, 1, CONSTANTS, WIDE, HALF, NARROW, 16, ABREAST>(family, clock, width)
     }
 }
 
@@ -351,19 +351,19 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     // Lanes: what was fastest when tried. The free oscillator's v and y fill the registers of AVX-512 and Φ comes from memory.
     kinds.sort(); // a sum of two does not care for their order, and this saves kernels
     Ok(match (kinds.as_slice(), spec.has("damped")) {
-        ([], false) if canonical => of_force::<Canonical, Free, St, 112, 24>(inputs, variables, clock, width),
-        ([], false) => of_force::<Physical, Free, St, 112, 24>(inputs, variables, clock, width),
-        ([], true) => of_force::<Either, Damped, St, 64, 32>(inputs, variables, clock, width),
-        ([Kind::Held], _) => of_force::<Either, Driven<FromTable>, St, 64, 32>(inputs, variables, clock, width),
-        ([Kind::Sine], _) => of_force::<Either, Driven<FromSine>, St, 16, 32>(inputs, variables, clock, width),
+        ([], false) if canonical => of_force::<Canonical, Free, St, 112, 24, 1>(inputs, variables, clock, width),
+        ([], false) => of_force::<Physical, Free, St, 112, 24, 1>(inputs, variables, clock, width),
+        ([], true) => of_force::<Either, Damped, St, 64, 32, 1>(inputs, variables, clock, width),
+        ([Kind::Held], _) => of_force::<Either, Driven<FromTable>, St, 64, 32, 1>(inputs, variables, clock, width),
+        ([Kind::Sine], _) => of_force::<Either, Driven<FromSine>, St, 16, 32, 1>(inputs, variables, clock, width),
         ([Kind::Held, Kind::Held], _) => {
-            of_force::<Either, Driven<(FromTable, FromTable)>, St, 64, 32>(inputs, variables, clock, width)
+            of_force::<Either, Driven<(FromTable, FromTable)>, St, 64, 32, 1>(inputs, variables, clock, width)
         }
         ([Kind::Held, Kind::Sine], _) => {
-            of_force::<Either, Driven<(FromTable, FromSine)>, St, 32, 32>(inputs, variables, clock, width)
+            of_force::<Either, Driven<(FromTable, FromSine)>, St, 32, 32, 1>(inputs, variables, clock, width)
         }
         ([Kind::Sine, Kind::Sine], _) => {
-            of_force::<Either, Driven<(FromSine, FromSine)>, St, 32, 32>(inputs, variables, clock, width)
+            of_force::<Either, Driven<(FromSine, FromSine)>, St, 32, 32, 1>(inputs, variables, clock, width)
         }
         _ => return Err(spec.unknown_options()),
     })

@@ -34,13 +34,13 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     let input =
         kind(spec, "held", "sine").map(|kind| if kind == Kind::Sine && common(3) && common(4) { Kind::Beat } else { kind });
     let inputs = [input, None];
-    // Lanes: a sine is long enough for two vectors of them to hide what one waits for; more were no faster when tried.
-    // A sinusoid that all have in common, as one that drives a sweep is, costs one sine for all lanes: the more, the less each pays.
+    // Lanes: what was fastest when tried. A sinusoid that all have in common, as one that drives a sweep is, costs one sine for all
+    // lanes: the more, the less each pays.
     Ok(match (input, spec.has("damped")) {
-        (None, false) => of_force::<Angle, Free, St, 16, 16>(inputs, Variables::Angle, clock, width),
-        (None, true) => of_force::<Angle, Damped, St, 16, 16>(inputs, Variables::Angle, clock, width),
-        (Some(Kind::Held), _) => of_force::<Angle, Driven<FromTable>, St, 16, 16>(inputs, Variables::Angle, clock, width),
-        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 128, 32>(inputs, Variables::Angle, clock, width),
-        (Some(Kind::Sine), _) => of_force::<Angle, Driven<FromSine>, St, 16, 16>(inputs, Variables::Angle, clock, width),
+        (None, false) => of_force::<Angle, Free, St, 48, 16, 3>(inputs, Variables::Angle, clock, width),
+        (None, true) => of_force::<Angle, Damped, St, 48, 16, 3>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Held), _) => of_force::<Angle, Driven<FromTable>, St, 16, 16, 1>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Beat), _) => of_force::<Angle, Driven<FromBeat>, St, 192, 32, 3>(inputs, Variables::Angle, clock, width),
+        (Some(Kind::Sine), _) => of_force::<Angle, Driven<FromSine>, St, 16, 16, 1>(inputs, Variables::Angle, clock, width),
     })
 }

@@ -87,5 +87,5 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
         return Err(spec.unknown_options());
     }
     // Square roots and divisions keep the machine busy with a vector or two of lanes.
-    Ok(tile::group::<_, St, 2, 2, CONSTANTS, 16, 16, NARROW, 16>(Family, clock, width))
+    Ok(tile::group::<_, St, 2, 2, CONSTANTS, 16, 16, NARROW, 16, 1>(Family, clock, width))
 }

@@ -462,11 +462,11 @@ pub fn group<St: Stepper>(spec: &Spec, clock: &Clock, width: Width) -> Result<Bo
     }
     // Lanes: what was fastest when tried.
     Ok(match (n, dim, *law, control.len() + spec.record.len()) {
-        (2, 2, "newton", 0) => tile::group::<_, St, 4, 4, 5, 16, 8, 1, 16>(Few::<2, 2, NEWTON>, clock, width),
-        (2, 3, "newton", 0) => tile::group::<_, St, 6, 6, 5, 16, 8, 1, 16>(Few::<2, 3, NEWTON>, clock, width),
-        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1, 8>(Few::<3, 2, NEWTON>, clock, width),
-        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1, 16>(Few::<3, 2, LOGARITHMIC>, clock, width),
-        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 16, 8, 1, 8>(Few::<3, 3, NEWTON>, clock, width),
+        (2, 2, "newton", 0) => tile::group::<_, St, 4, 4, 5, 16, 8, 1, 16, 1>(Few::<2, 2, NEWTON>, clock, width),
+        (2, 3, "newton", 0) => tile::group::<_, St, 6, 6, 5, 16, 8, 1, 16, 1>(Few::<2, 3, NEWTON>, clock, width),
+        (3, 2, "newton", 0) => tile::group::<_, St, 6, 6, 7, 8, 8, 1, 8, 1>(Few::<3, 2, NEWTON>, clock, width),
+        (3, 2, _, 0) => tile::group::<_, St, 6, 6, 7, 32, 16, 1, 16, 1>(Few::<3, 2, LOGARITHMIC>, clock, width),
+        (3, 3, "newton", 0) => tile::group::<_, St, 9, 9, 7, 16, 8, 1, 8, 1>(Few::<3, 3, NEWTON>, clock, width),
         _ => rows::group::<Bodies<{ rows::LANES }>, Bodies<1>, St>(spec, clock, width),
     })
 }
