@@ -138,16 +138,20 @@ class Brute:
         return np.linspace(0.0, self.end, ASKED + 1)[1:]
 
     def paced(self, method: str, tolerance: float) -> Try:
-        """A run with a tolerance, and what is between the times at which it is asked, in further runs."""
+        """A run with a tolerance, as wrong as the worst of it and of those that look between the times at which it is asked."""
         asked = self.asked()
         run = self._integrated(method, tolerance, asked)
         assert run.paces is not None
         tried = int(run.paces.accepted + run.paces.rejected)
         error = math.inf if run.status else float(self.scene.state_error(run).max())
-        for i in range(OTHERS if error <= 1.0 else 0):
-            run = self._integrated(method, tolerance, np.union1d(asked, self._between[i::OTHERS]))
-            error = max(error, float(self.scene.state_error(run).max()))
+        if error <= 1.0:
+            error = max(error, *self.others(method, tolerance))
         return Try(method, tried, tolerance, tried * self.prices[f"{method}, tolerance"], error)
+
+    def others(self, method: str, tolerance: float) -> list[float]:
+        """The errors of runs that are asked at other times as well; each of these ends a step, so each is another run."""
+        runs = (self._integrated(method, tolerance, np.union1d(self.asked(), self._between[i::OTHERS])) for i in range(OTHERS))
+        return [float(self.scene.state_error(run).max()) for run in runs]
 
     @functools.cached_property
     def _between(self) -> Any:

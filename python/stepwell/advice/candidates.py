@@ -23,7 +23,7 @@ LEAST_TOLERANCE = 1e-16
 
 #: A run with a tolerance is not looked at everywhere, and asked at other times it is another run: this share of the error that is
 #: allowed is all that it may have.
-SHARE = 0.8
+SHARE = 0.7
 
 
 class Candidate(Protocol):

@@ -23,8 +23,10 @@ from ..result import Run
 from .motion import Motion, looked_up
 from .trials import Trial
 
-#: Beside the times that it is asked for anyway, a run is asked for its state at as many as this share of its steps, or so many.
-SHARE, LEAST = 0.1, 4
+#: Beside the times that it is asked for anyway, a run is asked for its state at so many, or at these shares of its steps.
+#: Each ends a step, and steps that are not the method's own choice may make a run three times as wrong, most of all where there
+#: are half as many of them as of others.
+LEAST, SHARES = 4, (0.1, 0.25, 0.6)
 
 #: So many runs look between at first, and so many at most to confirm.
 LOOKS, CONFIRMS = 4, 100
@@ -89,10 +91,11 @@ class PacedTrials:
             yield np.unique(self._bad[method.name][-LEAST:])
         # What takes long is done less often.
         runs = min(runs, max(LOOKS, int(0.25 * self.most / (trial.steps * method.evaluations))))
-        # Many times at once find what is short, few leave the run as it is.
-        for times, part in ((max(LEAST, round(SHARE * trial.steps)), runs - runs // 2), (LEAST, runs // 2)):
+        # Many times at once find what is short and what they do to the run, few leave it as it is.
+        for times in dict.fromkeys(max(LEAST, round(share * trial.steps)) for share in (*SHARES, 0.0)):
             number = max(1, math.ceil(len(self.marks) / times))
-            for first in np.unique(np.linspace(0, number, min(part, number), endpoint=False).astype(int)):
+            part = min(math.ceil(runs / (1 + len(SHARES))), number)
+            for first in np.unique(np.linspace(0, number, part, endpoint=False).astype(int)):
                 yield self.marks[first::number]
 
     def _run(self, method: Method, tolerance: float) -> Trial:
