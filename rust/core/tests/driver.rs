@@ -63,6 +63,23 @@ fn every_method_is_the_same_for_every_number_of_threads() {
 }
 
 #[test]
+fn a_batch_of_any_size_is_its_members() {
+    // Wide groups of 192 lanes, three members abreast, narrow ones of 8, one or several after another: sizes on both sides of each.
+    let omega: Vec<f64> = (0..385).map(|i| 0.5 + f64::from(i) / 200.0).collect();
+    let parameters: Vec<&[f64]> = vec![&omega, &[0.2], &[0.7], &[1.1], &[0.3]];
+    let pendulums = |members: usize| {
+        let rows = parameters.iter().map(|x| Row(&x[..x.len().min(members)])).collect();
+        let spec = Spec { system: "pendulum", options: vec!["damped", "sine"], rows, ..Spec::default() };
+        Model::Direct { spec, method: "rk4" }
+    };
+    let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
+    for members in [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384] {
+        let (some_v, some_y, _) = last(&plan(pendulums(members), 0.1, 50, members, 1)).unwrap();
+        assert_eq!((&some_v[..], &some_y[..]), (&v[..members], &y[..members]), "{members} members");
+    }
+}
+
+#[test]
 fn the_first_bad_step_is_exact_on_both_sides_of_a_look() {
     // Steps 1023, 1024 and 1025 stand around the first look; growth is chosen so that members overflow there.
     let omega: Vec<f64> = (0..400).map(|i| 2.10 + f64::from(i) * 2e-4).collect();
