@@ -283,20 +283,18 @@ pub(super) fn kind(spec: &Spec, held: &str, sine: &str) -> Option<Kind> {
 impl<F: Form, D: Drive> Small<1, 1, CONSTANTS> for Family<F, D> {
     type Member<'a, const L: usize> = Oscillator<F, D::Force<'a, L>>;
 
+    #[inline(always)]
     fn constants(&self, h: f64, p: [f64; CONSTANTS]) -> [f64; CONSTANTS] {
         let [stiffness, by_x, by_a] = factors(self.variables, h, p[0]);
-        let mut c = [0.0; CONSTANTS];
-        c[0] = -stiffness; // negated once, and not in every step
-        c[1] = (2.0 * p[1]) * (h * p[0]);
-        c[SPEED] = if self.variables == Variables::Canonical { stiffness } else { h };
-        let mut slot = 2;
-        for (kind, factor, of) in [(self.inputs[0], by_x, 2), (self.inputs[1], by_a, 5)] {
-            if matches!(kind, Some(Kind::Sine | Kind::Beat)) {
-                c[slot..slot + 3].copy_from_slice(&[factor * p[of], p[of + 1], p[of + 2]]);
-                slot += 3;
-            }
-        }
-        c
+        let speed = if self.variables == Variables::Canonical { stiffness } else { h };
+        let [x, a] = self.inputs.map(|kind| matches!(kind, Some(Kind::Sine | Kind::Beat)));
+        let (of_x, of_a) = ([by_x * p[2], p[3], p[4]], [by_a * p[5], p[6], p[7]]);
+        // Without a loop or a branch, so that a loop over the lanes is a vector loop.
+        let first = if x { of_x } else { of_a };
+        let second = if x && a { of_a } else { [0.0; 3] };
+        let drag = (2.0 * p[1]) * (h * p[0]);
+        // The spring is negated once, and not in every step.
+        [-stiffness, drag, first[0], first[1], first[2], second[0], second[1], second[2], speed]
     }
 
     fn input_factor(&self, h: f64, p: [f64; CONSTANTS], i: usize) -> f64 {
