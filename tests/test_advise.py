@@ -46,10 +46,10 @@ def brute_of(name: str, frames: int | None = None) -> Brute:
 def assert_true(brute: Brute, advice: sw.advice.Advice) -> None:
     """Every ranked row, run in full, is as wrong as it says and no more than allowed.
 
-    With a tolerance the run that is meant is; asked at other times it is another run, by luck better or worse. The search has
-    looked at a hundred of those, all good enough, which it would not have found by chance (0.97^100 < 0.05) if more than three in
-    a hundred were not: at most two of twenty-four, then. Brute force has the true motion from a table that is right to 1e-9, and
-    so has the search.
+    With a tolerance the run that is meant is; asked at other times it is another run, by luck better or worse, and nothing is
+    promised of each. The search has looked at 75 or more of those if they are not long, all good enough. If more than four in a
+    hundred were not, that would be luck (0.96^75 < 0.05), and of twenty-four one is expected to be worse: two are let pass. Brute
+    force has the true motion from a table that is right to 1e-9, and so has the search.
     """
     frames = brute.frames
     for row in advice.ranked:
