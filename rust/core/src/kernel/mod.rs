@@ -1,0 +1,55 @@
+//! From the list of operations to what the machine does: kernels.
+//!
+//! A kernel makes a number of steps of a tile of lanes, one lane a member. It is interpreted ([`interpret`]) or written as machine
+//! code at run time ([`x86`]); the bits are the same.
+
+pub mod interpret;
+
+use crate::tape::split::Body;
+
+/// What a kernel works on. Rows are `lanes` numbers long, one for each member, and follow each other.
+#[derive(Debug)]
+pub struct Tile<'a> {
+    /// A row for each number of the state, changed in place.
+    pub state: &'a mut [f64],
+    /// A row for each number of the members that stays.
+    pub rows: &'a [f64],
+    /// Numbers that are the same for all: what [`Kernel::pool`] made of them.
+    pub pool: &'a [f64],
+    /// How many steps to make.
+    pub steps: usize,
+    /// So many entries for each step as the body says: the bits of a number, or, for what is held, the place of the first number of a
+    /// row in `held`.
+    pub per_step: &'a [u64],
+    /// Rows of sampled inputs.
+    pub held: &'a [f64],
+}
+
+/// Steps of a tile.
+pub trait Kernel: Send + Sync {
+    /// How long rows are.
+    fn lanes(&self) -> usize;
+
+    /// The numbers that are the same for all, as this kernel wants them.
+    fn pool(&self, uniforms: &[f64]) -> Vec<f64>;
+
+    /// Makes the steps. `scratch` is the kernel's to use and grows as needed.
+    ///
+    /// # Panics
+    ///
+    /// If the tile's slices are shorter than its body says.
+    fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>);
+}
+
+/// Panics unless a tile holds what a body asks for. What is written as machine code relies on it.
+pub fn check(body: &Body, lanes: usize, tile: &Tile) {
+    assert!(tile.state.len() >= body.next.len() * lanes, "state");
+    assert!(tile.rows.len() >= body.rows * lanes, "rows");
+    assert!(tile.per_step.len() >= body.per_step * tile.steps, "steps");
+    for op in &body.ops {
+        if let crate::tape::Op::Held(i) = op {
+            let places = tile.per_step.iter().skip(*i as usize).step_by(body.per_step).take(tile.steps);
+            assert!(places.clone().all(|at| (*at as usize).saturating_add(lanes) <= tile.held.len()), "held");
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! The tape: what a step computes, as a straight list of operations.
+//!
+//! A step is run once with symbols instead of numbers ([`crate::number::Symbol`]), and writes what it does to the tape. An operation
+//! that is there already is not written again, and what can be said exactly beforehand is: constants are folded, and an operation
+//! that changes no bit is left out. Whatever a value is, its bits are those of the operations as they were asked for.
+//!
+//! The only freedom taken is in what a NaN carries: its sign and payload are not promised.
+
+pub mod eval;
+pub mod print;
+pub mod split;
+
+use std::collections::HashMap;
+
+/// A value on a tape, by the number of the operation that makes it.
+pub type Id = u32;
+
+/// An operation. Comparisons set all bits of a number where they are true, and none where they are false.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Op {
+    /// A number of the state, as it is at the start of the step.
+    State(u32),
+    /// A parameter of the member.
+    Param(u32),
+    /// The step h.
+    Step,
+    /// The time at the start of the step.
+    Time,
+    /// A number, by its bits.
+    Const(u64),
+    /// A sampled input at a time.
+    Sample(u32, Id),
+    /// a + b
+    Add(Id, Id),
+    /// a − b
+    Sub(Id, Id),
+    /// a · b
+    Mul(Id, Id),
+    /// a / b
+    Div(Id, Id),
+    /// √a
+    Sqrt(Id),
+    /// −a
+    Neg(Id),
+    /// The largest whole number not above a.
+    Floor(Id),
+    /// a < b; false of a NaN, as all comparisons are.
+    Less(Id, Id),
+    /// a ≤ b
+    LessEqual(Id, Id),
+    /// a = b
+    Equal(Id, Id),
+    /// Of bits: where the first is set the second, else the third. A mask comes from a comparison.
+    Select(Id, Id, Id),
+    /// Bits of both.
+    And(Id, Id),
+    /// Bits of either.
+    Or(Id, Id),
+    /// Bits of one and not of both.
+    Xor(Id, Id),
+    /// The sum of both as whole numbers of 64 bits, without a carry out.
+    AddBits(Id, Id),
+    /// Bits moved up by so many places, zeros after them.
+    ShiftUp(Id, u32),
+    /// Bits moved down by so many places, zeros before them.
+    ShiftDown(Id, u32),
+    /// A value in the place of another that is the same: the next state is a number of the present one, or a constant.
+    Copy(Id),
+    /// Of a body ([`split::Body`]): a number of the member that is the same in every step.
+    Row(u32),
+    /// Of a body: a number that is the same for all members and steps.
+    Uniform(u32),
+    /// Of a body: a number of the step, the same for all members.
+    PerStep(u32),
+    /// Of a body: a number of the member that its sampled inputs have at the step.
+    Held(u32),
+}
+
+impl Op {
+    /// What it reads; the first so many of the three.
+    #[inline]
+    pub fn operands(self) -> ([Id; 3], usize) {
+        use Op::*;
+        match self {
+            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => ([0; 3], 0),
+            Sample(_, a) | Sqrt(a) | Neg(a) | Floor(a) | ShiftUp(a, _) | ShiftDown(a, _) | Copy(a) => ([a, 0, 0], 1),
+            Add(a, b)
+            | Sub(a, b)
+            | Mul(a, b)
+            | Div(a, b)
+            | Less(a, b)
+            | LessEqual(a, b)
+            | Equal(a, b)
+            | And(a, b)
+            | Or(a, b)
+            | Xor(a, b)
+            | AddBits(a, b) => ([a, b, 0], 2),
+            Select(m, a, b) => ([m, a, b], 3),
+        }
+    }
+
+    /// The same operation of other values.
+    #[must_use]
+    pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
+        use Op::*;
+        match self {
+            State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => self,
+            Sample(i, a) => Sample(i, f(a)),
+            Sqrt(a) => Sqrt(f(a)),
+            Neg(a) => Neg(f(a)),
+            Floor(a) => Floor(f(a)),
+            ShiftUp(a, n) => ShiftUp(f(a), n),
+            ShiftDown(a, n) => ShiftDown(f(a), n),
+            Copy(a) => Copy(f(a)),
+            Add(a, b) => Add(f(a), f(b)),
+            Sub(a, b) => Sub(f(a), f(b)),
+            Mul(a, b) => Mul(f(a), f(b)),
+            Div(a, b) => Div(f(a), f(b)),
+            Less(a, b) => Less(f(a), f(b)),
+            LessEqual(a, b) => LessEqual(f(a), f(b)),
+            Equal(a, b) => Equal(f(a), f(b)),
+            Select(m, a, b) => Select(f(m), f(a), f(b)),
+            And(a, b) => And(f(a), f(b)),
+            Or(a, b) => Or(f(a), f(b)),
+            Xor(a, b) => Xor(f(a), f(b)),
+            AddBits(a, b) => AddBits(f(a), f(b)),
+        }
+    }
+
+    /// Whether it is there before anything is computed.
+    pub fn is_leaf(self) -> bool {
+        self.operands().1 == 0
+    }
+}
+
+/// How often each kind of operation occurs. Changes of sign, copies and what sorts bits are not arithmetic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Additions and subtractions.
+    pub additions: u32,
+    /// Products.
+    pub multiplications: u32,
+    /// Quotients.
+    pub divisions: u32,
+    /// Square roots.
+    pub square_roots: u32,
+    /// Comparisons and choices.
+    pub choices: u32,
+    /// Operations on bits, roundings to whole numbers.
+    pub bits: u32,
+}
+
+impl Counts {
+    /// Counts one more.
+    pub fn note(&mut self, op: Op) {
+        use Op::*;
+        match op {
+            Add(..) | Sub(..) => self.additions += 1,
+            Mul(..) => self.multiplications += 1,
+            Div(..) => self.divisions += 1,
+            Sqrt(_) => self.square_roots += 1,
+            Less(..) | LessEqual(..) | Equal(..) | Select(..) => self.choices += 1,
+            And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..) | Floor(_) => self.bits += 1,
+            State(_) | Param(_) | Step | Time | Const(_) | Sample(..) | Neg(_) | Copy(_) | Row(_) | Uniform(_) | PerStep(_)
+            | Held(_) => {}
+        }
+    }
+}
+
+/// Operations in the order in which they were asked for first, each once.
+#[derive(Clone, Debug, Default)]
+pub struct Tape {
+    ops: Vec<Op>,
+    seen: HashMap<Op, Id>,
+    /// Of each value: whether it is surely not −0.
+    not_minus_zero: Vec<bool>,
+    /// What was asked for, before equal operations were merged.
+    written: Counts,
+}
+
+const MINUS_ZERO: u64 = 1 << 63;
+
+impl Tape {
+    /// The operations.
+    pub fn ops(&self) -> &[Op] {
+        &self.ops
+    }
+
+    /// The operation that makes a value.
+    pub fn op(&self, id: Id) -> Op {
+        self.ops[id as usize]
+    }
+
+    /// What was asked for, before equal operations were merged and needless ones left out.
+    pub fn written(&self) -> Counts {
+        self.written
+    }
+
+    /// A number.
+    pub fn constant(&mut self, x: f64) -> Id {
+        self.keep(Op::Const(x.to_bits()))
+    }
+
+    /// Writes an operation, or finds what is equal to it in every bit.
+    pub fn push(&mut self, op: Op) -> Id {
+        self.written.note(op);
+        self.shorten(op)
+    }
+
+    fn bits(&self, id: Id) -> Option<u64> {
+        match self.op(id) {
+            Op::Const(bits) => Some(bits),
+            _ => None,
+        }
+    }
+
+    fn never_minus_zero(&self, id: Id) -> bool {
+        self.not_minus_zero[id as usize]
+    }
+
+    /// 0 + x, of which only x matters.
+    fn behind_zero(&self, id: Id) -> Option<Id> {
+        match self.op(id) {
+            Op::Add(a, b) if self.bits(a) == Some(0) => Some(b),
+            Op::Add(a, b) if self.bits(b) == Some(0) => Some(a),
+            _ => None,
+        }
+    }
+
+    fn keep(&mut self, op: Op) -> Id {
+        if let Some(&id) = self.seen.get(&op) {
+            return id;
+        }
+        let id = self.ops.len() as Id;
+        let sure = |id: Id| self.not_minus_zero[id as usize];
+        let not_minus_zero = match op {
+            Op::Const(bits) => bits != MINUS_ZERO,
+            // A sum is −0 only if both are, a difference only of −0 and +0.
+            Op::Add(a, b) => sure(a) || sure(b),
+            Op::Sub(a, _) | Op::Sqrt(a) => sure(a),
+            Op::Mul(a, b) => a == b,
+            Op::Select(_, a, b) => sure(a) && sure(b),
+            _ => false,
+        };
+        self.ops.push(op);
+        self.not_minus_zero.push(not_minus_zero);
+        self.seen.insert(op, id);
+        id
+    }
+
+    /// Every rule here changes no bit of any result, whatever the numbers are: infinities, NaN but for its payload, both zeros.
+    fn shorten(&mut self, op: Op) -> Id {
+        use Op::*;
+        if let Some(known) = self.fold(op) {
+            return self.keep(Const(known));
+        }
+        let (zero, one, minus_one) = (Some(0), Some(1f64.to_bits()), Some((-1f64).to_bits()));
+        match op {
+            Neg(a) => match self.op(a) {
+                Neg(x) => x,
+                _ => self.keep(op),
+            },
+            Add(a, b) => {
+                // x + −0 is x, and so is x + 0 unless x is −0.
+                for (x, y) in [(a, b), (b, a)] {
+                    if self.bits(y) == Some(MINUS_ZERO) || (self.bits(y) == zero && self.never_minus_zero(x)) {
+                        return x;
+                    }
+                }
+                if let Neg(x) = self.op(b) {
+                    return self.shorten(Sub(a, x));
+                }
+                if let Neg(x) = self.op(a) {
+                    return self.shorten(Sub(b, x));
+                }
+                // (0 + x) + y: the zero matters only if x is −0, and then y alone decides, unless it is −0 too.
+                for (x, y) in [(a, b), (b, a)] {
+                    if self.never_minus_zero(y)
+                        && let Some(x) = self.behind_zero(x)
+                    {
+                        return self.shorten(Add(x, y));
+                    }
+                }
+                self.keep(Add(a.min(b), a.max(b)))
+            }
+            Sub(a, b) => {
+                if self.bits(b) == zero {
+                    return a;
+                }
+                if self.bits(a) == Some(MINUS_ZERO) {
+                    return self.shorten(Neg(b));
+                }
+                if let Neg(x) = self.op(b) {
+                    return self.shorten(Add(a, x));
+                }
+                self.keep(op)
+            }
+            Mul(a, b) => {
+                for (x, y) in [(a, b), (b, a)] {
+                    if self.bits(y) == one {
+                        return x;
+                    }
+                    if self.bits(y) == minus_one {
+                        return self.shorten(Neg(x));
+                    }
+                }
+                match (self.op(a), self.op(b)) {
+                    (Neg(x), Neg(y)) => self.shorten(Mul(x, y)),
+                    (Neg(x), _) => {
+                        let product = self.shorten(Mul(x, b));
+                        self.shorten(Neg(product))
+                    }
+                    (_, Neg(y)) => {
+                        let product = self.shorten(Mul(a, y));
+                        self.shorten(Neg(product))
+                    }
+                    _ => self.keep(Mul(a.min(b), a.max(b))),
+                }
+            }
+            Div(a, b) if self.bits(b) == one => a,
+            Equal(a, b) => self.keep(Equal(a.min(b), a.max(b))),
+            And(a, b) => self.keep(And(a.min(b), a.max(b))),
+            Or(a, b) => self.keep(Or(a.min(b), a.max(b))),
+            Xor(a, b) => self.keep(Xor(a.min(b), a.max(b))),
+            AddBits(a, b) => self.keep(AddBits(a.min(b), a.max(b))),
+            Select(_, a, b) if a == b => a,
+            Copy(a) => a,
+            ShiftUp(a, 0) | ShiftDown(a, 0) => a,
+            _ => self.keep(op),
+        }
+    }
+
+    /// What an operation of constants gives. A NaN is left to whoever computes.
+    fn fold(&self, op: Op) -> Option<u64> {
+        let ([a, b, c], n) = op.operands();
+        if n == 0 || matches!(op, Op::Sample(..)) {
+            return None;
+        }
+        let bits = |id: Id| self.bits(id);
+        let (x, y, z) = (bits(a)?, if n > 1 { bits(b)? } else { 0 }, if n > 2 { bits(c)? } else { 0 });
+        let made = eval::apply(op, x, y, z);
+        let is_number = matches!(op, Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) | Op::Floor(_));
+        (!is_number || !f64::from_bits(made).is_nan()).then_some(made)
+    }
+
+    /// The values that these need, themselves with them: for each value of the tape whether it is needed.
+    pub fn needed(&self, roots: impl IntoIterator<Item = Id>) -> Vec<bool> {
+        let mut needed = vec![false; self.ops.len()];
+        for root in roots {
+            needed[root as usize] = true;
+        }
+        for id in (0..self.ops.len()).rev() {
+            if needed[id] {
+                let (operands, n) = self.ops[id].operands();
+                for operand in &operands[..n] {
+                    needed[*operand as usize] = true;
+                }
+            }
+        }
+        needed
+    }
+
+    /// How often each kind occurs among what these values need.
+    pub fn counts(&self, roots: impl IntoIterator<Item = Id>) -> Counts {
+        let mut counts = Counts::default();
+        for (op, needed) in self.ops.iter().zip(self.needed(roots)) {
+            if needed {
+                counts.note(*op);
+            }
+        }
+        counts
+    }
+}

@@ -1,0 +1,338 @@
+//! What is computed when: once for a run, once for a member, once for a step, or for every member at every step.
+//!
+//! A tape says what a step computes. Much of it does not change from step to step (Φ = ω₀·h), or not from member to member (the sine
+//! of a drive that all have in common). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
+//! last of them is in the hot loop.
+
+use std::collections::HashMap;
+
+use super::{Id, Op, Tape};
+
+/// Operations over lanes: what an interpreter or a kernel writer takes.
+///
+/// Leaves are `State`, `Row`, `Uniform`, `PerStep`, `Held` and `Const` only. Every operation comes after what it reads, every one is
+/// needed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Body {
+    /// The operations.
+    pub ops: Vec<Op>,
+    /// The next value of each number of the state. It is `State(s)` itself if s stays as it is; otherwise no leaf, and of no other
+    /// number of the state as well (a `Copy` stands in where it would be).
+    pub next: Vec<Id>,
+    /// How many rows of the member it may read.
+    pub rows: usize,
+    /// How many numbers it may read that are the same for all.
+    pub uniforms: usize,
+    /// How many entries a step has in the table of the steps: the bits of a number for `PerStep`, for `Held` the place of a row.
+    pub per_step: usize,
+}
+
+impl Body {
+    /// Whether a number of the state stays as it is.
+    pub fn keeps(&self, s: usize) -> bool {
+        self.ops[self.next[s] as usize] == Op::State(s as u32)
+    }
+
+    /// How many operations are no leaves.
+    pub fn work(&self) -> usize {
+        self.ops.iter().filter(|op| !op.is_leaf()).count()
+    }
+
+    /// The values of the tape named `roots`, over leaves as `leaf` names them; `None` leaves an operation as it is.
+    fn of(tape: &Tape, roots: &[Id], mut leaf: impl FnMut(Id) -> Option<Op>) -> Body {
+        // From the back: what is a leaf here needs nothing.
+        let mut leaves: Vec<Option<Op>> = vec![None; tape.ops().len()];
+        let mut needed = vec![false; tape.ops().len()];
+        for &root in roots {
+            needed[root as usize] = true;
+        }
+        for id in (0..tape.ops().len()).rev() {
+            if !needed[id] {
+                continue;
+            }
+            leaves[id] = leaf(id as Id);
+            if leaves[id].is_none() {
+                let (operands, n) = tape.ops()[id].operands();
+                operands[..n].iter().for_each(|operand| needed[*operand as usize] = true);
+            }
+        }
+        let mut place = vec![0; tape.ops().len()];
+        let mut known: HashMap<Op, Id> = HashMap::new();
+        let mut body = Body::default();
+        for id in (0..tape.ops().len()).filter(|id| needed[*id]) {
+            let op = leaves[id].unwrap_or_else(|| tape.ops()[id].with(|operand| place[operand as usize]));
+            place[id] = *known.entry(op).or_insert_with(|| {
+                body.ops.push(op);
+                body.ops.len() as Id - 1
+            });
+        }
+        body.next = roots.iter().map(|root| place[*root as usize]).collect();
+        body
+    }
+
+    /// Puts a copy in the place of a next value that is a leaf or that another number of the state has too.
+    fn copy_what_is_shared(&mut self) {
+        let mut taken = vec![false; self.ops.len()];
+        for s in 0..self.next.len() {
+            let id = self.next[s];
+            if self.ops[id as usize] == Op::State(s as u32) {
+                continue;
+            }
+            if self.ops[id as usize].is_leaf() || taken[id as usize] {
+                self.ops.push(Op::Copy(id));
+                self.next[s] = self.ops.len() as Id - 1;
+            } else {
+                taken[id as usize] = true;
+            }
+        }
+    }
+
+    /// Counts what the leaves name.
+    fn count_leaves(&mut self) {
+        for op in &self.ops {
+            let (count, i) = match *op {
+                Op::Row(i) => (&mut self.rows, i),
+                Op::Uniform(i) => (&mut self.uniforms, i),
+                Op::PerStep(i) | Op::Held(i) => (&mut self.per_step, i),
+                _ => continue,
+            };
+            *count = (*count).max(i as usize + 1);
+        }
+    }
+
+    fn finished(mut self) -> Body {
+        self.copy_what_is_shared();
+        self.count_leaves();
+        self
+    }
+}
+
+/// How often a value changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Rank {
+    /// It is known beforehand.
+    Constant,
+    /// Once a run, the same for all members.
+    Run,
+    /// Once a run, each member has its own.
+    Member,
+    /// Every step, the same for all members.
+    Step,
+    /// Every step, each member has its own.
+    Lane,
+}
+
+/// What a number that is the same for all members is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Given {
+    /// The step h.
+    Step,
+    /// A parameter.
+    Param(u32),
+    /// The time of the first sample of an input.
+    Start(u32),
+    /// The time between two samples of an input.
+    Interval(u32),
+    /// The number of the last sample of an input.
+    Last(u32),
+}
+
+/// What an entry of the table of the steps is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Entry {
+    /// The value itself.
+    Value,
+    /// The number of a sample; the entry is the sample, which all members have in common.
+    Sample(u32),
+    /// The number of a sample; the entry is the place of its row.
+    Row(u32),
+}
+
+/// A tape, cut by how often its values change.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Split {
+    /// What the uniforms of the first three bodies are.
+    pub given: Vec<Given>,
+    /// Which parameters are the rows of `member`.
+    pub params: Vec<u32>,
+    /// Its state are the uniforms of `body`; computed once, in one lane.
+    pub run: Body,
+    /// Its state are the rows of `body`; computed once for each member.
+    pub member: Body,
+    /// Its state are the entries of the table of the steps, a lane for each step; row 0 is the time.
+    pub step: Body,
+    /// What the entries are.
+    pub entries: Vec<Entry>,
+    /// The hot loop.
+    pub body: Body,
+}
+
+/// A time this fraction of an interval before a sample's instant counts as it: t = t₀ + k·h may miss it by rounding.
+pub const HOLD_SLACK: f64 = 1e-6;
+
+/// Cuts a tape. `uniform` says which parameters all members have in common, `common` which inputs.
+pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: impl Fn(u32) -> bool) -> Split {
+    let mut tape = tape.clone();
+    let next = hoist_signs(&mut tape, next, &uniform);
+    let ranks = ranks(&tape, &uniform);
+    let rank = |id: Id| ranks[id as usize];
+    let mut split = Split::default();
+
+    // The hot loop. What is of a lower rank is a leaf to it.
+    let (mut rows, mut uniforms, mut entries) = (Vec::new(), Vec::new(), Vec::new());
+    let number = |list: &mut Vec<Id>, id: Id| {
+        let at = list.iter().position(|known| *known == id).unwrap_or_else(|| {
+            list.push(id);
+            list.len() - 1
+        });
+        at as u32
+    };
+    let mut samples: Vec<(u32, Id)> = Vec::new();
+    split.body = Body::of(&tape, &next, |id| match rank(id) {
+        Rank::Constant => None,
+        Rank::Run => Some(Op::Uniform(number(&mut uniforms, id))),
+        Rank::Member => Some(Op::Row(number(&mut rows, id))),
+        Rank::Step => Some(Op::PerStep(number(&mut entries, id))),
+        Rank::Lane => match tape.op(id) {
+            Op::Sample(input, t) if rank(t) < Rank::Lane => {
+                let sample = samples.iter().position(|s| *s == (input, t)).unwrap_or_else(|| {
+                    samples.push((input, t));
+                    samples.len() - 1
+                });
+                // Behind all values; they are numbered anew below, when it is known how many there are.
+                let place = u32::MAX - sample as u32;
+                Some(if common(input) { Op::PerStep(place) } else { Op::Held(place) })
+            }
+            _ => None,
+        },
+    });
+    let behind = |place: u32| if place > u32::MAX / 2 { entries.len() as u32 + (u32::MAX - place) } else { place };
+    for op in &mut split.body.ops {
+        *op = match *op {
+            Op::PerStep(i) => Op::PerStep(behind(i)),
+            Op::Held(i) => Op::Held(behind(i)),
+            other => other,
+        };
+    }
+    split.body = std::mem::take(&mut split.body).finished();
+
+    // Numbers of samples are found like other values.
+    split.entries = vec![Entry::Value; entries.len()];
+    for (input, t) in samples {
+        split.entries.push(if common(input) { Entry::Sample(input) } else { Entry::Row(input) });
+        entries.push(sample_number(&mut tape, input, t));
+    }
+
+    let mut given = Vec::new();
+    let mut params = Vec::new();
+    let mut leaf = |id: Id| match tape.op(id) {
+        Op::Step => Some(Op::Uniform(place(&mut given, Given::Step))),
+        Op::Param(i) if uniform(i) => Some(Op::Uniform(place(&mut given, Given::Param(i)))),
+        Op::Param(i) => Some(Op::Row(place(&mut params, i))),
+        // What the numbers of samples are made of, which the tape itself does not know: see `sample_number`.
+        Op::State(i) => {
+            let (input, what) = (i / 3, i % 3);
+            let known = [Given::Start(input), Given::Interval(input), Given::Last(input)][what as usize];
+            Some(Op::Uniform(place(&mut given, known)))
+        }
+        Op::Time => Some(Op::Row(0)),
+        _ => None,
+    };
+    split.run = Body::of(&tape, &uniforms, &mut leaf).finished();
+    split.member = Body::of(&tape, &rows, &mut leaf).finished();
+    split.step = Body::of(&tape, &entries, &mut leaf).finished();
+    split.given = given;
+    split.params = params;
+    split
+}
+
+fn place<T: PartialEq>(list: &mut Vec<T>, what: T) -> u32 {
+    let at = list.iter().position(|known| *known == what).unwrap_or_else(|| {
+        list.push(what);
+        list.len() - 1
+    });
+    at as u32
+}
+
+/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside.
+///
+/// `State` stands for what is known of the input, since a number of a sample depends on no state here.
+fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
+    let [start, interval, last] = [0, 1, 2].map(|what| tape.push(Op::State(3 * input + what)));
+    let since = tape.push(Op::Sub(t, start));
+    let intervals = tape.push(Op::Div(since, interval));
+    let slack = tape.constant(HOLD_SLACK);
+    let late = tape.push(Op::Add(intervals, slack));
+    let at = tape.push(Op::Floor(late));
+    held_within(tape, at, last)
+}
+
+/// A whole number, at least 0 and at most `last`; 0 of a NaN.
+fn held_within(tape: &mut Tape, at: Id, last: Id) -> Id {
+    let zero = tape.constant(0.0);
+    let above = tape.push(Op::Less(zero, at));
+    let at = tape.push(Op::Select(above, at, zero));
+    let below = tape.push(Op::Less(at, last));
+    tape.push(Op::Select(below, at, last))
+}
+
+fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
+    let mut ranks: Vec<Rank> = Vec::with_capacity(tape.ops().len());
+    for op in tape.ops() {
+        let rank = match *op {
+            Op::Const(_) => Rank::Constant,
+            Op::Step => Rank::Run,
+            Op::Param(i) if uniform(i) => Rank::Run,
+            Op::Param(_) => Rank::Member,
+            Op::Time => Rank::Step,
+            Op::State(_) | Op::Sample(..) => Rank::Lane,
+            _ => {
+                let (operands, n) = op.operands();
+                let of = operands[..n].iter().map(|id| ranks[*id as usize]);
+                let most = of.clone().max().unwrap_or(Rank::Constant);
+                if most == Rank::Step && of.clone().any(|rank| rank == Rank::Member) { Rank::Lane } else { most }
+            }
+        };
+        ranks.push(rank);
+    }
+    ranks
+}
+
+/// Moves a change of sign from a product that is made in every step to the factor that is made once.
+fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
+    let ranks = ranks(tape, uniform);
+    let needed = tape.needed(next.iter().copied());
+    let mut uses = vec![0u32; tape.ops().len()];
+    for (op, _) in tape.ops().iter().zip(&needed).filter(|(_, needed)| **needed) {
+        let (operands, n) = op.operands();
+        operands[..n].iter().for_each(|id| uses[*id as usize] += 1);
+    }
+    next.iter().for_each(|id| uses[*id as usize] += 1);
+    let old = std::mem::take(tape);
+    let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
+    for (id, op) in old.ops().iter().enumerate() {
+        let moved = match *op {
+            Op::Neg(product) if needed[id] && uses[product as usize] == 1 => match old.op(product) {
+                Op::Mul(a, b) if ranks[a as usize] != ranks[b as usize] => {
+                    let (once, often) = if ranks[a as usize] < ranks[b as usize] { (a, b) } else { (b, a) };
+                    let sign = tape.keep_or_fold(Op::Neg(place[once as usize]));
+                    Some(tape.keep(Op::Mul(sign.min(place[often as usize]), sign.max(place[often as usize]))))
+                }
+                _ => None,
+            },
+            _ => None,
+        };
+        place.push(moved.unwrap_or_else(|| tape.keep(op.with(|operand| place[operand as usize]))));
+    }
+    next.iter().map(|id| place[*id as usize]).collect()
+}
+
+impl Tape {
+    /// As `push`, but it does not count as written.
+    fn keep_or_fold(&mut self, op: Op) -> Id {
+        match self.fold(op) {
+            Some(bits) => self.keep(Op::Const(bits)),
+            None => self.keep(op),
+        }
+    }
+}
