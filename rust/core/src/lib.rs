@@ -5,4 +5,21 @@ pub mod functions;
 pub mod isa;
 pub mod kernel;
 pub mod number;
+pub mod program;
+pub mod signal;
+pub mod spec;
+pub mod system;
 pub mod tape;
+pub mod method;
+pub mod tableau;
+
+/// The methods, one file each; `build.rs` lists the folder.
+#[allow(missing_docs, reason = "each file documents its method in the record")]
+pub mod steppers {
+    include!(concat!(env!("OUT_DIR"), "/steppers.rs"));
+}
+
+/// The systems, one file each; `build.rs` lists the folder.
+pub mod systems {
+    include!(concat!(env!("OUT_DIR"), "/systems.rs"));
+}

@@ -1,48 +1,96 @@
-//! Systems: two blocks and an increment for each.
+//! Systems: two blocks and an increment for each, over any kind of number.
 
-use crate::block::Block;
+use nalgebra::DVector;
+
+use crate::{
+    error::Error,
+    number::{Number, Symbol},
+    spec::{Given, Parameters},
+};
+
+/// A velocity or coordinate block: its numbers in order.
+pub type Block<N> = DVector<N>;
 
 /// A system scaled to the step: its rates times `h`.
 ///
 /// The document writes every method in increments, `dv = h·v̇` and `dy = h·ẏ`, because `h` and a system's own constants can be
 /// multiplied once for a whole run (Φ = ω₀T for the oscillator: "ω₀ is the same as a scale factor for the time", §3). A
 /// method then needs nothing but increments and sums.
-pub trait System {
-    /// The velocity block.
-    type V: Block;
-    /// The coordinate block.
-    type Y: Block;
+pub trait System<N: Number> {
+    /// h·v̇(t, v, y)
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N>;
 
-    /// `out = h·v̇(t, v, y)`
-    fn dv(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::V);
-
-    /// `out = h·ẏ(t, v, y)`
-    fn dy(&mut self, t: f64, v: &Self::V, y: &Self::Y, out: &mut Self::Y);
+    /// h·ẏ(t, v, y)
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N>;
 
     /// The velocity whose increment of `y` is `d`: undoes `dy` in a second-order system, where ẏ is v times a number.
     ///
-    /// Methods that ask for [`crate::stepper::Needs::Acceleration`] use it; no other system needs it.
-    fn velocity(&mut self, _d: &Self::Y, out: &mut Self::V) {
-        out.numbers_mut().fill(f64::NAN);
+    /// Methods that ask for an acceleration use it; no other system needs it.
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|_| N::of(f64::NAN))
     }
 
-    /// Corrects the state after a step: projections onto what should be constant.
-    #[inline(always)]
-    fn settle(&mut self, _v: &mut Self::V, _y: &mut Self::Y) {}
-
-    /// Says that the state of these coordinates is about to be recorded, and that the next step will begin there.
-    fn foresee(&mut self, _y: &Self::Y) {}
-
-    /// Records quantities of a state, as rows.
-    fn record(&mut self, _v: &Self::V, _y: &Self::Y, _rows: &mut [f64]) {}
-
-    /// What it adds up over the steps.
-    fn tally(&self) -> &[f64] {
-        &[]
+    /// h·v̇, h times the kinetic and h times the whole energy of a state, if the system has an energy that can be controlled.
+    fn energies(&self, _v: &Block<N>, _y: &Block<N>) -> Option<Energies<N>> {
+        None
     }
 
-    /// What it adds up, to write.
-    fn tally_mut(&mut self) -> &mut [f64] {
-        &mut []
+    /// The gradient of h·E at a state: in the velocities and in the coordinates.
+    fn gradient(&self, _v: &Block<N>, _y: &Block<N>) -> Option<(Block<N>, Block<N>)> {
+        None
+    }
+
+    /// The numbers of a quantity of a state that can be recorded, if the system knows it.
+    fn record(&self, _quantity: &str, _v: &Block<N>, _y: &Block<N>) -> Option<Vec<N>> {
+        None
+    }
+
+    /// The state after a step, corrected: projections onto what should be constant.
+    fn settle(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        (v, y)
+    }
+
+    /// What it has added up since it was made, if it adds anything up.
+    fn tally(&self) -> Option<N> {
+        None
     }
 }
+
+/// What [`System::energies`] gives.
+#[derive(Clone, Debug)]
+pub struct Energies<N: Number> {
+    /// h·v̇
+    pub dv: Block<N>,
+    /// h times the kinetic energy.
+    pub kinetic: N,
+    /// h times the whole energy.
+    pub whole: N,
+}
+
+/// How many numbers the blocks of a system have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Velocities.
+    pub v: usize,
+    /// Coordinates.
+    pub y: usize,
+}
+
+/// Everything that the core knows of a kind of system: its file in `systems/` holds one as `KIND`.
+pub struct Kind {
+    /// The name of its file.
+    pub name: &'static str,
+    /// How large the blocks are, or what is wrong with what was given.
+    pub shape: fn(&Given) -> Result<Shape, Error>,
+    /// The term that depends on the velocity, if there is one: methods that ask for an acceleration refuse it.
+    pub velocity_term: fn(&Given) -> Option<&'static str>,
+    /// Numbers of each quantity that can be recorded; the energy of a system that no quantity is known of is not among them.
+    pub quantities: fn(&Given) -> Vec<(&'static str, usize)>,
+    /// The system over numbers, for tests.
+    pub numbers: Make<f64>,
+    /// The system over symbols.
+    pub symbols: Make<Symbol>,
+}
+
+/// Makes the system of one member, scaled to the step.
+pub type Make<N> = fn(&Parameters<N>) -> Box<dyn System<N>>;

@@ -1,45 +1,39 @@
-//! Explicit Runge-Kutta methods by their tableau, as the papers print them: each sum is a list of stages and their weights, summed
-//! from the left, zeros left out. Stages count from 0.
+//! Explicit Runge-Kutta methods by their tableau, as the papers print them. Zeros are left out of the sums.
 
-use crate::{
-    block::{Block, Work},
-    system::System,
-};
+use crate::program::{Block, Length, Rates, Time};
 
-/// Stage 0: the increments at the start of the step.
-#[inline(always)]
-pub fn first<S: System>(s: &mut S, t: f64, v: &S::V, y: &S::Y, w: &mut Work<S>) {
-    s.dv(t, v, y, &mut w.dv[0]);
-    s.dy(t, v, y, &mut w.dy[0]);
+/// Nodes, one row of weights for each stage, and the weights of the result.
+#[derive(Debug)]
+pub struct Tableau {
+    /// Times of the stages, as shares of the step.
+    pub nodes: &'static [f64],
+    /// Weights of the increments that each stage looks at.
+    pub rows: &'static [&'static [f64]],
 }
 
-/// A later stage: the increments at a time, and at the state that those before lead to.
-#[inline(always)]
-pub fn stage<S: System, const N: usize>(
-    s: &mut S,
-    at: f64,
-    v: &S::V,
-    y: &S::Y,
-    w: &mut Work<S>,
-    stage: usize,
-    terms: [(usize, f64); N],
-) {
-    w.v.sum_weighted(v, &w.dv, terms);
-    w.y.sum_weighted(y, &w.dy, terms);
-    s.dv(at, &w.v, &w.y, &mut w.dv[stage]);
-    s.dy(at, &w.v, &w.y, &mut w.dy[stage]);
+impl Tableau {
+    /// The increments of both blocks, one stage after the other.
+    pub fn stages(&self, s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+        let mut found = Vec::with_capacity(self.nodes.len());
+        for (&node, row) in self.nodes.iter().zip(self.rows) {
+            let at = t + node * h;
+            let (vi, yi) = if row.is_empty() { (v, y) } else { plus(v, y, row, &found) };
+            found.push((s.dv(at, vi, yi), s.dy(at, vi, yi)));
+        }
+        found
+    }
 }
 
-/// The state goes on by the weighted increments.
-#[inline(always)]
-pub fn go_on<S: System, const N: usize>(v: &mut S::V, y: &mut S::Y, w: &Work<S>, terms: [(usize, f64); N]) {
-    v.add_weighted(&w.dv, terms);
-    y.add_weighted(&w.dy, terms);
+/// Both blocks and the weighted sums of their increments.
+pub fn plus(v: Block, y: Block, weights: &[f64], increments: &[(Block, Block)]) -> (Block, Block) {
+    let (dv, dy) = combined(weights, increments);
+    (v + dv, y + dy)
 }
 
-/// An estimate of the error, into `w.v` and `w.y`.
-#[inline(always)]
-pub fn estimate<S: System, const N: usize>(w: &mut Work<S>, terms: [(usize, f64); N]) {
-    w.v.set_weighted(&w.dv, terms);
-    w.y.set_weighted(&w.dy, terms);
+/// The weighted sums of the increments of both blocks, from the left. Panics if all weights are zero.
+pub fn combined(weights: &[f64], increments: &[(Block, Block)]) -> (Block, Block) {
+    let mut terms = weights.iter().zip(increments).filter(|(c, _)| **c != 0.0).map(|(c, (dv, dy))| (*c * *dv, *c * *dy));
+    let first = terms.next();
+    assert!(first.is_some(), "weights of a tableau are all zero");
+    terms.fold(first.unwrap_or(increments[0]), |(v, y), (dv, dy)| (v + dv, y + dy))
 }

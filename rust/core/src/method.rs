@@ -1,0 +1,107 @@
+//! Methods: what there is to say of one, and what it does to blocks.
+
+use crate::program::{Block, Length, Program, Rates, Time};
+
+/// Everything there is to say about a method. Python attributes, `__doc__`, the tables of the docs, the command line, tests,
+/// charts and benches all read it.
+#[derive(Debug)]
+pub struct Record {
+    /// The name users type.
+    pub name: &'static str,
+    /// The document's name, as a title.
+    pub title: &'static str,
+    /// Standard names of the same method.
+    pub other_names: &'static [&'static str],
+    /// Methods that it is easily taken for.
+    pub false_friends: &'static [&'static str],
+    /// Order of convergence of both blocks.
+    pub order: u32,
+    /// What kind of method it is.
+    pub family: &'static str,
+    /// The undamped oscillator is stable for Φ = ω₀T below this; 0 means never.
+    pub limit: f64,
+    /// What it asks of a system.
+    pub needs: Needs,
+    /// What it keeps between steps in the place of `v`, if that is something else.
+    pub carry: Option<Carry>,
+    /// How it estimates the error of a step, if it does: the step can then be chosen to a tolerance.
+    pub estimate: Option<Estimate>,
+    /// Section of the document.
+    pub section: &'static str,
+    /// Where it comes from.
+    pub reference: &'static str,
+    /// What it does, in a few sentences.
+    pub about: &'static str,
+    /// One step: the new v and y.
+    pub step: fn(Rates, Time, Length, Block, Block) -> (Block, Block),
+}
+
+/// What a method asks of a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// Nothing beyond the two increments.
+    Rates,
+    /// A second-order system, ÿ = a(t, y), whose forces do not depend on the velocity.
+    Acceleration,
+}
+
+/// What a method keeps between steps in the place of the velocity.
+#[derive(Debug)]
+pub struct Carry {
+    /// Its name.
+    pub name: &'static str,
+    /// Ways to start, the default first; empty if there is nothing to choose.
+    pub starts: &'static [&'static str],
+    /// Turns the velocity into what is carried. The number is that of the way to start.
+    pub start: fn(Rates, usize, Time, Block, Block) -> Block,
+    /// Turns what is carried back into the velocity: the inverse of `start`.
+    pub finish: fn(Rates, usize, Time, Block, Block) -> Block,
+}
+
+/// How a method estimates the error of a step.
+#[derive(Debug)]
+pub struct Estimate {
+    /// Order of h in which it does.
+    pub order: u32,
+    /// The estimate for both blocks.
+    pub error: fn(Rates, Time, Length, Block, Block) -> (Block, Block),
+    /// A second estimate, of lower order, which corrects the first, so that both together behave as one of the method's order.
+    pub coarse: Option<fn(Rates, Time, Length, Block, Block) -> (Block, Block)>,
+}
+
+impl Record {
+    /// The program of a step: results are the new v and y.
+    pub fn program(&self) -> Program {
+        Program::record(|s, t, h, v, y| {
+            let (v, y) = (self.step)(s, t, h, v, y);
+            vec![v, y]
+        })
+    }
+
+    /// The program of an attempt: results are the new v and y and the estimates of their errors, two or four blocks.
+    pub fn attempt(&self) -> Option<Program> {
+        let estimate = self.estimate.as_ref()?;
+        Some(Program::record(|s, t, h, v, y| {
+            let (new_v, new_y) = (self.step)(s, t, h, v, y);
+            let (error_v, error_y) = (estimate.error)(s, t, h, v, y);
+            let mut results = vec![new_v, new_y, error_v, error_y];
+            if let Some(coarse) = estimate.coarse {
+                let (coarse_v, coarse_y) = coarse(s, t, h, v, y);
+                results.extend([coarse_v, coarse_y]);
+            }
+            results
+        }))
+    }
+
+    /// The program that turns a velocity into what the method carries.
+    pub fn start(&self, choice: usize) -> Option<Program> {
+        let carry = self.carry.as_ref()?;
+        Some(Program::record(|s, t, _, v, y| vec![(carry.start)(s, choice, t, v, y)]))
+    }
+
+    /// The program that turns what the method carries into a velocity.
+    pub fn finish(&self, choice: usize) -> Option<Program> {
+        let carry = self.carry.as_ref()?;
+        Some(Program::record(|s, t, _, v, y| vec![(carry.finish)(s, choice, t, v, y)]))
+    }
+}

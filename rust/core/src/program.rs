@@ -1,0 +1,234 @@
+//! The step program: a method, recorded over blocks.
+//!
+//! A method says which value of which block is used; what a block is made of is not its concern. So it is run once with
+//! [`Block`]s that only write down what is done with them: rates, sums, products with numbers. The program is then carried out over
+//! vectors of numbers or of symbols ([`Program::run`]; that is how it becomes a tape), or over long rows on the heap (`large/`).
+
+use std::{
+    cell::RefCell,
+    collections::HashMap,
+    ops::{Add, Mul, Sub},
+};
+
+use nalgebra::DVector;
+
+use crate::{number::Number, system::System};
+
+/// A velocity or coordinate block, by the number of the entry that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Block(u32);
+
+/// A length of time, as a share of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Length(f64);
+
+/// A time within a step, by its distance from the start as a share of the step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Time(f64);
+
+impl Mul<Length> for f64 {
+    type Output = Length;
+    fn mul(self, h: Length) -> Length {
+        Length(self * h.0)
+    }
+}
+
+impl Add<Length> for Time {
+    type Output = Time;
+    fn add(self, length: Length) -> Time {
+        Time(self.0 + length.0)
+    }
+}
+
+impl Time {
+    /// Its distance from the start of the step, as a share of the step.
+    pub fn node(self) -> f64 {
+        self.0
+    }
+
+    /// t + node·h in numbers.
+    pub fn at<N: Number>(self, t: N, h: N) -> N {
+        match self.0 {
+            0.0 => t,
+            1.0 => t + h,
+            node => t + N::of(node) * h,
+        }
+    }
+}
+
+/// One entry of a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Entry {
+    /// The block in the place of v at the start of the step.
+    V,
+    /// The coordinates at the start of the step.
+    Y,
+    /// h·v̇ at a time and a state.
+    Dv(Time, Block, Block),
+    /// h·ẏ at a time and a state.
+    Dy(Time, Block, Block),
+    /// The velocity whose increment of y is this block.
+    Velocity(Block),
+    /// a + b
+    Add(Block, Block),
+    /// a − b
+    Sub(Block, Block),
+    /// c·a
+    Scale(f64, Block),
+}
+
+impl Entry {
+    /// The blocks that it reads.
+    pub fn operands(self) -> Vec<Block> {
+        match self {
+            Entry::V | Entry::Y => vec![],
+            Entry::Velocity(a) | Entry::Scale(_, a) => vec![a],
+            Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
+        }
+    }
+
+    /// What tells it from others. Numbers are compared by their bits.
+    fn key(self) -> (u8, u64, u32, u32) {
+        match self {
+            Entry::V => (0, 0, 0, 0),
+            Entry::Y => (1, 0, 0, 0),
+            Entry::Dv(t, a, b) => (2, t.0.to_bits(), a.0, b.0),
+            Entry::Dy(t, a, b) => (3, t.0.to_bits(), a.0, b.0),
+            Entry::Velocity(a) => (4, 0, a.0, 0),
+            Entry::Add(a, b) => (5, 0, a.0, b.0),
+            Entry::Sub(a, b) => (6, 0, a.0, b.0),
+            Entry::Scale(c, a) => (7, c.to_bits(), a.0, 0),
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct Recording {
+    entries: Vec<Entry>,
+    seen: HashMap<(u8, u64, u32, u32), Block>,
+}
+
+thread_local! {
+    static RECORDING: RefCell<Recording> = RefCell::new(Recording::default());
+}
+
+fn write(entry: Entry) -> Block {
+    RECORDING.with_borrow_mut(|recording| {
+        let next = Block(recording.entries.len() as u32);
+        *recording.seen.entry(entry.key()).or_insert_with(|| {
+            recording.entries.push(entry);
+            next
+        })
+    })
+}
+
+impl Add for Block {
+    type Output = Block;
+    fn add(self, other: Block) -> Block {
+        write(Entry::Add(self, other))
+    }
+}
+
+impl Sub for Block {
+    type Output = Block;
+    fn sub(self, other: Block) -> Block {
+        write(Entry::Sub(self, other))
+    }
+}
+
+impl Mul<Block> for f64 {
+    type Output = Block;
+    fn mul(self, block: Block) -> Block {
+        write(Entry::Scale(self, block))
+    }
+}
+
+/// The system as a method sees it: increments of both blocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates(());
+
+impl Rates {
+    /// h·v̇(t, v, y)
+    pub fn dv(self, t: Time, v: Block, y: Block) -> Block {
+        write(Entry::Dv(t, v, y))
+    }
+
+    /// h·ẏ(t, v, y)
+    pub fn dy(self, t: Time, v: Block, y: Block) -> Block {
+        write(Entry::Dy(t, v, y))
+    }
+
+    /// The velocity whose increment of y is d, in a second-order system.
+    pub fn velocity(self, d: Block) -> Block {
+        write(Entry::Velocity(d))
+    }
+}
+
+/// What a method does to blocks, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    /// The entries, each after what it reads.
+    pub entries: Vec<Entry>,
+    /// The blocks that it is for: of a step the new v and y, then those of estimates of the error.
+    pub results: Vec<Block>,
+}
+
+impl Program {
+    /// Records what a method does.
+    pub fn record(method: impl FnOnce(Rates, Time, Length, Block, Block) -> Vec<Block>) -> Program {
+        let outer = RECORDING.take();
+        let (v, y) = (write(Entry::V), write(Entry::Y));
+        let results = method(Rates(()), Time(0.0), Length(1.0), v, y);
+        let recording = RECORDING.replace(outer);
+        Program { entries: recording.entries, results }
+    }
+
+    /// How often the rate of v is asked for.
+    pub fn evaluations(&self) -> usize {
+        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..))).count()
+    }
+
+    /// Times within a step at which the rates are asked for, as shares of the step, ascending.
+    ///
+    /// `of_y`: those of ẏ count too; of a second-order system it does not depend on the time.
+    pub fn nodes(&self, of_y: bool) -> Vec<f64> {
+        let mut nodes: Vec<f64> = Vec::new();
+        for entry in &self.entries {
+            match entry {
+                Entry::Dv(t, ..) => nodes.push(t.0),
+                Entry::Dy(t, ..) if of_y => nodes.push(t.0),
+                _ => {}
+            }
+        }
+        nodes.sort_by(f64::total_cmp);
+        nodes.dedup();
+        nodes
+    }
+
+    /// Carries the program out over vectors of numbers, and gives its results.
+    pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
+        let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
+        for entry in &self.entries {
+            let of = |block: Block| &blocks[block.0 as usize];
+            let made = match *entry {
+                Entry::V => v.clone(),
+                Entry::Y => y.clone(),
+                Entry::Dv(at, v, y) => s.dv(at.at(t, h), of(v), of(y)),
+                Entry::Dy(at, v, y) => s.dy(at.at(t, h), of(v), of(y)),
+                Entry::Velocity(d) => s.velocity(of(d)),
+                Entry::Add(a, b) => of(a).zip_map(of(b), |a, b| a + b),
+                Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
+                Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),
+            };
+            blocks.push(made);
+        }
+        self.results.iter().map(|block| blocks[block.0 as usize].clone()).collect()
+    }
+}
+
+impl Block {
+    /// The number of the entry that makes it.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}

@@ -1,0 +1,166 @@
+//! What is to be stepped, as it is given: words, whole numbers, rows of parameters and tables of samples, each by its name.
+
+use crate::{error::Error, number::Number};
+
+/// The numbers of one parameter or input, for every member.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a>(pub &'a [f64]);
+
+impl Row<'_> {
+    /// Whether one number serves all members.
+    pub fn is_common(&self) -> bool {
+        self.0.len() == 1
+    }
+
+    /// The value for a member; a row of length one serves all.
+    pub fn at(&self, member: usize) -> f64 {
+        match self.0 {
+            [one] => *one,
+            many => many.get(member).copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    /// The values for the members from `first`; what is past the `count`-th repeats the last.
+    pub fn fill(&self, first: usize, count: usize, lanes: &mut [f64]) {
+        match self.0 {
+            [one] => lanes.fill(*one),
+            many => {
+                lanes[..count].copy_from_slice(&many[first..first + count]);
+                lanes[count..].fill(many[first + count - 1]);
+            }
+        }
+    }
+}
+
+/// A sampled input: `samples[i]` holds from `start + i·interval` until the next sample.
+#[derive(Clone, Debug)]
+pub struct Table<'a> {
+    /// One row per sample.
+    pub samples: Vec<Row<'a>>,
+    /// Time of the first sample.
+    pub start: f64,
+    /// Time from one sample to the next.
+    pub interval: f64,
+}
+
+/// Names of what is given, and how much of it there is: all that a step depends on but for the numbers themselves.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Given {
+    /// The system's name: its file in `systems/`.
+    pub system: String,
+    /// Choices, such as the form of an oscillator.
+    pub words: Vec<(String, String)>,
+    /// Whole numbers, such as the dimensions of a space.
+    pub wholes: Vec<(String, usize)>,
+    /// Parameters: how many rows each has, and for each row whether all members have it in common.
+    pub rows: Vec<(String, Vec<bool>)>,
+    /// Sampled inputs, and whether all members have all samples in common.
+    pub tables: Vec<(String, bool)>,
+}
+
+fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {
+    list.iter().find(|(known, _)| known == name).map(|(_, value)| value)
+}
+
+impl Given {
+    /// The choice of that name; empty if none was made.
+    pub fn word(&self, name: &str) -> &str {
+        find(&self.words, name).map_or("", String::as_str)
+    }
+
+    /// The whole number of that name; zero if it was not given.
+    pub fn whole(&self, name: &str) -> usize {
+        find(&self.wholes, name).copied().unwrap_or(0)
+    }
+
+    /// How many rows the parameter of that name has; zero if it was not given.
+    pub fn count(&self, name: &str) -> usize {
+        find(&self.rows, name).map_or(0, Vec::len)
+    }
+
+    /// Whether anything of that name was given: a parameter, or an input of any kind.
+    pub fn has(&self, name: &str) -> bool {
+        self.count(name) > 0 || find(&self.tables, name).is_some() || self.count(&format!("{name}.amplitude")) > 0
+    }
+
+    /// How many rows of parameters there are in all.
+    pub fn parameters(&self) -> usize {
+        self.rows.iter().map(|(_, rows)| rows.len()).sum()
+    }
+
+    /// The place of a parameter's first row among all.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        let at = self.rows.iter().position(|(known, _)| known == name)?;
+        Some(self.rows[..at].iter().map(|(_, rows)| rows.len()).sum())
+    }
+
+    /// Whether all members have a row of parameters in common.
+    pub fn is_common(&self, row: u32) -> bool {
+        self.rows.iter().flat_map(|(_, rows)| rows).nth(row as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether all members have a sampled input in common.
+    pub fn is_common_table(&self, table: u32) -> bool {
+        self.tables.get(table as usize).is_some_and(|(_, common)| *common)
+    }
+
+    /// The error for a choice that the system does not know.
+    pub fn unknown(&self, name: &str) -> Error {
+        Error::Options { system: self.system.clone(), options: format!("{name} = {:?}", self.word(name)) }
+    }
+}
+
+/// Which system, with which parameters.
+#[derive(Clone, Debug, Default)]
+pub struct Spec<'a> {
+    /// Names and counts.
+    pub given: Given,
+    /// The rows of all parameters, in the order of `given`.
+    pub rows: Vec<Row<'a>>,
+    /// The sampled inputs, likewise.
+    pub tables: Vec<Table<'a>>,
+}
+
+/// The numbers of one member, by name: what a system is made of.
+pub struct Parameters<'a, N: Number> {
+    /// Names and counts.
+    pub given: &'a Given,
+    /// The step.
+    pub h: N,
+    /// All parameters, in the order of `given`.
+    pub numbers: Vec<N>,
+    /// A sampled input, by its number, at a time.
+    pub sample: fn(u32, N) -> N,
+}
+
+impl<N: Number> Parameters<'_, N> {
+    /// A parameter of one number that is surely given; a NaN if it is not.
+    pub fn number(&self, name: &str) -> N {
+        self.maybe(name).unwrap_or_else(|| N::of(f64::NAN))
+    }
+
+    /// A parameter of one number, if it was given.
+    pub fn maybe(&self, name: &str) -> Option<N> {
+        self.numbers(name).first().copied()
+    }
+
+    /// A parameter of several numbers; none if it was not given.
+    pub fn numbers(&self, name: &str) -> &[N] {
+        let Some(first) = self.given.place(name) else { return &[] };
+        &self.numbers[first..first + self.given.count(name)]
+    }
+
+    /// The input of that name, if it was given.
+    pub fn signal(&self, name: &str) -> Option<crate::signal::Signal<N>> {
+        use crate::signal::Signal;
+        if let Some(value) = self.maybe(name) {
+            return Some(Signal::Constant(value));
+        }
+        if let Some(table) = self.given.tables.iter().position(|(known, _)| known == name) {
+            return Some(Signal::Held { table: table as u32, sample: self.sample, factor: None });
+        }
+        let part = |part: &str| self.maybe(&format!("{name}.{part}"));
+        let (amplitude, omega, phase) = (part("amplitude")?, part("omega")?, part("phase")?);
+        Some(Signal::Sine { amplitude, omega, phase })
+    }
+}
