@@ -11,7 +11,10 @@ pub mod spec;
 pub mod system;
 pub mod tape;
 pub mod method;
+pub mod pace;
+pub mod run;
 pub mod tableau;
+pub mod trace;
 
 /// The methods, one file each; `build.rs` lists the folder.
 #[allow(missing_docs, reason = "each file documents its method in the record")]

@@ -4,8 +4,9 @@
 //! code at run time ([`x86`]); the bits are the same.
 
 pub mod interpret;
+pub mod runner;
 
-use crate::tape::split::Body;
+use crate::{isa::Level, tape::split::Body};
 
 /// What a kernel works on. Rows are `lanes` numbers long, one for each member, and follow each other.
 #[derive(Debug)]
@@ -52,4 +53,35 @@ pub fn check(body: &Body, lanes: usize, tile: &Tile) {
             assert!(places.clone().all(|at| (*at as usize).saturating_add(lanes) <= tile.held.len()), "held");
         }
     }
+}
+
+/// How a body becomes machine code. There is none without a kernel writer for this machine.
+#[derive(Clone, Debug)]
+pub struct Shape {}
+
+impl Shape {
+    /// How long rows are.
+    pub fn lanes(&self) -> usize {
+        0
+    }
+
+    /// Costs
+    pub fn blocks(&self) -> usize {
+        0
+    }
+}
+
+/// c
+pub fn choose(_body: &Body, _level: Level, _width: runner::Width) -> Option<Shape> {
+    None
+}
+
+/// c
+pub fn choose_long(_body: &Body, _level: Level, _lanes: usize) -> Option<Shape> {
+    None
+}
+
+/// c
+pub fn write(_body: &Body, _shape: &Shape) -> Option<Box<dyn Kernel>> {
+    None
 }

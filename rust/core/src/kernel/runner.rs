@@ -1,0 +1,90 @@
+//! A body and what makes its steps: interpreted at first, written as machine code when that pays.
+
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicU64, Ordering::Relaxed},
+};
+
+use super::{Kernel, interpret::Interpreter};
+use crate::{isa::Level, tape::split::Body};
+
+/// How many members to expect: a wide tile has the throughput, a narrow one the latency.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Width {
+    /// As many lanes as keep the machine busy.
+    Wide,
+    /// One vector of lanes, for a few members.
+    Few,
+    /// One member.
+    One,
+}
+
+impl Width {
+    /// All of them.
+    pub const ALL: [Width; 3] = [Width::Wide, Width::Few, Width::One];
+}
+
+/// Steps times lanes that are interpreted before machine code is written: writing takes about as long as interpreting so many.
+const INTERPRETED: u64 = 2000;
+
+/// Lanes that the interpreter takes at once where nothing else sets their number: the values of a step stay in the first cache.
+const INTERPRETED_LANES: [usize; 3] = [64, 8, 1];
+
+/// A body at a width.
+pub struct Runner {
+    body: Body,
+    lanes: usize,
+    interpreter: Interpreter,
+    /// How it would be written; none where no machine code can be.
+    shape: Option<super::Shape>,
+    written: OnceLock<Option<Box<dyn Kernel>>>,
+    /// Steps times lanes that were made so far.
+    done: AtomicU64,
+}
+
+impl Runner {
+    /// For so many members as the width says.
+    pub fn new(body: &Body, level: Level, width: Width) -> Runner {
+        let shape = super::choose(body, level, width);
+        let lanes = shape.as_ref().map_or(INTERPRETED_LANES[width as usize], super::Shape::lanes);
+        Runner::shaped(body, level, lanes, shape)
+    }
+
+    /// For rows of so many lanes, each a number of a long block.
+    pub fn long(body: &Body, level: Level, lanes: usize) -> Runner {
+        Runner::shaped(body, level, lanes, super::choose_long(body, level, lanes))
+    }
+
+    fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<super::Shape>) -> Runner {
+        let interpreter = Interpreter::new(body, lanes, level);
+        Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }
+    }
+
+    /// How long rows are.
+    pub fn lanes(&self) -> usize {
+        self.lanes
+    }
+
+    /// How many vectors of lanes a step of the tile costs, beside that of a narrow one.
+    pub fn blocks(&self) -> usize {
+        self.shape.as_ref().map_or(self.lanes.div_ceil(8), super::Shape::blocks)
+    }
+
+    /// What it makes steps of.
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// What makes so many more steps, and whether that is machine code.
+    pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
+        let coming = (steps * self.lanes) as u64;
+        if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED && self.written.get().is_none() {
+            return (&self.interpreter, false);
+        }
+        let write = || self.shape.as_ref().and_then(|shape| super::write(&self.body, shape));
+        match self.written.get_or_init(write) {
+            Some(written) => (written.as_ref(), true),
+            None => (&self.interpreter, false),
+        }
+    }
+}

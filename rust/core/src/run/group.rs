@@ -1,0 +1,179 @@
+//! Groups: a handful of members stepped together, whatever they are made of.
+
+use std::sync::Arc;
+
+use super::{
+    aligned::Aligned,
+    stage::{Clock, Loaded, Stage},
+};
+use crate::{isa::Level, kernel::runner::Width, spec::Spec, trace::Traced};
+
+/// A handful of members stepped together.
+///
+/// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
+/// method carries between steps, which is the velocity for all but the methods that say otherwise in their record.
+pub trait Group: Send {
+    /// How many members it steps together.
+    fn lanes(&self) -> usize;
+
+    /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Both slots.
+    fn slots(&self) -> (&[f64], &[f64]);
+
+    /// Both slots, to write.
+    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]);
+
+    /// Turns velocities in the `v` slot into what the method carries, at step `k`.
+    fn start(&mut self, k: i64);
+
+    /// `n` steps from step `k`.
+    fn advance(&mut self, k: i64, n: i64);
+
+    /// Turns what the method carries into velocities, at step `k`: the inverse of `start`.
+    fn finish(&mut self, k: i64);
+
+    /// How many numbers of a member it records.
+    fn recorded(&self) -> usize;
+
+    /// Records the present state, whose v slot is finished: rows of lanes.
+    fn record(&mut self, rows: &mut [f64]);
+
+    /// What the system adds up over the steps, a row of lanes or nothing.
+    fn tally(&self) -> &[f64];
+
+    /// What the system adds up, to write.
+    fn tally_mut(&mut self) -> &mut [f64];
+}
+
+/// A stage that is run once in a while, over a state of its own.
+struct Aside {
+    loaded: Loaded,
+    /// The state, with what the stage makes behind it.
+    state: Vec<f64>,
+}
+
+impl Aside {
+    fn new(stage: &Stage, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> Aside {
+        let loaded = Loaded::with(stage, stage.runner_of(level, lanes), spec, level, clock, f64::INFINITY);
+        Aside { loaded, state: vec![0.0; stage.split.body.next.len() * lanes] }
+    }
+
+    /// Runs the stage once over a state, and gives what it makes of it.
+    fn run(&mut self, stage: &Stage, clock: &Clock, k: i64, from: &[f64]) -> &[f64] {
+        let shared = from.len().min(self.state.len());
+        self.state[..shared].copy_from_slice(&from[..shared]);
+        self.loaded.advance(stage, clock, k, 1, &mut self.state);
+        &self.state
+    }
+}
+
+/// Members of a system whose whole step is one tape.
+pub struct Lanes {
+    traced: Arc<Traced>,
+    clock: Clock,
+    step: Loaded,
+    start: Option<Aside>,
+    finish: Option<Aside>,
+    record: Option<Aside>,
+    state: Aligned,
+}
+
+impl Lanes {
+    /// For tiles of so many lanes as the width says.
+    pub fn new(traced: Arc<Traced>, spec: &Spec, level: Level, width: Width, clock: &Clock) -> Lanes {
+        let step = Loaded::new(&traced.step, spec, level, width, clock, f64::INFINITY);
+        let lanes = step.lanes();
+        let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
+        let aside = |stage: &Option<Stage>| stage.as_ref().map(|stage| Aside::new(stage, spec, level, lanes, clock));
+        Lanes {
+            state: Aligned::new(numbers * lanes),
+            clock: *clock,
+            start: aside(&traced.start),
+            finish: aside(&traced.finish),
+            record: aside(&traced.record),
+            step,
+            traced,
+        }
+    }
+
+    /// The stages that are run once in a while.
+    fn asides(&mut self) -> impl Iterator<Item = (&mut Aside, &Stage)> {
+        let Lanes { traced, start, finish, record, .. } = self;
+        let all = [(start, &traced.start), (finish, &traced.finish), (record, &traced.record)];
+        all.into_iter().filter_map(|(aside, stage)| Some((aside.as_mut()?, stage.as_ref()?)))
+    }
+
+    /// Numbers of both slots.
+    fn sizes(&self) -> (usize, usize) {
+        let lanes = self.step.lanes();
+        (self.traced.shape.v * lanes, self.traced.shape.y * lanes)
+    }
+}
+
+impl Group for Lanes {
+    fn lanes(&self) -> usize {
+        self.step.lanes()
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
+        self.step.prepare(&self.traced.step, spec, first, count);
+        for (aside, stage) in self.asides() {
+            aside.loaded.prepare(stage, spec, first, count);
+        }
+        self.tally_mut().fill(0.0);
+    }
+
+    fn slots(&self) -> (&[f64], &[f64]) {
+        let (v, y) = self.sizes();
+        self.state[..v + y].split_at(v)
+    }
+
+    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        let (v, y) = self.sizes();
+        self.state[..v + y].split_at_mut(v)
+    }
+
+    fn start(&mut self, k: i64) {
+        let v = self.sizes().0;
+        if let (Some(aside), Some(stage)) = (&mut self.start, &self.traced.start) {
+            let made = aside.run(stage, &self.clock, k, &self.state);
+            self.state[..v].copy_from_slice(&made[..v]);
+        }
+    }
+
+    fn advance(&mut self, k: i64, n: i64) {
+        self.step.advance(&self.traced.step, &self.clock, k, n as usize, &mut self.state);
+    }
+
+    fn finish(&mut self, k: i64) {
+        let v = self.sizes().0;
+        if let (Some(aside), Some(stage)) = (&mut self.finish, &self.traced.finish) {
+            let made = aside.run(stage, &self.clock, k, &self.state);
+            self.state[..v].copy_from_slice(&made[..v]);
+        }
+    }
+
+    fn recorded(&self) -> usize {
+        self.traced.recorded
+    }
+
+    fn record(&mut self, rows: &mut [f64]) {
+        let (v, y) = self.sizes();
+        if let (Some(aside), Some(stage)) = (&mut self.record, &self.traced.record) {
+            let made = aside.run(stage, &self.clock, 0, &self.state[..v + y]);
+            rows.copy_from_slice(&made[v + y..]);
+        }
+    }
+
+    fn tally(&self) -> &[f64] {
+        let (v, y) = self.sizes();
+        &self.state[v + y..]
+    }
+
+    fn tally_mut(&mut self) -> &mut [f64] {
+        let (v, y) = self.sizes();
+        &mut self.state[v + y..]
+    }
+}

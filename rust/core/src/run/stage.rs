@@ -1,0 +1,259 @@
+//! A cut tape, ready to be run over tiles: the hot loop, and what is computed before it.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use super::aligned::Aligned;
+use crate::{
+    isa::Level,
+    kernel::{
+        Kernel, Tile,
+        interpret::Interpreter,
+        runner::{Runner, Width},
+    },
+    spec::Spec,
+    tape::split::{Entry, Given, Split},
+    trace::BUDGET,
+};
+
+/// A cut tape with its kernels, which are made when they are first asked for and kept.
+pub struct Stage {
+    /// The tape.
+    pub split: Split,
+    runners: [[OnceLock<Arc<Runner>>; Width::ALL.len()]; Level::ALL.len()],
+    /// Those for rows of a length that something else has set.
+    long: Mutex<Vec<(Level, usize, Arc<Runner>)>>,
+}
+
+impl Stage {
+    /// Of a tape that was cut.
+    pub fn new(split: Split) -> Stage {
+        Stage { split, runners: Default::default(), long: Mutex::default() }
+    }
+
+    /// Operations of all its bodies.
+    pub fn size(&self) -> usize {
+        let split = &self.split;
+        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum()
+    }
+
+    /// What makes its steps at a width.
+    pub fn runner(&self, level: Level, width: Width) -> Arc<Runner> {
+        let slot = &self.runners[level as usize][width as usize];
+        Arc::clone(slot.get_or_init(|| Arc::new(Runner::new(&self.split.body, level, width))))
+    }
+
+    /// What makes its steps over rows of so many lanes.
+    pub fn runner_of(&self, level: Level, lanes: usize) -> Arc<Runner> {
+        let mut long = self.long.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, known)) = long.iter().find(|(at, wide, _)| (*at, *wide) == (level, lanes)) {
+            return Arc::clone(known);
+        }
+        let made = Arc::new(Runner::long(&self.split.body, level, lanes));
+        long.push((level, lanes, Arc::clone(&made)));
+        made
+    }
+}
+
+/// Time and step: t = `t0` + k·`h` at step k, never accumulated.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    /// Time of step 0.
+    pub t0: f64,
+    /// The step.
+    pub h: f64,
+}
+
+impl Clock {
+    /// The time of step `k`.
+    #[inline]
+    pub fn at(&self, k: i64) -> f64 {
+        self.t0 + k as f64 * self.h
+    }
+}
+
+/// Tables of steps that are kept, in numbers: groups after the first find them there.
+const MOST_ENTRIES: usize = 1 << 16;
+
+/// A stage with the numbers of some members: all that its hot loop reads.
+pub struct Loaded {
+    runner: Arc<Runner>,
+    member: Interpreter,
+    step: Interpreter,
+    /// What is the same for all members, in the order of [`Split::given`].
+    given: Vec<f64>,
+    /// The uniforms of the hot loop.
+    uniforms: Vec<f64>,
+    /// The same as the kernel wants them, and whether that kernel is machine code.
+    pool: Aligned,
+    pool_for: Option<bool>,
+    rows: Aligned,
+    held: Aligned,
+    /// Where in `held` the samples of each input begin.
+    inputs: Vec<usize>,
+    /// Samples that all members have in common.
+    common: Vec<Vec<f64>>,
+    /// Tables of steps, by their first step.
+    tables: Vec<(i64, Vec<u64>)>,
+    raw: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Loaded {
+    /// For tiles of so many lanes as the width says. `budget` is the most attempts of a member, for those.
+    pub fn new(stage: &Stage, spec: &Spec, level: Level, width: Width, clock: &Clock, budget: f64) -> Loaded {
+        Loaded::with(stage, stage.runner(level, width), spec, level, clock, budget)
+    }
+
+    /// With a kernel that was chosen already.
+    pub fn with(stage: &Stage, runner: Arc<Runner>, spec: &Spec, level: Level, clock: &Clock, budget: f64) -> Loaded {
+        let split = &stage.split;
+        let last = |input: u32| spec.tables[input as usize].samples.len() as f64 - 1.0;
+        let number = |given: &Given| match *given {
+            Given::Step => clock.h,
+            Given::Param(BUDGET) => budget,
+            Given::Param(i) => spec.rows[i as usize].at(0),
+            Given::Start(input) => spec.tables[input as usize].start,
+            Given::Interval(input) => spec.tables[input as usize].interval,
+            Given::Last(input) => last(input),
+        };
+        let given: Vec<f64> = split.given.iter().map(number).collect();
+        let mut uniforms = vec![0.0; split.run.next.len()];
+        let mut scratch = Vec::new();
+        let tile = &mut Tile { state: &mut uniforms, rows: &[], pool: &given, steps: 1, per_step: &[], held: &[] };
+        Interpreter::new(&split.run, 1, Level::Baseline).run(tile, &mut scratch);
+        let lanes = runner.lanes();
+        let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
+        Loaded {
+            member: Interpreter::new(&split.member, lanes, level),
+            step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
+            given,
+            uniforms,
+            pool: Aligned::new(0),
+            pool_for: None,
+            rows: Aligned::new(split.member.next.len() * lanes),
+            held: Aligned::new(0),
+            inputs: Vec::new(),
+            common,
+            tables: Vec::new(),
+            raw: vec![0.0; split.params.len() * lanes],
+            scratch,
+            runner,
+        }
+    }
+
+    /// How long rows are.
+    pub fn lanes(&self) -> usize {
+        self.runner.lanes()
+    }
+
+    /// What makes the steps.
+    pub fn runner(&self) -> &Arc<Runner> {
+        &self.runner
+    }
+
+    /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last.
+    pub fn prepare(&mut self, stage: &Stage, spec: &Spec, first: usize, count: usize) {
+        let lanes = self.lanes();
+        for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
+            spec.rows[*param as usize].fill(first, count, raw);
+        }
+        let (rows, given) = (&mut self.rows, &self.given);
+        let tile = &mut Tile { state: rows, rows: &self.raw, pool: given, steps: 1, per_step: &[], held: &[] };
+        self.member.run(tile, &mut self.scratch);
+        self.take_samples(stage, spec, |row, to| row.fill(first, count, to));
+    }
+
+    /// Takes the parameters of a member into one lane.
+    pub fn prepare_lane(&mut self, stage: &Stage, spec: &Spec, lane: usize, member: usize) {
+        let split = &stage.split;
+        let raw: Vec<f64> = split.params.iter().map(|param| spec.rows[*param as usize].at(member)).collect();
+        let mut made = vec![0.0; split.member.next.len()];
+        let tile = &mut Tile { state: &mut made, rows: &raw, pool: &self.given, steps: 1, per_step: &[], held: &[] };
+        Interpreter::new(&split.member, 1, Level::Baseline).run(tile, &mut self.scratch);
+        let lanes = self.lanes();
+        for (row, number) in self.rows.chunks_exact_mut(lanes).zip(made) {
+            row[lane] = number;
+        }
+        self.take_samples(stage, spec, |row, to| to[lane] = row.at(member));
+    }
+
+    /// Fills the rows of samples of inputs of which members have their own.
+    fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
+        let lanes = self.lanes();
+        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)));
+        if !of_members {
+            return;
+        }
+        if self.inputs.is_empty() {
+            let mut rows = 0;
+            for table in &spec.tables {
+                self.inputs.push(rows * lanes);
+                rows += table.samples.len();
+            }
+            self.held = Aligned::new(rows * lanes);
+        }
+        let rows = spec.tables.iter().flat_map(|table| &table.samples);
+        for (to, row) in self.held.chunks_exact_mut(lanes).zip(rows) {
+            take(row, to);
+        }
+    }
+
+    /// So many steps of a state from step `k`.
+    pub fn advance(&mut self, stage: &Stage, clock: &Clock, k: i64, n: usize, state: &mut [f64]) {
+        if stage.split.entries.is_empty() {
+            self.steps(n, None, state);
+            return;
+        }
+        let (mut k, until) = (k, k + n as i64);
+        while k < until {
+            let first = k.div_euclid(STEPS_AT_ONCE) * STEPS_AT_ONCE;
+            let n = (until - k).min(first + STEPS_AT_ONCE - k);
+            let table = self.table(stage, clock, first);
+            self.steps(n as usize, Some((table, (k - first) as usize * stage.split.entries.len())), state);
+            k += n;
+        }
+    }
+
+    fn steps(&mut self, steps: usize, table: Option<(usize, usize)>, state: &mut [f64]) {
+        let (kernel, written) = self.runner.kernel(steps);
+        if self.pool_for != Some(written) {
+            self.pool = Aligned::from(&kernel.pool(&self.uniforms));
+            self.pool_for = Some(written);
+        }
+        let per_step = table.map_or(&[][..], |(at, from)| &self.tables[at].1[from..]);
+        let tile = &mut Tile { state, rows: &self.rows, pool: &self.pool, steps, per_step, held: &self.held };
+        kernel.run(tile, &mut self.scratch);
+    }
+
+    /// The table of [`STEPS_AT_ONCE`] steps from step `first`, by its place among those that are kept.
+    fn table(&mut self, stage: &Stage, clock: &Clock, first: i64) -> usize {
+        if let Some(at) = self.tables.iter().position(|(from, _)| *from == first) {
+            return at;
+        }
+        let (entries, steps) = (&stage.split.entries, STEPS_AT_ONCE as usize);
+        if self.tables.iter().map(|(_, table)| table.len()).sum::<usize>() + steps * entries.len() > MOST_ENTRIES {
+            self.tables.clear();
+        }
+        let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
+        let mut values = vec![0.0; entries.len() * steps];
+        let tile = &mut Tile { state: &mut values, rows: &times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
+        self.step.run(tile, &mut self.scratch);
+        let lanes = self.lanes();
+        let mut table = vec![0; steps * entries.len()];
+        for (e, entry) in entries.iter().enumerate() {
+            for step in 0..steps {
+                let value = values[e * steps + step];
+                table[step * entries.len() + e] = match *entry {
+                    Entry::Value => value.to_bits(),
+                    Entry::Sample(input) => self.common[input as usize][value as usize].to_bits(),
+                    Entry::Row(input) => (self.inputs[input as usize] + value as usize * lanes) as u64,
+                };
+            }
+        }
+        self.tables.push((first, table));
+        self.tables.len() - 1
+    }
+}
+
+/// Steps of a table, which begins at a multiple of them: they are the lanes in which it is computed.
+const STEPS_AT_ONCE: i64 = 256;

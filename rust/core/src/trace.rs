@@ -1,0 +1,318 @@
+//! From a system and a method to tapes: what a run needs of them, cut by how often it changes.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+};
+
+use crate::{
+    controls,
+    error::Error,
+    method::Record,
+    number::{Number, Symbol, record},
+    pace::{Pace, attempt},
+    program::Program,
+    run::stage::Stage,
+    spec::{Given, Parameters},
+    system::{Block, Kind, Shape, System},
+    tape::{Counts, Id, Op, Tape, split::split},
+};
+
+/// What makes a step.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum How {
+    /// A method, by its name, started in its `choice`-th way.
+    Method {
+        /// The method's name.
+        name: String,
+        /// Which of its ways to start.
+        choice: usize,
+    },
+    /// Attempts at steps of chosen length by a method.
+    Attempts {
+        /// The method's name.
+        name: String,
+    },
+    /// The transition-matrix form (Appendix B): s ← P·s + Σ Q·u, with the inputs at these nodes, by the bits of each.
+    Matrix {
+        /// Times of the inputs, as fractions of a step, by their bits.
+        nodes: Vec<u64>,
+    },
+}
+
+/// What a tape is made for.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Scene {
+    /// What is given.
+    pub given: Given,
+    /// What makes the step.
+    pub how: How,
+    /// Quantities that are recorded beside states.
+    pub record: Vec<String>,
+}
+
+/// The tapes of a scene.
+pub struct Traced {
+    /// How large the blocks are.
+    pub shape: Shape,
+    /// Whether the system adds something up, in a number of the state behind v and y.
+    pub tally: bool,
+    /// One step, or one attempt, of the whole state.
+    pub step: Stage,
+    /// Turns velocities into what the method carries.
+    pub start: Option<Stage>,
+    /// Turns what the method carries into velocities.
+    pub finish: Option<Stage>,
+    /// The recorded numbers, behind v and y.
+    pub record: Option<Stage>,
+    /// How many numbers are recorded.
+    pub recorded: usize,
+    /// Operations of a step as the document writes them.
+    pub written: Counts,
+}
+
+/// A traced step, before it is cut: for tests, listings and comparisons.
+#[derive(Clone, Debug)]
+pub struct Steps {
+    /// The tape.
+    pub tape: Tape,
+    /// The next state.
+    pub next: Vec<Id>,
+    /// How large the blocks are.
+    pub shape: Shape,
+    /// Whether a tally stands behind them.
+    pub tally: bool,
+}
+
+/// The leaves of a tape: parameters, sampled inputs, the step.
+fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
+    let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
+    Parameters { given, h, numbers, sample: |table, t| Symbol::new(Op::Sample(table, t.0)) }
+}
+
+fn block(first: usize, count: usize) -> Block<Symbol> {
+    Block::from_fn(count, |i, _| Symbol::new(Op::State((first + i) as u32)))
+}
+
+/// The system of a scene, scaled to the step h, under its control if it has one.
+fn system(kind: &Kind, p: &Parameters<Symbol>, tally: Symbol) -> Box<dyn System<Symbol>> {
+    controls::wrap(p, (kind.symbols)(p), tally)
+}
+
+/// How large the blocks of a scene are.
+pub fn shape(given: &Given) -> Result<Shape, Error> {
+    if given.system == "matrix" {
+        let n = given.whole("n");
+        let v = given.whole("n_v").min(n);
+        return Ok(Shape { v, y: n - v });
+    }
+    (kind(given)?.shape)(given)
+}
+
+/// The kind of system that is given.
+pub fn kind(given: &Given) -> Result<&'static Kind, Error> {
+    crate::systems::KINDS.iter().copied().find(|kind| kind.name == given.system).ok_or_else(|| Error::UnknownSystem {
+        name: given.system.clone(),
+        known: crate::systems::KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// The record of a method.
+pub fn method(name: &str) -> Result<&'static Record, Error> {
+    crate::steppers::RECORDS.iter().copied().find(|r| r.name == name).ok_or_else(|| Error::UnknownMethod {
+        name: name.to_owned(),
+        known: crate::steppers::RECORDS.iter().map(|r| r.name).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// Numbers of a recorded quantity.
+fn quantity(given: &Given, name: &str) -> Result<usize, Error> {
+    let known = (kind(given)?.quantities)(given);
+    let found = known.iter().find(|(known, _)| *known == name);
+    found
+        .map(|(_, numbers)| *numbers)
+        .ok_or_else(|| Error::Options { system: given.system.clone(), options: format!("record {name}") })
+}
+
+/// How many numbers are recorded in all.
+pub fn recorded(given: &Given, names: &[String]) -> Result<usize, Error> {
+    names.iter().try_fold(0, |sum, name| Ok(sum + quantity(given, name)?))
+}
+
+/// The number of a parameter that no system has: the most attempts of a member.
+pub const BUDGET: u32 = u32::MAX / 4;
+
+/// Traces one step of a scene onto a tape that may hold something already.
+pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> {
+    let shape = shape(given)?;
+    match how {
+        How::Matrix { nodes } => {
+            let (tape, next) = record(tape, || matrix(given, shape, nodes));
+            Ok(Steps { tape, next, shape, tally: false })
+        }
+        How::Method { name, .. } => {
+            let (kind, program) = (kind(given)?, method(name)?.program());
+            let (tape, (next, tally)) = record(tape, || step(kind, given, shape, &program));
+            Ok(Steps { tape, next, shape, tally })
+        }
+        How::Attempts { name } => {
+            let (kind, method) = (kind(given)?, method(name)?);
+            let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+            let (tape, next) = record(tape, || attempts(kind, given, shape, &program, estimate.order));
+            Ok(Steps { tape, next, shape, tally: false })
+        }
+    }
+}
+
+fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Vec<Id> {
+    blocks.into_iter().flat_map(|block| block.iter().map(|symbol| symbol.0)).collect()
+}
+
+fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>, bool) {
+    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let s = system(kind, &parameters(given, h), Symbol::new(Op::State((shape.v + shape.y) as u32)));
+    let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
+    let (v, y) = (made.next().unwrap_or(v), made.next().unwrap_or(y));
+    let (v, y) = s.settle(v, y);
+    let mut next = ids([&v, &y]);
+    let tally = s.tally();
+    next.extend(tally.map(|tally| tally.0));
+    (next, tally.is_some())
+}
+
+fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let s = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
+    let numbers: [Symbol; Pace::<f64>::NUMBERS] =
+        std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
+    let budget = Symbol::new(Op::Param(BUDGET));
+    let (pace, v, y) = attempt(program, s.as_ref(), order, Pace::of(numbers), budget, &v, &y);
+    let mut next = ids([&v, &y]);
+    next.extend(pace.numbers().map(|symbol| symbol.0));
+    next
+}
+
+/// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
+fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
+    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let p = parameters(given, h);
+    let n = shape.v + shape.y;
+    let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
+    let inputs: Vec<_> = (0..given.whole("inputs")).filter_map(|i| p.signal(&format!("inputs[{i}]"))).collect();
+    for node in nodes {
+        let at = t + Symbol::of(f64::from_bits(*node)) * h;
+        columns.extend(inputs.iter().map(|input| input.at(at)));
+    }
+    let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
+    // P by rows; Q by columns, nodes and inputs, each with a number for every row.
+    let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
+    let row = |i: usize| {
+        let products = columns.iter().enumerate().map(|(j, column)| entry(i, j) * *column);
+        products.reduce(|sum, product| sum + product).map_or(0, |sum| sum.0)
+    };
+    (0..n).map(row).collect()
+}
+
+/// Traces a program that changes the block v alone.
+fn trace_slot(scene: &Scene, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
+    let (shape, kind) = (shape(&scene.given)?, kind(&scene.given)?);
+    Ok(record(Tape::default(), || {
+        let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+        let s = (kind.symbols)(&parameters(&scene.given, h));
+        let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
+        ids([&made.next().unwrap_or(v), &y])
+    }))
+}
+
+/// Traces the recorded quantities of a state onto a tape: a number behind v and y for each.
+pub fn trace_record(tape: Tape, given: &Given, names: &[String]) -> Result<(Tape, Vec<Id>), Error> {
+    let (shape, kind) = (shape(given)?, kind(given)?);
+    recorded(given, names)?;
+    Ok(record(tape, || {
+        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+        let s = (kind.symbols)(&parameters(given, Symbol::new(Op::Step)));
+        let mut next = ids([&v, &y]);
+        for name in names {
+            next.extend(s.record(name, &v, &y).into_iter().flatten().map(|symbol| symbol.0));
+        }
+        next
+    }))
+}
+
+fn cut(given: &Given, tape: &Tape, next: &[Id]) -> Stage {
+    Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
+}
+
+impl Scene {
+    /// Traces all that a run needs.
+    fn trace(&self) -> Result<Traced, Error> {
+        let steps = trace_step(Tape::default(), &self.given, &self.how)?;
+        let mut start = None;
+        let mut finish = None;
+        if let How::Method { name, choice } = &self.how {
+            let method = method(name)?;
+            for (stage, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
+                if let Some(program) = program {
+                    let (tape, next) = trace_slot(self, &program)?;
+                    *stage = Some(cut(&self.given, &tape, &next));
+                }
+            }
+        }
+        let mut quantities = None;
+        if !self.record.is_empty() {
+            let (tape, next) = trace_record(Tape::default(), &self.given, &self.record)?;
+            quantities = Some(cut(&self.given, &tape, &next));
+        }
+        Ok(Traced {
+            shape: steps.shape,
+            tally: steps.tally,
+            step: cut(&self.given, &steps.tape, &steps.next),
+            start,
+            finish,
+            record: quantities,
+            recorded: recorded(&self.given, &self.record)?,
+            written: steps.tape.written(),
+        })
+    }
+
+    /// Traces all that a run needs, or finds it from before.
+    pub fn traced(&self) -> Result<Arc<Traced>, Error> {
+        let cache = CACHE.get_or_init(Mutex::default);
+        // A thread that panicked while it held the lock has left a map that is whole: entries are made outside.
+        let lock = || cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().known.get(self) {
+            return Ok(Arc::clone(known));
+        }
+        let traced = Arc::new(self.trace()?);
+        let size = traced.size();
+        let mut cache = lock();
+        if cache.operations + size > MOST_OPERATIONS {
+            *cache = Cache::default();
+        }
+        cache.operations += size;
+        cache.known.insert(self.clone(), Arc::clone(&traced));
+        Ok(traced)
+    }
+}
+
+impl Traced {
+    /// Operations of all its bodies.
+    fn size(&self) -> usize {
+        let stages = [Some(&self.step), self.start.as_ref(), self.finish.as_ref(), self.record.as_ref()];
+        stages.into_iter().flatten().map(Stage::size).sum()
+    }
+}
+
+/// Operations of all that is kept in the cache, at most: about 50 bytes each on the tape, and at most as much again, for each vector
+/// that goes abreast, as machine code. When a scene would pass it, the others are forgotten.
+const MOST_OPERATIONS: usize = 200_000;
+
+#[derive(Default)]
+struct Cache {
+    known: HashMap<Scene, Arc<Traced>>,
+    operations: usize,
+}
+
+static CACHE: OnceLock<Mutex<Cache>> = OnceLock::new();
