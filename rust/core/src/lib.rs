@@ -4,14 +4,14 @@ pub mod error;
 pub mod functions;
 pub mod isa;
 pub mod kernel;
+pub mod method;
 pub mod number;
 pub mod program;
 pub mod signal;
 pub mod spec;
 pub mod system;
-pub mod tape;
-pub mod method;
 pub mod tableau;
+pub mod tape;
 
 /// The methods, one file each; `build.rs` lists the folder.
 #[allow(missing_docs, reason = "each file documents its method in the record")]
