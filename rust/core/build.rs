@@ -22,10 +22,9 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
 fn main() -> io::Result<()> {
     let root = env::current_dir()?;
     let out = env::var("OUT_DIR").map_err(io::Error::other)?;
-    for (folder, list, kind, constant) in [
-        ("steppers", "RECORDS", "crate::method::Record", "RECORD"),
-        ("systems", "KINDS", "crate::system::Kind", "KIND"),
-    ] {
+    for (folder, list, kind, constant) in
+        [("steppers", "RECORDS", "crate::method::Record", "RECORD"), ("systems", "KINDS", "crate::system::Kind", "KIND")]
+    {
         let from = Path::new("src").join(folder);
         let names = names(&from)?;
         let mut text = String::new();

@@ -1,19 +1,20 @@
 //! # stepwell-core
 
+pub mod controls;
 pub mod error;
 pub mod functions;
 pub mod isa;
 pub mod kernel;
+pub mod method;
 pub mod number;
+pub mod pace;
 pub mod program;
+pub mod run;
 pub mod signal;
 pub mod spec;
 pub mod system;
-pub mod tape;
-pub mod method;
-pub mod pace;
-pub mod run;
 pub mod tableau;
+pub mod tape;
 pub mod trace;
 
 /// The methods, one file each; `build.rs` lists the folder.

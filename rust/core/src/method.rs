@@ -33,7 +33,15 @@ pub struct Record {
     /// What it does, in a few sentences.
     pub about: &'static str,
     /// One step: the new v and y.
-    pub step: fn(Rates, Time, Length, Block, Block) -> (Block, Block),
+    pub step: Blocks,
+}
+
+/// What makes two blocks, one in the place of v and one of y, of a state.
+pub type Blocks = fn(Rates, Time, Length, Block, Block) -> (Block, Block);
+
+/// The method of that name.
+pub fn record(name: &str) -> Option<&'static Record> {
+    crate::steppers::RECORDS.iter().copied().find(|record| record.name == name)
 }
 
 /// What a method asks of a system.
@@ -64,9 +72,9 @@ pub struct Estimate {
     /// Order of h in which it does.
     pub order: u32,
     /// The estimate for both blocks.
-    pub error: fn(Rates, Time, Length, Block, Block) -> (Block, Block),
+    pub error: Blocks,
     /// A second estimate, of lower order, which corrects the first, so that both together behave as one of the method's order.
-    pub coarse: Option<fn(Rates, Time, Length, Block, Block) -> (Block, Block)>,
+    pub coarse: Option<Blocks>,
 }
 
 impl Record {

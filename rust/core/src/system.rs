@@ -94,3 +94,8 @@ pub struct Kind {
 
 /// Makes the system of one member, scaled to the step.
 pub type Make<N> = fn(&Parameters<N>) -> Box<dyn System<N>>;
+
+/// The kind of systems of that name.
+pub fn kind(name: &str) -> Option<&'static Kind> {
+    crate::systems::KINDS.iter().copied().find(|kind| kind.name == name)
+}

@@ -97,6 +97,14 @@ impl Task for Run<'_, '_> {
                         let from = tile.per_step[step * body.per_step + i as usize] as usize;
                         scratch[to..to + lanes].copy_from_slice(&tile.held[from..from + lanes]);
                     }
+                    Op::Gather(place) => {
+                        let from = at(place);
+                        for l in 0..lanes {
+                            // A place that is none is a NaN's: what comes of it is of no use to anybody.
+                            let place = scratch[from + l] as usize + l;
+                            scratch[to + l] = tile.held.get(place).copied().unwrap_or(f64::NAN);
+                        }
+                    }
                     _ => apply(*op, scratch, &at, to, lanes),
                 }
             }

@@ -1,24 +1,22 @@
 //! The driver of steps of chosen length: every member goes at its own pace, and a lane that is done takes the next member.
 
-use std::{ops::Range, thread};
+use std::{ops::Range, sync::Arc, thread};
 
-use crate::{
+use super::{
+    Machine, Model,
     batch::{cut, expect},
     crew::{self, GoOn},
-    error::Error,
-    group::{Clock, Group, Row, Width},
-    isa::Level,
-    pace::{NUMBERS, Pace},
-    table::Model,
+    paced::Paced,
 };
+use crate::{error::Error, kernel::runner::Width, pace::Pace, spec::Row, trace::Traced};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
 pub struct Plan<'a> {
     /// What to step, and how.
     pub model: Model<'a>,
-    /// What the hot loop may use.
-    pub level: Level,
+    /// What hot loops may use.
+    pub machine: Machine,
     /// Time of the start.
     pub t0: f64,
     /// Times to reach exactly and to keep the state at, ascending.
@@ -37,8 +35,6 @@ pub struct Plan<'a> {
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
-    /// How many threads; zero for as many as pay.
-    pub threads: usize,
 }
 
 /// How a member ended.
@@ -68,7 +64,7 @@ pub struct Arrays<'a> {
 }
 
 /// Attempts between two looks at the lanes; of a large member a single one, which may take long.
-const LOOK: u32 = 16;
+const LOOK: usize = 16;
 /// Numbers of a lane above which it is large.
 const LARGE: usize = 1000;
 /// Members below which a second thread costs more than it brings, for a small system.
@@ -86,9 +82,8 @@ struct Part<'a> {
 /// Makes the run. The monitor is as that of [`crate::batch::run`].
 pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
     let b = plan.members;
-    let mine = Worker::new(plan)?;
-    let lanes = mine.group.lanes();
-    let (p, q) = (mine.group.slots().0.len() / lanes, mine.group.slots().1.len() / lanes);
+    let traced = plan.model.traced()?;
+    let (p, q) = (traced.shape.v, traced.shape.y);
     expect("v", p, plan.v.len())?;
     expect("y", q, plan.y.len())?;
     expect("saved_v", plan.at.len() * p * b, arrays.saved_v.len())?;
@@ -96,13 +91,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("reached", 2 * b, arrays.reached.len())?;
     expect("counts", 3 * b, arrays.counts.len())?;
     let several = [plan.first, plan.relative, plan.absolute];
-    for row in plan.model.spec().rows.iter().chain(&plan.v).chain(&plan.y).chain(&several) {
+    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&several) {
         if row.0.len() != 1 {
             expect("a row", b, row.0.len())?;
         }
     }
 
-    let threads = match plan.threads {
+    let mine = Worker::new(plan, &traced);
+    let lanes = mine.group.lanes();
+    let threads = match plan.machine.threads {
         0 if lanes > 1 && b < WORTH_A_THREAD => 1,
         0 => thread::available_parallelism().map_or(1, usize::from),
         n => n,
@@ -121,7 +118,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         first += count;
     }
     let total = b as f64;
-    crew::share(parts, threads, total, monitor, mine, || Worker::new(plan), Worker::part)
+    crew::share(parts, threads, total, monitor, mine, || Ok(Worker::new(plan, &traced)), Worker::part)
 }
 
 /// Who is in a lane: a member of the part, and which of the asked times is next.
@@ -133,20 +130,15 @@ struct Seat {
 
 struct Worker<'a> {
     plan: &'a Plan<'a>,
-    group: Box<dyn Group>,
-    paces: Vec<f64>,
+    group: Box<dyn Paced>,
 }
 
 impl<'a> Worker<'a> {
-    fn new(plan: &'a Plan<'a>) -> Result<Self, Error> {
-        let threads = if plan.members == 1 { plan.threads } else { 1 };
-        let clock = Clock { t0: plan.t0, h: 1.0, start: 0, level: plan.level, threads };
-        let group = plan.model.group(&clock, if plan.members > 1 { Width::Paced } else { Width::Lone })?;
-        if !group.adapts() {
-            return Err(Error::NoEstimate);
-        }
-        let paces = vec![0.0; NUMBERS * group.lanes()];
-        Ok(Worker { plan, group, paces })
+    fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>) -> Self {
+        let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
+        let machine = Machine { threads, ..plan.machine };
+        let width = if plan.members > 1 { Width::Wide } else { Width::One };
+        Worker { plan, group: plan.model.paced(traced, machine, width, plan.budget as f64) }
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
@@ -163,8 +155,8 @@ impl<'a> Worker<'a> {
                     *seat = self.tend(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
-            let numbers = self.group.slots().0.len() / self.group.lanes();
-            self.group.adapt(&mut self.paces, self.plan.budget as f64, if numbers > LARGE { 1 } else { LOOK });
+            let numbers = self.plan.v.len() + self.plan.y.len();
+            self.group.attempt(if numbers > LARGE { 1 } else { LOOK });
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
@@ -172,31 +164,14 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    fn pace(&self, lane: usize) -> Pace {
-        let lanes = self.group.lanes();
-        let [t, h, target, relative, absolute, before, most, accepted, rejected, error] =
-            std::array::from_fn(|i| self.paces[i * lanes + lane]);
-        Pace { t, h, target, relative, absolute, before, most, accepted, rejected, error }
-    }
-
-    fn set_pace(&mut self, lane: usize, pace: Pace) {
-        let lanes = self.group.lanes();
-        for (i, number) in pace.numbers().into_iter().enumerate() {
-            self.paces[i * lanes + lane] = number;
-        }
-    }
-
     /// A member takes a lane, at the start.
     fn sit(&mut self, part: &Part, lane: usize, member: usize) -> Seat {
-        let (plan, at, lanes) = (self.plan, part.first + member, self.group.lanes());
-        self.group.prepare_lane(plan.model.spec(), lane, at);
-        let (v, y) = self.group.slots_mut();
-        for (rows, slot) in [(&plan.v, v), (&plan.y, y)] {
-            for (row, slot) in rows.iter().zip(slot.chunks_exact_mut(lanes)) {
-                slot[lane] = row.at(at);
-            }
-        }
-        self.set_pace(lane, Pace::new(plan.t0, plan.first.at(at), plan.relative.at(at), plan.absolute.at(at)));
+        let (plan, at) = (self.plan, part.first + member);
+        self.group.prepare_lane(&plan.model.spec, lane, at);
+        let state: Vec<f64> = plan.v.iter().chain(&plan.y).map(|row| row.at(at)).collect();
+        self.group.sit(lane, &state);
+        let (first, relative, absolute) = (plan.first.at(at), plan.relative.at(at), plan.absolute.at(at));
+        self.group.set_pace(lane, Pace::new(plan.t0, first, relative, absolute));
         Seat { member, next: 0 }
     }
 
@@ -212,7 +187,7 @@ impl<'a> Worker<'a> {
     ) -> Result<Option<Seat>, Error> {
         let plan = self.plan;
         loop {
-            let mut pace = self.pace(lane);
+            let mut pace = self.group.pace(lane);
             while let Some(&target) = plan.at.get(seat.next) {
                 pace.target = target;
                 if pace.t < target {
@@ -222,7 +197,7 @@ impl<'a> Worker<'a> {
                 seat.next += 1;
             }
             if seat.next < plan.at.len() && pace.runs(plan.budget as f64) {
-                self.set_pace(lane, pace);
+                self.group.set_pace(lane, pace);
                 return Ok(Some(seat));
             }
             self.end(part, seat, &pace);
@@ -230,7 +205,7 @@ impl<'a> Worker<'a> {
                 return Err(Error::Interrupted);
             }
             let Some(member) = waiting.next() else {
-                self.set_pace(lane, Pace { target: pace.t, ..pace }); // nothing runs in an empty lane
+                self.group.set_pace(lane, Pace { target: pace.t, ..pace }); // nothing runs in an empty lane
                 return Ok(None);
             };
             seat = self.sit(part, lane, member);
@@ -238,7 +213,7 @@ impl<'a> Worker<'a> {
     }
 
     /// Notes how a member ended.
-    fn end(&self, part: &mut Part, seat: Seat, pace: &Pace) {
+    fn end(&self, part: &mut Part, seat: Seat, pace: &Pace<f64>) {
         let times = self.plan.at.len();
         let status = if seat.next == times {
             Status::Ok
@@ -264,12 +239,11 @@ impl<'a> Worker<'a> {
     }
 
     fn keep(&self, part: &mut Part, lane: usize, seat: Seat) {
-        let lanes = self.group.lanes();
-        let (v, y) = self.group.slots();
-        for (rows, slot) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
-            let block = slot.len() / lanes;
-            for (row, slot) in rows[seat.next * block..(seat.next + 1) * block].iter_mut().zip(slot.chunks_exact(lanes)) {
-                row[seat.member] = slot[lane];
+        let state = self.group.state(lane);
+        let (v, y) = state.split_at(self.plan.v.len());
+        for (rows, block) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
+            for (row, number) in rows[seat.next * block.len()..].iter_mut().zip(block) {
+                row[seat.member] = *number;
             }
         }
     }

@@ -5,6 +5,7 @@ pub mod batch;
 pub mod chosen;
 pub mod crew;
 pub mod group;
+pub mod paced;
 pub mod stage;
 pub mod world;
 
@@ -12,6 +13,7 @@ use std::sync::Arc;
 
 use self::{
     group::{Group, Lanes},
+    paced::{Paced, PacedLanes},
     stage::Clock,
 };
 use crate::{
@@ -55,6 +57,11 @@ impl Model<'_> {
     /// A group that steps it.
     pub fn group(&self, traced: &Arc<Traced>, machine: Machine, width: Width, clock: &Clock) -> Box<dyn Group> {
         Box::new(Lanes::new(Arc::clone(traced), &self.spec, machine.level, width, clock))
+    }
+
+    /// A group whose members go at a pace of their own each.
+    pub fn paced(&self, traced: &Arc<Traced>, machine: Machine, width: Width, budget: f64) -> Box<dyn Paced> {
+        Box::new(PacedLanes::new(Arc::clone(traced), &self.spec, machine.level, width, budget))
     }
 
     /// Which width serves so many members best.

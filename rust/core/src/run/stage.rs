@@ -108,6 +108,7 @@ impl Loaded {
     pub fn with(stage: &Stage, runner: Arc<Runner>, spec: &Spec, level: Level, clock: &Clock, budget: f64) -> Loaded {
         let split = &stage.split;
         let last = |input: u32| spec.tables[input as usize].samples.len() as f64 - 1.0;
+        let before = |input: u32| spec.tables[..input as usize].iter().map(|table| table.samples.len()).sum::<usize>();
         let number = |given: &Given| match *given {
             Given::Step => clock.h,
             Given::Param(BUDGET) => budget,
@@ -115,6 +116,8 @@ impl Loaded {
             Given::Start(input) => spec.tables[input as usize].start,
             Given::Interval(input) => spec.tables[input as usize].interval,
             Given::Last(input) => last(input),
+            Given::First(input) => (before(input) * runner.lanes()) as f64,
+            Given::Lanes => runner.lanes() as f64,
         };
         let given: Vec<f64> = split.given.iter().map(number).collect();
         let mut uniforms = vec![0.0; split.run.next.len()];
@@ -180,7 +183,8 @@ impl Loaded {
     /// Fills the rows of samples of inputs of which members have their own.
     fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
         let lanes = self.lanes();
-        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)));
+        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)))
+            || stage.split.given.contains(&Given::Lanes);
         if !of_members {
             return;
         }

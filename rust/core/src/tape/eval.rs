@@ -28,6 +28,6 @@ pub fn apply(op: Op, a: u64, b: u64, c: u64) -> u64 {
         ShiftDown(_, n) => a >> n,
         Copy(_) => a,
         Const(bits) => bits,
-        State(_) | Param(_) | Step | Time | Sample(..) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => 0,
+        State(_) | Param(_) | Step | Time | Sample(..) | Row(_) | Uniform(_) | PerStep(_) | Held(_) | Gather(_) => 0,
     }
 }

@@ -68,12 +68,14 @@ pub enum Op {
     Copy(Id),
     /// Of a body ([`split::Body`]): a number of the member that is the same in every step.
     Row(u32),
-    /// Of a body: a number that is the same for all members and steps.
+    /// Of a body: a number that is the same for all members and steps. Of a tape that is being cut: a fact of an input, see `split`.
     Uniform(u32),
     /// Of a body: a number of the step, the same for all members.
     PerStep(u32),
     /// Of a body: a number of the member that its sampled inputs have at the step.
     Held(u32),
+    /// Of a body: a sample, by its place, where members are at times of their own.
+    Gather(Id),
 }
 
 impl Op {
@@ -83,7 +85,7 @@ impl Op {
         use Op::*;
         match self {
             State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => ([0; 3], 0),
-            Sample(_, a) | Sqrt(a) | Neg(a) | Floor(a) | ShiftUp(a, _) | ShiftDown(a, _) | Copy(a) => ([a, 0, 0], 1),
+            Sample(_, a) | Sqrt(a) | Neg(a) | Floor(a) | ShiftUp(a, _) | ShiftDown(a, _) | Copy(a) | Gather(a) => ([a, 0, 0], 1),
             Add(a, b)
             | Sub(a, b)
             | Mul(a, b)
@@ -112,6 +114,7 @@ impl Op {
             ShiftUp(a, n) => ShiftUp(f(a), n),
             ShiftDown(a, n) => ShiftDown(f(a), n),
             Copy(a) => Copy(f(a)),
+            Gather(a) => Gather(f(a)),
             Add(a, b) => Add(f(a), f(b)),
             Sub(a, b) => Sub(f(a), f(b)),
             Mul(a, b) => Mul(f(a), f(b)),
@@ -162,7 +165,7 @@ impl Counts {
             Less(..) | LessEqual(..) | Equal(..) | Select(..) => self.choices += 1,
             And(..) | Or(..) | Xor(..) | AddBits(..) | ShiftUp(..) | ShiftDown(..) | Floor(_) => self.bits += 1,
             State(_) | Param(_) | Step | Time | Const(_) | Sample(..) | Neg(_) | Copy(_) | Row(_) | Uniform(_) | PerStep(_)
-            | Held(_) => {}
+            | Held(_) | Gather(_) => {}
         }
     }
 }
@@ -333,7 +336,7 @@ impl Tape {
     /// What an operation of constants gives. A NaN is left to whoever computes.
     fn fold(&self, op: Op) -> Option<u64> {
         let ([a, b, c], n) = op.operands();
-        if n == 0 || matches!(op, Op::Sample(..)) {
+        if n == 0 || matches!(op, Op::Sample(..) | Op::Gather(_)) {
             return None;
         }
         let bits = |id: Id| self.bits(id);

@@ -37,6 +37,7 @@ pub fn line(id: Id, op: Op) -> String {
         Uniform(i) => format!("uniform[{i}]"),
         PerStep(i) => format!("step[{i}]"),
         Held(i) => format!("held[{i}]"),
+        Gather(a) => format!("sample %{a}"),
     };
     format!("%{id} = {is}")
 }

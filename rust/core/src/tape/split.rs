@@ -135,6 +135,10 @@ pub enum Given {
     Interval(u32),
     /// The number of the last sample of an input.
     Last(u32),
+    /// The place of the first sample of an input among the samples of all.
+    First(u32),
+    /// How long a row of samples is.
+    Lanes,
 }
 
 /// What an entry of the table of the steps is made of.
@@ -173,7 +177,8 @@ pub const HOLD_SLACK: f64 = 1e-6;
 /// Cuts a tape. `uniform` says which parameters all members have in common, `common` which inputs.
 pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: impl Fn(u32) -> bool) -> Split {
     let mut tape = tape.clone();
-    let next = hoist_signs(&mut tape, next, &uniform);
+    let next = look_up_samples(&mut tape, next, &uniform);
+    let next = hoist_signs(&mut tape, &next, &uniform);
     let ranks = ranks(&tape, &uniform);
     let rank = |id: Id| ranks[id as usize];
     let mut split = Split::default();
@@ -229,12 +234,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         Op::Step => Some(Op::Uniform(place(&mut given, Given::Step))),
         Op::Param(i) if uniform(i) => Some(Op::Uniform(place(&mut given, Given::Param(i)))),
         Op::Param(i) => Some(Op::Row(place(&mut params, i))),
-        // What the numbers of samples are made of, which the tape itself does not know: see `sample_number`.
-        Op::State(i) => {
-            let (input, what) = (i / 3, i % 3);
-            let known = [Given::Start(input), Given::Interval(input), Given::Last(input)][what as usize];
-            Some(Op::Uniform(place(&mut given, known)))
-        }
+        Op::Uniform(fact) => Some(Op::Uniform(place(&mut given, fact_of(fact)))),
         Op::Time => Some(Op::Row(0)),
         _ => None,
     };
@@ -254,26 +254,57 @@ fn place<T: PartialEq>(list: &mut Vec<T>, what: T) -> u32 {
     at as u32
 }
 
-/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside.
-///
-/// `State` stands for what is known of the input, since a number of a sample depends on no state here.
-fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
-    let [start, interval, last] = [0, 1, 2].map(|what| tape.push(Op::State(3 * input + what)));
-    let since = tape.push(Op::Sub(t, start));
-    let intervals = tape.push(Op::Div(since, interval));
-    let slack = tape.constant(HOLD_SLACK);
-    let late = tape.push(Op::Add(intervals, slack));
-    let at = tape.push(Op::Floor(late));
-    held_within(tape, at, last)
+/// What a step does not know of an input and a run does, as a leaf of a tape that is being cut.
+fn fact(given: Given) -> Op {
+    Op::Uniform(match given {
+        Given::Start(input) => 5 * input,
+        Given::Interval(input) => 5 * input + 1,
+        Given::Last(input) => 5 * input + 2,
+        Given::First(input) => 5 * input + 3,
+        Given::Lanes | Given::Step | Given::Param(_) => 4,
+    })
 }
 
-/// A whole number, at least 0 and at most `last`; 0 of a NaN.
-fn held_within(tape: &mut Tape, at: Id, last: Id) -> Id {
-    let zero = tape.constant(0.0);
-    let above = tape.push(Op::Less(zero, at));
-    let at = tape.push(Op::Select(above, at, zero));
-    let below = tape.push(Op::Less(at, last));
-    tape.push(Op::Select(below, at, last))
+/// The inverse of `fact`.
+fn fact_of(fact: u32) -> Given {
+    let input = fact / 5;
+    [Given::Start(input), Given::Interval(input), Given::Last(input), Given::First(input), Given::Lanes][fact as usize % 5]
+}
+
+/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside; 0 if the time is a NaN.
+fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
+    let [start, interval, last] = [Given::Start(input), Given::Interval(input), Given::Last(input)].map(|g| tape.keep(fact(g)));
+    let since = tape.keep(Op::Sub(t, start));
+    let intervals = tape.keep(Op::Div(since, interval));
+    let slack = tape.keep(Op::Const(HOLD_SLACK.to_bits()));
+    let late = tape.keep(Op::Add(intervals, slack));
+    let at = tape.keep(Op::Floor(late));
+    let zero = tape.keep(Op::Const(0));
+    let above = tape.keep(Op::Less(zero, at));
+    let at = tape.keep(Op::Select(above, at, zero));
+    let below = tape.keep(Op::Less(at, last));
+    tape.keep(Op::Select(below, at, last))
+}
+
+/// Where members are at times of their own, each looks up its sample by itself.
+fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
+    let ranks = ranks(tape, uniform);
+    let old = std::mem::take(tape);
+    let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
+    for op in old.ops() {
+        let moved = op.with(|operand| place[operand as usize]);
+        place.push(match (*op, moved) {
+            (Op::Sample(_, t), Op::Sample(input, now)) if ranks[t as usize] == Rank::Lane => {
+                let number = sample_number(tape, input, now);
+                let (lanes, first) = (tape.keep(fact(Given::Lanes)), tape.keep(fact(Given::First(input))));
+                let row = tape.keep(Op::Mul(number, lanes));
+                let at = tape.keep(Op::Add(row, first));
+                tape.keep(Op::Gather(at))
+            }
+            _ => tape.keep(moved),
+        });
+    }
+    next.iter().map(|id| place[*id as usize]).collect()
 }
 
 fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
@@ -281,11 +312,11 @@ fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
     for op in tape.ops() {
         let rank = match *op {
             Op::Const(_) => Rank::Constant,
-            Op::Step => Rank::Run,
+            Op::Step | Op::Uniform(_) => Rank::Run,
             Op::Param(i) if uniform(i) => Rank::Run,
             Op::Param(_) => Rank::Member,
             Op::Time => Rank::Step,
-            Op::State(_) | Op::Sample(..) => Rank::Lane,
+            Op::State(_) | Op::Sample(..) | Op::Gather(_) => Rank::Lane,
             _ => {
                 let (operands, n) = op.operands();
                 let of = operands[..n].iter().map(|id| ranks[*id as usize]);

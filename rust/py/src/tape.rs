@@ -1,0 +1,242 @@
+//! Tapes in Python: symbols that stand for numbers, so that what Python computes can be held against what the core traces.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use pyo3::{
+    exceptions::{PyIndexError, PyTypeError, PyValueError},
+    prelude::*,
+};
+use stepwell_core::{
+    tape::{self, Id, Op, print},
+    trace,
+};
+
+use crate::model::{ModelSpec, core_error};
+
+type Shared = Arc<Mutex<tape::Tape>>;
+
+fn lock(tape: &Shared) -> MutexGuard<'_, tape::Tape> {
+    // Every operation leaves a tape whole.
+    tape.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A list of operations, each once. Symbols write to it.
+#[pyclass(module = "stepwell._core", frozen)]
+pub struct Tape(Shared);
+
+/// A value on a tape.
+#[pyclass(module = "stepwell._core", frozen)]
+#[derive(Clone)]
+pub struct Symbol {
+    tape: Shared,
+    #[pyo3(get)]
+    id: Id,
+}
+
+/// A symbol, or a number that becomes one.
+#[derive(FromPyObject)]
+enum Value<'py> {
+    Symbol(PyRef<'py, Symbol>),
+    Number(f64),
+}
+
+impl Symbol {
+    fn on(&self, op: impl FnOnce(Id) -> Op) -> Symbol {
+        let id = lock(&self.tape).push(op(self.id));
+        Symbol { tape: Arc::clone(&self.tape), id }
+    }
+
+    fn id_of(&self, other: &Value) -> PyResult<Id> {
+        match other {
+            Value::Symbol(other) if Arc::ptr_eq(&self.tape, &other.tape) => Ok(other.id),
+            Value::Symbol(_) => Err(PyValueError::new_err("symbols of different tapes")),
+            Value::Number(x) => Ok(lock(&self.tape).constant(*x)),
+        }
+    }
+
+    fn with(&self, other: &Value, op: impl FnOnce(Id, Id) -> Op) -> PyResult<Symbol> {
+        let other = self.id_of(other)?;
+        Ok(self.on(|id| op(id, other)))
+    }
+
+    fn with_bits(&self, bits: u64, op: impl FnOnce(Id, Id) -> Op) -> Symbol {
+        let bits = lock(&self.tape).push(Op::Const(bits));
+        self.on(|id| op(id, bits))
+    }
+}
+
+#[pymethods]
+impl Symbol {
+    fn __add__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Add)
+    }
+    fn __radd__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, |a, b| Op::Add(b, a))
+    }
+    fn __sub__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Sub)
+    }
+    fn __rsub__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, |a, b| Op::Sub(b, a))
+    }
+    fn __mul__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Mul)
+    }
+    fn __rmul__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, |a, b| Op::Mul(b, a))
+    }
+    fn __truediv__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Div)
+    }
+    fn __rtruediv__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, |a, b| Op::Div(b, a))
+    }
+    fn __neg__(&self) -> Symbol {
+        self.on(Op::Neg)
+    }
+    fn __pos__(&self) -> Symbol {
+        self.clone()
+    }
+    fn __invert__(&self) -> Symbol {
+        self.with_bits(u64::MAX, Op::Xor)
+    }
+    fn __and__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::And)
+    }
+    fn __or__(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Or)
+    }
+    /// √x
+    fn sqrt(&self) -> Symbol {
+        self.on(Op::Sqrt)
+    }
+    /// The largest whole number not above x.
+    fn floor(&self) -> Symbol {
+        self.on(Op::Floor)
+    }
+    /// x < y
+    fn below(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Less)
+    }
+    /// x ≤ y
+    fn at_most(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::LessEqual)
+    }
+    /// x = y
+    fn equals(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Equal)
+    }
+    /// One of two values, as this comparison says.
+    fn choose(&self, yes: Value, no: Value) -> PyResult<Symbol> {
+        let (yes, no) = (self.id_of(&yes)?, self.id_of(&no)?);
+        Ok(self.on(|id| Op::Select(id, yes, no)))
+    }
+    /// Bits of x and of a constant.
+    fn and_bits(&self, bits: u64) -> Symbol {
+        self.with_bits(bits, Op::And)
+    }
+    /// Bits of x or of a constant.
+    fn or_bits(&self, bits: u64) -> Symbol {
+        self.with_bits(bits, Op::Or)
+    }
+    /// Bits of one and not of both.
+    fn xor_bits(&self, other: Value) -> PyResult<Symbol> {
+        self.with(&other, Op::Xor)
+    }
+    /// The bits of x as a whole number, and a constant added.
+    fn add_bits(&self, bits: u64) -> Symbol {
+        self.with_bits(bits, Op::AddBits)
+    }
+    /// Bits moved up.
+    fn shift_up(&self, places: u32) -> Symbol {
+        self.on(|id| Op::ShiftUp(id, places & 63))
+    }
+    /// Bits moved down.
+    fn shift_down(&self, places: u32) -> Symbol {
+        self.on(|id| Op::ShiftDown(id, places & 63))
+    }
+    fn __bool__(&self) -> PyResult<bool> {
+        Err(PyTypeError::new_err("a symbol has no truth value: choose between two values instead of branching"))
+    }
+    fn __float__(&self) -> PyResult<f64> {
+        Err(PyTypeError::new_err("a symbol is not known as a number yet"))
+    }
+    fn __repr__(&self) -> String {
+        print::line(self.id, lock(&self.tape).op(self.id))
+    }
+}
+
+#[pymethods]
+impl Tape {
+    #[new]
+    fn new() -> Tape {
+        Tape(Shared::default())
+    }
+
+    /// A number of the state at the start of the step.
+    fn state(&self, i: u32) -> Symbol {
+        self.leaf(Op::State(i))
+    }
+
+    /// A row of parameters.
+    fn parameter(&self, i: u32) -> Symbol {
+        self.leaf(Op::Param(i))
+    }
+
+    /// The most attempts of a member with steps of chosen length.
+    fn budget(&self) -> Symbol {
+        self.leaf(Op::Param(trace::BUDGET))
+    }
+
+    /// The step h.
+    fn step(&self) -> Symbol {
+        self.leaf(Op::Step)
+    }
+
+    /// The time at the start of the step.
+    fn time(&self) -> Symbol {
+        self.leaf(Op::Time)
+    }
+
+    /// A number.
+    fn constant(&self, x: f64) -> Symbol {
+        self.leaf(Op::Const(x.to_bits()))
+    }
+
+    /// A sampled input at a time.
+    fn sample(&self, table: u32, t: Value) -> PyResult<Symbol> {
+        let t = self.leaf(Op::Time).id_of(&t)?;
+        Ok(self.leaf(Op::Sample(table, t)))
+    }
+
+    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, or of a "record".
+    fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
+        let before = std::mem::take(&mut *lock(&self.0));
+        let traced = trace::trace(before.clone(), &model.given, &model.method, what);
+        let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
+        *lock(&self.0) = tape;
+        Ok(next.into_iter().map(|id| Symbol { tape: Arc::clone(&self.0), id }).collect())
+    }
+
+    /// The operations that a value is made of, as text.
+    fn listing(&self, of: &Symbol) -> PyResult<String> {
+        let tape = lock(&self.0);
+        if of.id as usize >= tape.ops().len() {
+            return Err(PyIndexError::new_err("a symbol of another tape"));
+        }
+        let needed = tape.needed([of.id]);
+        let lines = tape.ops().iter().enumerate().filter(|(id, _)| needed[*id]);
+        Ok(lines.map(|(id, op)| print::line(id as Id, *op) + "\n").collect())
+    }
+
+    fn __len__(&self) -> usize {
+        lock(&self.0).ops().len()
+    }
+}
+
+impl Tape {
+    fn leaf(&self, op: Op) -> Symbol {
+        let id = lock(&self.0).push(op);
+        Symbol { tape: Arc::clone(&self.0), id }
+    }
+}
