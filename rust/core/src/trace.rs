@@ -215,12 +215,12 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
 }
 
 /// Traces a program that changes the block v alone.
-fn trace_slot(scene: &Scene, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
-    let (shape, kind) = (shape(&scene.given)?, kind(&scene.given)?);
-    Ok(record(Tape::default(), || {
+fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
+    let (shape, kind) = (shape(given)?, kind(given)?);
+    Ok(record(tape, || {
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let s = (kind.symbols)(&parameters(&scene.given, h));
+        let s = (kind.symbols)(&parameters(given, h));
         let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
         ids([&made.next().unwrap_or(v), &y])
     }))
@@ -241,6 +241,28 @@ pub fn trace_record(tape: Tape, given: &Given, names: &[String]) -> Result<(Tape
     }))
 }
 
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", "start" and "finish" with the number of a way to start
+/// behind them, or "record" with a quantity behind it.
+pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, Vec<Id>), Error> {
+    let (what, which) = what.split_once(' ').unwrap_or((what, ""));
+    let unknown = || Error::Options { system: given.system.clone(), options: format!("trace {what} {which}") };
+    let name = match how {
+        How::Method { name, .. } | How::Attempts { name } => name.as_str(),
+        How::Matrix { .. } => "",
+    };
+    let choice = which.parse().unwrap_or(0);
+    match what {
+        "step" => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
+        "attempt" => {
+            trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next))
+        }
+        "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
+        "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
+        "record" => trace_record(tape, given, &[which.to_owned()]),
+        _ => Err(unknown()),
+    }
+}
+
 fn cut(given: &Given, tape: &Tape, next: &[Id]) -> Stage {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
 }
@@ -255,7 +277,7 @@ impl Scene {
             let method = method(name)?;
             for (stage, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
-                    let (tape, next) = trace_slot(self, &program)?;
+                    let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
                     *stage = Some(cut(&self.given, &tape, &next));
                 }
             }

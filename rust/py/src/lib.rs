@@ -1,18 +1,23 @@
 //! The Python binding: arrays in, arrays out, the GIL released, errors mapped. No arithmetic and no decisions here.
 
 mod model;
+mod tape;
 mod world;
 
 use numpy::{PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
-    adaptive,
-    batch::{self, Arrays, Plan},
     error::Error,
-    group::{Clock, Row},
     isa::Level,
-    stepper::{Needs, Record},
-    table,
+    method::{Needs, Record},
+    run::{
+        Machine,
+        batch::{self, Arrays, Plan},
+        chosen,
+        stage::Clock,
+    },
+    spec::Row,
+    steppers, systems as kinds,
 };
 
 use model::{ModelSpec, by_row, core_error};
@@ -20,19 +25,20 @@ use model::{ModelSpec, by_row, core_error};
 /// Everything that a method says of itself.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
+    let program = r.program();
     d.set_item("name", r.name)?;
     d.set_item("title", r.title)?;
     d.set_item("other_names", r.other_names)?;
     d.set_item("false_friends", r.false_friends)?;
     d.set_item("order", r.order)?;
-    d.set_item("evaluations", r.evaluations)?;
+    d.set_item("evaluations", program.evaluations())?;
     d.set_item("family", r.family)?;
     d.set_item("limit", r.limit)?;
-    d.set_item("nodes", r.nodes)?;
+    d.set_item("nodes", program.nodes(r.needs == Needs::Rates))?;
     d.set_item("needs_acceleration", r.needs == Needs::Acceleration)?;
-    d.set_item("carry", r.carry)?;
-    d.set_item("starts", r.starts)?;
-    d.set_item("error_order", r.error_order)?;
+    d.set_item("carry", r.carry.as_ref().map(|c| c.name))?;
+    d.set_item("starts", r.carry.as_ref().map_or(&[][..], |c| c.starts))?;
+    d.set_item("error_order", r.estimate.as_ref().map(|e| e.order))?;
     d.set_item("section", r.section)?;
     d.set_item("reference", r.reference)?;
     d.set_item("about", r.about)?;
@@ -42,13 +48,13 @@ fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
 /// The records of all methods, by name.
 #[pyfunction]
 fn catalogue(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
-    table::RECORDS.iter().map(|r| describe(py, r)).collect()
+    steppers::RECORDS.iter().map(|r| describe(py, r)).collect()
 }
 
-/// The names of all systems that have a kernel.
+/// The names of all systems that the core has.
 #[pyfunction]
 fn systems() -> Vec<&'static str> {
-    table::SYSTEMS.to_vec()
+    kinds::KINDS.iter().map(|kind| kind.name).collect()
 }
 
 /// The CPU level in use.
@@ -95,7 +101,7 @@ fn run(
     mut first_bad: PyReadwriteArray1<'_, i64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<()> {
-    let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)?, threads };
+    let machine = Machine { level: Level::choose().map_err(core_error)?, threads };
     let arrays = Arrays {
         saved_v: saved_v.as_slice_mut()?,
         saved_y: saved_y.as_slice_mut()?,
@@ -108,17 +114,16 @@ fn run(
     let tables = model.tables(py)?;
     let members = arrays.first_bad.len();
     let plan = Plan {
-        model: model.model(&rows, &tables)?,
-        clock,
+        model: model.model(model.started(start), &rows, &tables)?,
+        clock: Clock { t0, h: dt },
+        machine,
         first,
         steps,
         every,
         v: by_row(&v)?,
         y: by_row(&y)?,
         members,
-        threads,
         carried,
-        carries: model.carries(),
     };
     detached(py, progress, |monitor| batch::run(&plan, arrays, monitor))
 }
@@ -146,7 +151,7 @@ fn adapt(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<()> {
     let members = counts.as_array().ncols();
-    let arrays = adaptive::Arrays {
+    let arrays = chosen::Arrays {
         saved_v: saved_v.as_slice_mut()?,
         saved_y: saved_y.as_slice_mut()?,
         reached: reached.as_slice_mut()?,
@@ -154,9 +159,9 @@ fn adapt(
     };
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
-    let plan = adaptive::Plan {
-        model: model.model(&rows, &tables)?,
-        level: Level::choose().map_err(core_error)?,
+    let plan = chosen::Plan {
+        model: model.model(model.attempts(), &rows, &tables)?,
+        machine: Machine { level: Level::choose().map_err(core_error)?, threads },
         t0,
         at: &at,
         first: Row(first.as_slice()?),
@@ -166,9 +171,8 @@ fn adapt(
         v: by_row(&v)?,
         y: by_row(&y)?,
         members,
-        threads,
     };
-    detached(py, progress, |monitor| adaptive::run(&plan, arrays, monitor))
+    detached(py, progress, |monitor| chosen::run(&plan, arrays, monitor))
 }
 
 /// Runs without the GIL, tells how far it is and hears Ctrl-C.
@@ -210,6 +214,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_class::<ModelSpec>()?;
+    m.add_class::<tape::Tape>()?;
+    m.add_class::<tape::Symbol>()?;
     m.add_class::<world::World>()?;
     Ok(())
 }

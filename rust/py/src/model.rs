@@ -4,8 +4,9 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::{prelude::*, types::PyType};
 use stepwell_core::{
     error::Error,
-    group::{Row, Spec, Table},
-    table::{self, Model},
+    run::Model,
+    spec::{Given, Row, Spec, Table},
+    trace::{How, Scene},
 };
 
 /// A message as the package's own error.
@@ -22,16 +23,22 @@ pub fn core_error(error: Error) -> PyErr {
     argument_error(error.to_string())
 }
 
-/// A system and a method, or a linear map.
+/// What is given under a name: a word, a whole number, rows of a parameter, or samples with their start and interval.
+#[derive(FromPyObject)]
+enum Value {
+    Word(String),
+    Whole(usize),
+    Samples((f64, f64, Py<PyArray2<f64>>)),
+    Rows(Py<PyArray2<f64>>),
+}
+
+/// A system and what makes its steps.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct ModelSpec {
-    system: String,
-    options: Vec<String>,
-    sizes: Vec<usize>,
+    pub given: Given,
+    pub how: How,
     rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
-    method: String,
-    matrix: Option<(Vec<f64>, usize)>,
     record: Vec<String>,
 }
 
@@ -48,30 +55,44 @@ pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>
 
 #[pymethods]
 impl ModelSpec {
-    /// `matrix` is the nodes and the number of rows in the v slot, if the transition-matrix form is asked for.
+    /// `given` is a list of names and what is given under them; `nodes` are those of the transition-matrix form, if it is asked for.
     #[new]
-    #[pyo3(signature = (system, options, sizes, rows, tables, method, matrix=None, record=Vec::new()))]
-    #[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
+    #[pyo3(signature = (system, method, given, *, nodes=None, record=Vec::new()))]
     fn new(
+        py: Python<'_>,
         system: String,
-        options: Vec<String>,
-        sizes: Vec<usize>,
-        rows: Vec<Py<PyArray2<f64>>>,
-        tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
         method: String,
-        matrix: Option<(Vec<f64>, usize)>,
+        given: Vec<(String, Value)>,
+        nodes: Option<Vec<f64>>,
         record: Vec<String>,
     ) -> Self {
-        ModelSpec { system, options, sizes, rows, tables, method, matrix, record }
+        let mut names = Given { system, ..Given::default() };
+        let (mut rows, mut tables) = (Vec::new(), Vec::new());
+        for (name, value) in given {
+            match value {
+                Value::Word(word) => names.words.push((name, word)),
+                Value::Whole(whole) => names.wholes.push((name, whole)),
+                Value::Rows(array) => {
+                    let [count, members] = [0, 1].map(|axis| array.bind(py).readonly().as_array().shape()[axis]);
+                    names.rows.push((name, vec![members == 1; count]));
+                    rows.push(array);
+                }
+                Value::Samples((start, interval, array)) => {
+                    let common = array.bind(py).readonly().as_array().ncols() == 1;
+                    names.tables.push((name, common));
+                    tables.push((start, interval, array));
+                }
+            }
+        }
+        let how = match nodes {
+            None => How::Method { name: method, choice: 0 },
+            Some(nodes) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+        };
+        ModelSpec { given: names, how, rows, tables, record }
     }
 }
 
 impl ModelSpec {
-    /// Whether the v slot holds something else than v between steps.
-    pub fn carries(&self) -> bool {
-        self.matrix.is_none() && table::record(&self.method).is_some_and(|r| r.carry.is_some())
-    }
-
     /// Borrows the parameters.
     pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
         self.rows.iter().map(|r| Ok(r.bind(py).try_readonly()?)).collect()
@@ -82,22 +103,32 @@ impl ModelSpec {
         self.tables.iter().map(|(start, interval, t)| Ok((*start, *interval, t.bind(py).try_readonly()?))).collect()
     }
 
+    /// Steps of fixed length, by a method that is started in its `choice`-th way.
+    pub fn started(&self, choice: usize) -> How {
+        match &self.how {
+            How::Method { name, .. } => How::Method { name: name.clone(), choice },
+            other => other.clone(),
+        }
+    }
+
+    /// Steps of chosen length.
+    pub fn attempts(&self) -> How {
+        match &self.how {
+            How::Method { name, .. } => How::Attempts { name: name.clone() },
+            other => other.clone(),
+        }
+    }
+
     /// What the core steps.
-    pub fn model<'a>(&'a self, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+    pub fn model<'a>(&'a self, how: How, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
         let spec = Spec {
-            system: &self.system,
-            options: self.options.iter().map(String::as_str).collect(),
-            sizes: self.sizes.clone(),
+            given: self.given.clone(),
             rows: rows.iter().map(by_row).collect::<PyResult<Vec<_>>>()?.concat(),
             tables: tables
                 .iter()
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
-            record: self.record.iter().map(String::as_str).collect(),
         };
-        Ok(match &self.matrix {
-            None => Model::Direct { spec, method: &self.method },
-            Some((nodes, v_rows)) => Model::Matrix { spec, nodes, v_rows: *v_rows },
-        })
+        Ok(Model { spec, scene: Scene { given: self.given.clone(), how, record: self.record.clone() } })
     }
 }

@@ -2,7 +2,10 @@
 
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::{buffer::PyBuffer, prelude::*};
-use stepwell_core::{group::Clock, isa::Level, world};
+use stepwell_core::{
+    isa::Level,
+    run::{Machine, stage::Clock, world},
+};
 
 use crate::model::{ModelSpec, argument_error, core_error};
 
@@ -53,11 +56,11 @@ impl World {
         v: Py<PyArrayDyn<f64>>,
         y: Py<PyArrayDyn<f64>>,
     ) -> PyResult<Self> {
-        let clock = Clock { t0, h: dt, start, level: Level::choose().map_err(core_error)?, threads: 1 };
+        let (clock, machine) = (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(core_error)?, threads: 1 });
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
-        let world =
-            world::World::new(&model.model(&rows, &tables)?, clock, members, model.carries(), first).map_err(core_error)?;
+        let model = model.model(model.started(start), &rows, &tables)?;
+        let world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
         let sizes = world.sizes();
         let (v_size, y_size) =
             (v.bind(py).try_readwrite()?.as_slice_mut()?.len(), y.bind(py).try_readwrite()?.as_slice_mut()?.len());

@@ -12,7 +12,7 @@ use crate::{isa::Level, kernel::runner::Width, spec::Spec, trace::Traced};
 ///
 /// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
 /// method carries between steps, which is the velocity for all but the methods that say otherwise in their record.
-pub trait Group: Send {
+pub trait Group: Send + Sync {
     /// How many members it steps together.
     fn lanes(&self) -> usize;
 
