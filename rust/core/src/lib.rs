@@ -1,5 +1,6 @@
 //! # stepwell-core
 
+pub mod controls;
 pub mod error;
 pub mod functions;
 pub mod isa;
