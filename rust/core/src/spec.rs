@@ -78,6 +78,12 @@ impl Given {
         find(&self.rows, name).map_or(0, Vec::len)
     }
 
+    /// An error unless the parameter of that name has so many rows.
+    pub fn expect(&self, what: &'static str, expected: usize) -> Result<(), Error> {
+        let got = self.count(what);
+        if got == expected { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
+    }
+
     /// Whether anything of that name was given: a parameter, or an input of any kind.
     pub fn has(&self, name: &str) -> bool {
         self.count(name) > 0 || find(&self.tables, name).is_some() || self.count(&format!("{name}.amplitude")) > 0

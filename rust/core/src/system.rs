@@ -3,7 +3,9 @@
 use nalgebra::DVector;
 
 use crate::{
+    controls,
     error::Error,
+    method::{Needs, Record},
     number::{Number, Symbol},
     spec::{Given, Parameters},
 };
@@ -35,8 +37,8 @@ pub trait System<N: Number> {
         None
     }
 
-    /// The gradient of h·E at a state: in the velocities and in the coordinates.
-    fn gradient(&self, _v: &Block<N>, _y: &Block<N>) -> Option<(Block<N>, Block<N>)> {
+    /// The gradient of the energy at the state whose velocities and energies these are.
+    fn gradient(&self, _v: &Block<N>, _energies: &Energies<N>) -> Option<Gradient<N>> {
         None
     }
 
@@ -67,6 +69,17 @@ pub struct Energies<N: Number> {
     pub whole: N,
 }
 
+/// What [`System::gradient`] gives.
+#[derive(Clone, Debug)]
+pub struct Gradient<N: Number> {
+    /// ∂E/∂v
+    pub v: Block<N>,
+    /// ∂E/∂y
+    pub y: Block<N>,
+    /// The square of the length of both together.
+    pub square: N,
+}
+
 /// How many numbers the blocks of a system have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
@@ -84,12 +97,29 @@ pub struct Kind {
     pub shape: fn(&Given) -> Result<Shape, Error>,
     /// The term that depends on the velocity, if there is one: methods that ask for an acceleration refuse it.
     pub velocity_term: fn(&Given) -> Option<&'static str>,
-    /// Numbers of each quantity that can be recorded; the energy of a system that no quantity is known of is not among them.
+    /// Quantities that can be recorded, and how many numbers each has. The `energy` is among them if it can be controlled.
     pub quantities: fn(&Given) -> Vec<(&'static str, usize)>,
     /// The system over numbers, for tests.
     pub numbers: Make<f64>,
     /// The system over symbols.
     pub symbols: Make<Symbol>,
+}
+
+impl Kind {
+    /// How large the blocks are, or why a system of this kind cannot be made of what was given, or not be stepped by the method.
+    ///
+    /// Whatever passes here can be made and stepped.
+    pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
+        let shape = (self.shape)(given)?;
+        controls::check(self, given)?;
+        let term = (self.velocity_term)(given).or(controls::is_given(given).then_some("energy control"));
+        match term {
+            Some(term) if method.needs == Needs::Acceleration => {
+                Err(Error::VelocityDependent { method: method.name, system: self.name, term })
+            }
+            _ => Ok(shape),
+        }
+    }
 }
 
 /// Makes the system of one member, scaled to the step.

@@ -1,8 +1,18 @@
 //! Methods and systems: what they ask for, and that a step over numbers and the tape of a step over symbols are the same.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use nalgebra::DVector;
 use stepwell_core::{
-    method::{self, Needs},
+    controls,
+    error::Error,
+    method::{self, Needs, Record},
+    number::{Number, Symbol, record},
+    spec::{Given, Parameters},
     steppers::RECORDS,
+    system::{self, Make, Shape, System},
+    systems::{KINDS, nbody},
+    tape::{Counts, Id, Op, Tape, eval},
 };
 
 /// Evaluations of each method, and the times within a step at which they are made.
@@ -59,6 +69,312 @@ fn an_estimate_asks_for_no_more_rates() {
     for record in RECORDS {
         if let Some(attempt) = record.attempt() {
             assert_eq!(attempt.evaluations(), record.program().evaluations(), "{}", record.name);
+        }
+    }
+}
+
+/// What is given to a system: words and whole numbers, numbers of rows, sampled inputs, all by name.
+fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &[(&str, usize)], tables: &[&str]) -> Given {
+    Given {
+        system: system.to_owned(),
+        words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
+        wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        rows: rows.iter().map(|(name, count)| (name.to_string(), vec![true; *count])).collect(),
+        tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
+    }
+}
+
+fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given {
+    let mut words = vec![("force", force)];
+    words.extend(control);
+    let mut rows = vec![("masses", n), ("strength", n), ("softening", 1)];
+    match control.first() {
+        Some((_, "energy")) => rows.extend([("control.gain", 1), ("control.target", 1)]),
+        Some(_) => rows.push(("control.target", 1)),
+        None => {}
+    }
+    given("nbody", &words, &[("dim", dim)], &rows, &[])
+}
+
+const SINE_A: [(&str, usize); 3] = [("a.amplitude", 1), ("a.omega", 1), ("a.phase", 1)];
+const CONTROLS: [[(&str, &str); 2]; 4] = [
+    [("control", "energy"), ("control.form", "limited")],
+    [("control", "energy"), ("control.form", "printed")],
+    [("control", "projection"), ("control.way", "scaling")],
+    [("control", "projection"), ("control.way", "nacozy")],
+];
+
+/// Systems of every kind, in every form.
+fn systems() -> Vec<Given> {
+    let mut all = Vec::new();
+    for form in ["canonical", "physical"] {
+        let oscillator = |rows: &[(&str, usize)], tables: &[&str]| given("oscillator", &[("form", form)], &[], rows, tables);
+        all.push(oscillator(&[("omega", 1)], &[]));
+        all.push(oscillator(&[("omega", 1), ("damping", 1)], &[]));
+        all.push(oscillator(&[("omega", 1), ("x", 1)], &["a"]));
+        all.push(oscillator(&[&[("omega", 1), ("damping", 1)], &SINE_A[..]].concat(), &["x"]));
+    }
+    all.push(given("pendulum", &[], &[], &[("omega", 1)], &[]));
+    all.push(given("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
+    all.push(given("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
+    all.push(given("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
+    for n in [1, 4] {
+        all.push(given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
+    }
+    all.push(given("linear", &[("kind", "acceleration")], &[("n_v", 2)], &[("rows", 16)], &[]));
+    all.push(given("linear", &[], &[("n_v", 0)], &[("rows", 9)], &[]));
+    all.push(given("linear", &[], &[("n_v", 2), ("inputs", 2)], &[("rows", 8), ("inputs[0]", 1)], &["inputs[1]"]));
+    for force in ["logarithmic", "newton", "printed"] {
+        for (n, dim) in [(1, 2), (2, 2), (2, 3), (3, 3), (4, 2), (9, 3)] {
+            all.push(bodies(n, dim, force, &[]));
+        }
+        all.extend(CONTROLS.iter().flat_map(|control| [bodies(3, 2, force, control), bodies(10, 3, force, control)]));
+    }
+    all.push(bodies(35, 2, "newton", &[]));
+    all
+}
+
+/// What a step makes: the state, then the tally.
+fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
+    let system = controls::wrap(p, make(p), tally);
+    let (v, y) = state.split_at(shape.v);
+    let next = method.program().run(&*system, t, p.h, &DVector::from_column_slice(v), &DVector::from_column_slice(y));
+    let (v, y) = system.settle(next[0].clone(), next[1].clone());
+    v.iter().chain(&y).copied().chain(system.tally()).collect()
+}
+
+/// The step as a tape, and what it makes.
+fn trace(method: &Record, given: &Given) -> (Tape, Vec<Id>) {
+    let kind = system::kind(&given.system).unwrap();
+    let shape = kind.fit(given, method).unwrap();
+    let state = shape.v + shape.y;
+    let (tape, made) = record(Tape::default(), || {
+        let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
+        let p = Parameters { given, h: Symbol::new(Op::Step), numbers, sample: |i, t| Symbol::new(Op::Sample(i, t.0)) };
+        let symbols: Vec<Symbol> = (0..=state as u32).map(|i| Symbol::new(Op::State(i))).collect();
+        step(method, kind.symbols, &p, shape, Symbol::new(Op::Time), &symbols[..state], symbols[state])
+    });
+    (tape, made.into_iter().map(|symbol| symbol.0).collect())
+}
+
+fn sample(table: u32, t: f64) -> f64 {
+    f64::from(table) + (3.0 * t).floor()
+}
+
+/// What the tape makes of these numbers.
+fn evaluate(tape: &Tape, roots: &[Id], h: f64, t: f64, parameters: &[f64], state: &[f64]) -> Vec<u64> {
+    let mut values: Vec<u64> = Vec::with_capacity(tape.ops().len());
+    for op in tape.ops() {
+        let ([a, b, c], _) = op.operands();
+        let of = |id: Id| values.get(id as usize).copied().unwrap_or_default();
+        values.push(match *op {
+            Op::State(i) => state[i as usize].to_bits(),
+            Op::Param(i) => parameters[i as usize].to_bits(),
+            Op::Step => h.to_bits(),
+            Op::Time => t.to_bits(),
+            Op::Sample(table, at) => sample(table, f64::from_bits(of(at))).to_bits(),
+            op => eval::apply(op, of(a), of(b), of(c)),
+        });
+    }
+    roots.iter().map(|root| values[*root as usize]).collect()
+}
+
+/// Numbers between ½ and 2, always the same.
+fn numbers(count: usize, seed: u64) -> Vec<f64> {
+    let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut next = || {
+        x ^= x << 13;
+        x ^= x >> 7;
+        x ^= x << 17;
+        0.5 + 1.5 * (x >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+#[test]
+fn a_tape_makes_what_the_step_makes() {
+    let (h, t) = (0.0123, 1.7);
+    let mut seen = 0;
+    for given in systems() {
+        let kind = system::kind(&given.system).unwrap();
+        let parameters = numbers(given.parameters(), 1);
+        for method in RECORDS {
+            let shape = match kind.fit(&given, method) {
+                Ok(shape) => shape,
+                Err(Error::VelocityDependent { .. }) => continue,
+                Err(error) => panic!("{error}"),
+            };
+            let state = numbers(shape.v + shape.y + 1, 2);
+            let (tape, roots) = trace(method, &given);
+            let p = Parameters { given: &given, h, numbers: parameters.clone(), sample };
+            let stepped = step(method, kind.numbers, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
+            let stepped: Vec<u64> = stepped.into_iter().map(f64::to_bits).collect();
+            assert_eq!(evaluate(&tape, &roots, h, t, &parameters, &state), stepped, "{} on {given:?}", method.name);
+            assert!(stepped.iter().all(|bits| f64::from_bits(*bits).is_finite()), "{} on {given:?}", method.name);
+            seen += 1;
+        }
+    }
+    assert!(seen > 600, "{seen}");
+}
+
+#[test]
+fn every_kind_of_system_is_tried() {
+    let tried = systems();
+    assert!(KINDS.iter().all(|kind| tried.iter().any(|given| given.system == kind.name)));
+}
+
+/// How many operations of each kind depend on the state.
+fn of_the_state(tape: &Tape, roots: &[Id]) -> Counts {
+    let mut counts = Counts::default();
+    let mut depends: Vec<bool> = Vec::new();
+    for (op, needed) in tape.ops().iter().zip(tape.needed(roots.iter().copied())) {
+        let (operands, n) = op.operands();
+        let lane = matches!(op, Op::State(_)) || operands[..n].iter().any(|id| depends[*id as usize]);
+        depends.push(lane);
+        if lane && needed {
+            counts.note(*op);
+        }
+    }
+    counts
+}
+
+#[test]
+fn false_euler_on_an_oscillator_is_four_operations() {
+    for form in ["canonical", "physical"] {
+        let given = given("oscillator", &[("form", form)], &[], &[("omega", 1)], &[]);
+        let (tape, roots) = trace(method::record("false_euler").unwrap(), &given);
+        assert_eq!(of_the_state(&tape, &roots), Counts { additions: 2, multiplications: 2, ..Counts::default() }, "{form}");
+    }
+}
+
+#[test]
+fn zeros_that_begin_the_sums_of_a_few_bodies_cost_nothing() {
+    // A pair: differences, their square and the softening; then what each number of each body gets, which is two pushes, the one
+    // from the body before it taken from zero; then the step itself.
+    for (n, pairs, additions) in [(2, 1, 1), (3, 3, 2)] {
+        for dim in [2, 3] {
+            let (tape, roots) = trace(method::record("false_euler").unwrap(), &bodies(n, dim, "newton", &[]));
+            let most = pairs * (2 * dim) + additions * n * dim + 2 * n * dim;
+            assert!(of_the_state(&tape, &roots).additions as usize <= most, "{n} bodies in {dim} dimensions");
+        }
+    }
+}
+
+#[test]
+fn every_pair_of_bodies_meets_once() {
+    for n in (1..=131).chain([256, 511, 512, 513, 600]) {
+        let mut met = vec![false; n * n];
+        for k in nbody::partners(n).into_iter().flatten().flatten() {
+            for i in 0..nbody::meeting(n, k) {
+                let j = (i + k) % n;
+                let pair = &mut met[i.min(j) * n + i.max(j)];
+                assert!(i != j && !*pair, "{n} bodies: {i} and {j}");
+                *pair = true;
+            }
+        }
+        assert_eq!(met.into_iter().filter(|met| *met).count(), n * (n - 1) / 2, "{n} bodies");
+    }
+}
+
+/// The quantities of a state of bodies, by name.
+fn quantity<N: Number>(make: Make<N>, p: &Parameters<N>, name: &str, v: &[N], y: &[N]) -> Vec<N> {
+    make(p).record(name, &DVector::from_column_slice(v), &DVector::from_column_slice(y)).unwrap()
+}
+
+#[test]
+fn quantities_of_bodies_are_what_they_are_said_to_be() {
+    for (n, dim, force) in [(1, 2, "newton"), (3, 2, "printed"), (4, 3, "logarithmic"), (11, 3, "newton")] {
+        let given = bodies(n, dim, force, &[]);
+        let kind = system::kind("nbody").unwrap();
+        let (parameters, state) = (numbers(given.parameters(), 3), numbers(2 * n * dim, 4));
+        let (v, y) = state.split_at(n * dim);
+        for (name, size) in (kind.quantities)(&given) {
+            let p = Parameters { given: &given, h: 0.5, numbers: parameters.clone(), sample };
+            let made = quantity(kind.numbers, &p, name, v, y);
+            assert_eq!(made.len(), size, "{name}");
+            let (tape, symbols) = record(Tape::default(), || {
+                let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
+                let p = Parameters {
+                    given: &given,
+                    h: Symbol::new(Op::Step),
+                    numbers,
+                    sample: |i, t| Symbol::new(Op::Sample(i, t.0)),
+                };
+                let symbols: Vec<Symbol> = (0..2 * (n * dim) as u32).map(|i| Symbol::new(Op::State(i))).collect();
+                let (v, y) = symbols.split_at(n * dim);
+                quantity(kind.symbols, &p, name, v, y)
+            });
+            let roots: Vec<Id> = symbols.into_iter().map(|symbol| symbol.0).collect();
+            let bits: Vec<u64> = made.iter().map(|number| number.to_bits()).collect();
+            assert_eq!(evaluate(&tape, &roots, 0.5, 0.0, &parameters, &state), bits, "{name}");
+            if name == "momentum" {
+                let sum: f64 = (0..n).map(|i| parameters[i] * v[dim * i]).sum();
+                assert!((made[0] - sum).abs() < 1e-12 * sum);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_made_is_refused() {
+    let standard_euler = method::record("standard_euler").unwrap();
+    let fit = |given: &Given| system::kind(&given.system).unwrap().fit(given, standard_euler);
+    let unknown = |given: Given| assert!(matches!(fit(&given), Err(Error::Options { .. })), "{given:?}");
+    let misshapen = |given: Given| assert!(matches!(fit(&given), Err(Error::Shape { .. })), "{given:?}");
+    unknown(given("oscillator", &[("form", "square")], &[], &[("omega", 1)], &[]));
+    unknown(bodies(3, 4, "newton", &[]));
+    unknown(bodies(3, 2, "magnetic", &[]));
+    unknown(bodies(3, 2, "newton", &[("control", "energy"), ("control.form", "loose")]));
+    unknown(bodies(3, 2, "newton", &[("control", "projection"), ("control.way", "up")]));
+    unknown(bodies(3, 2, "newton", &[("control", "cruise")]));
+    unknown(given("linear", &[("kind", "odd")], &[("n_v", 1)], &[("rows", 4)], &[]));
+    unknown(given("linear", &[("kind", "acceleration")], &[("n_v", 1)], &[("rows", 9)], &[]));
+    let controlled = [("form", "physical"), ("control", "energy"), ("control.form", "limited")];
+    unknown(given("oscillator", &controlled, &[], &[("omega", 1), ("control.gain", 1), ("control.target", 1)], &[]));
+    misshapen(given("oscillator", &[("form", "physical")], &[], &[], &[]));
+    misshapen(given("pendulum", &[], &[], &[("omega", 2)], &[]));
+    misshapen(given("restricted_three_body", &[], &[], &[], &[]));
+    misshapen(given("chain", &[], &[], &[], &[]));
+    misshapen(given("chain", &[], &[], &[("stiffness", 3), ("mass", 3)], &[]));
+    misshapen(given("linear", &[], &[("n_v", 0)], &[], &[]));
+    misshapen(given("linear", &[], &[("n_v", usize::MAX)], &[("rows", 4)], &[]));
+    misshapen(given("linear", &[], &[("n_v", 1), ("inputs", 1)], &[("rows", 6)], &[]));
+    misshapen(given("linear", &[], &[("n_v", 1)], &[("rows", 5)], &[]));
+    misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("masses", 2), ("strength", 3), ("softening", 1)], &[]));
+    misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("softening", 1)], &[]));
+}
+
+#[test]
+fn forces_of_the_velocity_are_refused_where_they_do_harm() {
+    let term =
+        |given: &Given, method: &str| match system::kind(&given.system).unwrap().fit(given, method::record(method).unwrap()) {
+            Err(Error::VelocityDependent { term, .. }) => Some(term),
+            _ => None,
+        };
+    let damped = given("pendulum", &[], &[], &[("omega", 1), ("damping", 1)], &[]);
+    let turning = given("restricted_three_body", &[], &[], &[("mu", 1)], &[]);
+    for method in ["verlet", "leapfrog", "pefrl"] {
+        assert_eq!(term(&damped, method), Some("damping"));
+        assert_eq!(term(&turning, method), Some("the Coriolis force"));
+        assert_eq!(term(&bodies(3, 2, "newton", &CONTROLS[0]), method), Some("energy control"));
+        assert_eq!(term(&bodies(3, 2, "newton", &[]), method), None);
+    }
+    assert_eq!(term(&damped, "rk4"), None);
+}
+
+#[test]
+fn what_is_carried_turns_back_into_the_velocity() {
+    let given = bodies(3, 3, "newton", &[]);
+    let kind = system::kind("nbody").unwrap();
+    let p = Parameters { given: &given, h: 0.01, numbers: numbers(given.parameters(), 5), sample };
+    let system: Box<dyn System<f64>> = (kind.numbers)(&p);
+    let (v, y) = (DVector::from_vec(numbers(9, 6)), DVector::from_vec(numbers(9, 7)));
+    for record in RECORDS {
+        let choices = record.carry.as_ref().map_or(0, |carry| carry.starts.len().max(1));
+        for choice in 0..choices {
+            let carried = record.start(choice).unwrap().run(&*system, 0.0, p.h, &v, &y);
+            let back = record.finish(choice).unwrap().run(&*system, 0.0, p.h, &carried[0], &y);
+            assert!((&back[0] - &v).amax() < 1e-12, "{} {choice}", record.name);
         }
     }
 }

@@ -1,6 +1,57 @@
-//! stub
-use crate::{number::Number, spec::Parameters, system::System};
-/// stub
-pub fn wrap<N: Number>(_p: &Parameters<N>, system: Box<dyn System<N>>, _tally: N) -> Box<dyn System<N>> {
-    system
+//! What keeps the energy near its target (§12, Appendix D).
+//!
+//! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage of whatever method makes the step,
+//! so it goes with all of them. A *projection* sets the state back onto the energy after the step. Both wrap any system that has
+//! an energy, and are a system themselves. Energies come scaled to the step, as everything does.
+//!
+//! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`; or it is
+//! `projection`, with the word `control.way` and the `control.target`.
+
+pub mod energy;
+pub mod projection;
+
+use crate::{
+    error::Error,
+    number::Number,
+    spec::{Given, Parameters},
+    system::{Kind, System},
+};
+
+/// Whether a system is given any control.
+pub fn is_given(given: &Given) -> bool {
+    !given.word("control").is_empty()
+}
+
+/// What is wrong with the control that is given, if anything is.
+pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
+    let name = match given.word("control") {
+        "" => return Ok(()),
+        "energy" => "control.form",
+        "projection" => "control.way",
+        _ => return Err(given.unknown("control")),
+    };
+    if !(kind.quantities)(given).iter().any(|(quantity, _)| *quantity == "energy") {
+        return Err(given.unknown("control"));
+    }
+    match (name, given.word(name)) {
+        ("control.form", "limited" | "printed") => given.expect("control.gain", 1)?,
+        ("control.way", "scaling" | "nacozy") => {}
+        _ => return Err(given.unknown(name)),
+    }
+    given.expect("control.target", 1)
+}
+
+/// A system under the control that is given, or the system itself. The tally starts from this number: h times what control or
+/// projection changed of the energy.
+pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
+    match p.given.word("control") {
+        "energy" => Box::new(energy::Controlled::new(p, system, tally)),
+        "projection" => Box::new(projection::Projected::new(p, system, tally)),
+        _ => system,
+    }
+}
+
+/// √x with x held between ¼ and 4: a factor of velocities between ½ and 2.
+fn factor<N: Number>(square: N) -> N {
+    square.held(0.25, 4.0).sqrt()
 }

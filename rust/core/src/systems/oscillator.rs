@@ -24,6 +24,7 @@ pub const KIND: Kind = Kind {
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
+    given.expect("omega", 1)?;
     match given.word("form") {
         "canonical" | "physical" => Ok(Shape { v: 1, y: 1 }),
         _ => Err(given.unknown("form")),

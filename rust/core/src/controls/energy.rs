@@ -1,0 +1,76 @@
+//! A push −g·v in every stage.
+//!
+//! As printed, g = h·C·ΔE. It overflows where C·h·K passes 1, so the limited form takes the decay of ΔE by backward Euler: the
+//! velocities are scaled by the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ¼ … 4.
+
+use std::cell::Cell;
+
+use super::factor;
+use crate::{
+    number::Number,
+    spec::Parameters,
+    system::{Block, Energies, Gradient, System},
+};
+
+/// A system whose velocities are pushed.
+pub struct Controlled<N: Number> {
+    system: Box<dyn System<N>>,
+    limited: bool,
+    gain: N,
+    /// h times the energy to keep.
+    target: N,
+    work: Cell<N>,
+}
+
+impl<N: Number> Controlled<N> {
+    /// A system under the control that is given.
+    pub fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
+        let limited = p.given.word("control.form") == "limited";
+        let (gain, target) = (p.number("control.gain"), p.h * p.number("control.target"));
+        Controlled { system, limited, gain, target, work: Cell::new(tally) }
+    }
+
+    /// g, the share of the velocity that is taken away.
+    fn push(&self, energies: &Energies<N>) -> N {
+        let off = energies.whole - self.target;
+        if !self.limited {
+            return self.gain * off;
+        }
+        let (one, twice) = (N::of(1.0), N::of(2.0) * self.gain);
+        one - factor(one - (twice * off) / (one + twice * energies.kinetic))
+    }
+}
+
+impl<N: Number> System<N> for Controlled<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let Some(energies) = self.system.energies(v, y) else { return self.system.dv(t, v, y) };
+        let g = self.push(&energies);
+        // What the push alone would change of the energy: ((1 − g)² − 1)·K.
+        self.work.set(self.work.get() - (g * (N::of(2.0) - g)) * energies.kinetic);
+        energies.dv.zip_map(v, |dv, v| dv - g * v)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.system.dy(t, v, y)
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        self.system.velocity(d)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        self.system.energies(v, y)
+    }
+
+    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        self.system.gradient(v, energies)
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        self.system.record(quantity, v, y)
+    }
+
+    fn tally(&self) -> Option<N> {
+        Some(self.work.get())
+    }
+}

@@ -1,0 +1,79 @@
+//! Back onto the energy after a step: all velocities by one factor, or the least change of the state (Nacozy 1971), which is along
+//! the gradient of the energy, in velocities and coordinates.
+
+use std::cell::Cell;
+
+use super::factor;
+use crate::{
+    number::Number,
+    spec::Parameters,
+    system::{Block, Energies, Gradient, System},
+};
+
+/// A system whose states are set back onto their energy.
+pub struct Projected<N: Number> {
+    system: Box<dyn System<N>>,
+    h: N,
+    nacozy: bool,
+    /// h times the energy to keep.
+    target: N,
+    work: Cell<N>,
+}
+
+impl<N: Number> Projected<N> {
+    /// A system under the projection that is given.
+    pub fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
+        let (nacozy, target) = (p.given.word("control.way") == "nacozy", p.h * p.number("control.target"));
+        Projected { system, h: p.h, nacozy, target, work: Cell::new(tally) }
+    }
+
+    /// The state set back; `None` if the system has no energy.
+    fn back(&self, v: &Block<N>, y: &Block<N>) -> Option<(Block<N>, Block<N>)> {
+        let energies = self.system.energies(v, y)?;
+        let off = energies.whole - self.target;
+        if self.nacozy {
+            let along = self.system.gradient(v, &energies)?;
+            let step = (off / self.h) / along.square;
+            self.work.set(self.work.get() - off);
+            return Some((v.zip_map(&along.v, |v, along| v - step * along), y.zip_map(&along.y, |y, along| y - step * along)));
+        }
+        let factor = factor(N::of(1.0) - off / energies.kinetic);
+        self.work.set(self.work.get() + (factor * factor - N::of(1.0)) * energies.kinetic);
+        Some((v * factor, y.clone()))
+    }
+}
+
+impl<N: Number> System<N> for Projected<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.system.dv(t, v, y)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.system.dy(t, v, y)
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        self.system.velocity(d)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        self.system.energies(v, y)
+    }
+
+    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        self.system.gradient(v, energies)
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        self.system.record(quantity, v, y)
+    }
+
+    fn settle(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        let back = self.back(&v, &y);
+        back.unwrap_or((v, y))
+    }
+
+    fn tally(&self) -> Option<N> {
+        Some(self.work.get())
+    }
+}

@@ -1,0 +1,87 @@
+//! Any linear system (§3): ṡ = A·s + B·x(t), with the state s = (v, y) of any size, cut into the two blocks where the user says.
+//!
+//! An increment is a row of h·A and h·B times the columns v, y and x, summed in this order.
+
+use crate::{
+    error::Error,
+    number::Number,
+    signal::Signal,
+    spec::{Given, Parameters},
+    system::{Block, Kind, Shape, System},
+};
+
+/// What the core knows of it. Given: `n_v`, how many of the states are in v; `inputs`, how many, and `inputs[0]`, …; `rows`,
+/// [A B] by rows; the word `kind` is `acceleration` if ẏ is v times a number and v̇ does not depend on v.
+pub const KIND: Kind = Kind {
+    name: "linear",
+    shape,
+    velocity_term: |given| (given.word("kind") != "acceleration").then_some("rates of another kind"),
+    quantities: |_| Vec::new(),
+    numbers: make,
+    symbols: make,
+};
+
+fn input(i: usize) -> String {
+    format!("inputs[{i}]")
+}
+
+fn shape(given: &Given) -> Result<Shape, Error> {
+    let (v, inputs) = (given.whole("n_v"), given.whole("inputs"));
+    let got = (0..inputs).filter(|i| given.has(&input(*i))).count();
+    if got != inputs {
+        return Err(Error::Shape { what: "inputs", expected: inputs, got });
+    }
+    let mut n = v.max(1);
+    let numbers = |n: usize| n.saturating_mul(n.saturating_add(inputs));
+    while numbers(n) < given.count("rows") {
+        n += 1;
+    }
+    given.expect("rows", numbers(n))?;
+    match given.word("kind") {
+        "" => {}
+        "acceleration" if v == n - v => {}
+        _ => return Err(given.unknown("kind")),
+    }
+    Ok(Shape { v, y: n - v })
+}
+
+struct Linear<N: Number> {
+    /// A row of h·A and h·B for each number of v, then of y.
+    rows: Vec<Vec<N>>,
+    inputs: Vec<Signal<N>>,
+    velocities: usize,
+}
+
+fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let inputs = (0..p.given.whole("inputs")).map(|i| p.signal(&input(i)).unwrap_or(Signal::Constant(N::of(f64::NAN))));
+    let inputs: Vec<_> = inputs.collect();
+    let velocities = p.given.whole("n_v");
+    let numbers: Vec<N> = p.numbers("rows").iter().map(|number| p.h * *number).collect();
+    let states = shape(p.given).map_or(1, |shape| shape.v + shape.y);
+    let rows = numbers.chunks(states + inputs.len()).map(<[N]>::to_vec).collect();
+    Box::new(Linear { rows, inputs, velocities })
+}
+
+impl<N: Number> Linear<N> {
+    /// Rows times the columns v, y and x, from the left.
+    fn times(&self, rows: &[Vec<N>], t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let columns: Vec<N> = v.iter().chain(y).copied().chain(self.inputs.iter().map(|x| x.at(t))).collect();
+        let times = |row: &Vec<N>| row.iter().zip(&columns).map(|(a, s)| *a * *s).reduce(|sum, term| sum + term);
+        Block::from_iterator(rows.len(), rows.iter().map(|row| times(row).unwrap_or(N::of(0.0))))
+    }
+}
+
+impl<N: Number> System<N> for Linear<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.times(&self.rows[..self.velocities], t, v, y)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.times(&self.rows[self.velocities..], t, v, y)
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        let speed = self.rows.get(self.velocities).and_then(|row| row.first()).copied();
+        d.map(|d| d / speed.unwrap_or(N::of(f64::NAN)))
+    }
+}

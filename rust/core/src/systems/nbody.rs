@@ -1,0 +1,253 @@
+//! Bodies that attract each other (Appendix C, D): v̇ᵢ = Σⱼ G·mⱼ·(yⱼ − yᵢ)·f(r² + ε²), ẏ = v, each pair computed once.
+//!
+//! | force | f | potential of a pair |
+//! |---|---|---|
+//! | `logarithmic` | 1/r² | G·m·m·ln r |
+//! | `newton` | 1/r³ | −G·m·m/r |
+//! | `printed` | 1/r² | −G·m·m/r, which belongs to the other force |
+//!
+//! Body i meets body i + k for k = 1 … n/2, counted round the circle, so every pair comes once. What a body gets from partners
+//! after it and before it is summed apart, the latter over two rounds (body n + j is body j), so that no index wraps where bodies
+//! are taken side by side. The order of these sums is the same however many there are and whoever computes them.
+
+use crate::{
+    error::Error,
+    functions::log,
+    number::Number,
+    spec::{Given, Parameters},
+    system::{Block, Energies, Gradient, Kind, Shape, System},
+};
+
+/// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
+/// `softening`, ε.
+pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, numbers: make::<f64>, symbols: make };
+
+fn shape(given: &Given) -> Result<Shape, Error> {
+    let dim = given.whole("dim");
+    if !matches!(dim, 2 | 3) {
+        return Err(Error::Options { system: given.system.clone(), options: format!("dim = {dim}") });
+    }
+    if law(given).is_none() {
+        return Err(given.unknown("force"));
+    }
+    let n = given.count("masses").max(1);
+    given.expect("masses", n)?;
+    given.expect("strength", n)?;
+    given.expect("softening", 1)?;
+    Ok(Shape { v: n * dim, y: n * dim })
+}
+
+fn quantities(given: &Given) -> Vec<(&'static str, usize)> {
+    let dim = given.whole("dim");
+    let spin = if dim == 2 { 1 } else { 3 };
+    vec![("energy", 1), ("momentum", dim), ("angular_momentum", spin), ("closest", 1)]
+}
+
+/// A force and its potential.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Law {
+    Logarithmic,
+    Newton,
+    Printed,
+}
+
+fn law(given: &Given) -> Option<Law> {
+    match given.word("force") {
+        "logarithmic" => Some(Law::Logarithmic),
+        "newton" => Some(Law::Newton),
+        "printed" => Some(Law::Printed),
+        _ => None,
+    }
+}
+
+impl Law {
+    /// f(r²)
+    fn pull<N: Number>(self, r2: N) -> N {
+        let r2 = if self == Law::Newton { r2 * r2.sqrt() } else { r2 };
+        N::of(1.0) / r2
+    }
+
+    /// The potential, per mass, that a partner makes.
+    fn potential<N: Number>(self, r2: N, pull: N, strength: N) -> N {
+        match self {
+            Law::Logarithmic => (N::of(0.5) * log(r2)) * strength,
+            Law::Newton => -(r2 * (pull * strength)), // the product is at hand
+            Law::Printed => -(pull.sqrt() * strength),
+        }
+    }
+}
+
+/// Sums over bodies are kept in this many parts, body i in part i mod `LANES`; distances that are taken together are so far apart.
+pub const LANES: usize = 8;
+/// Bodies from which on the distances are cut into slabs.
+const LONG: usize = 64;
+/// Bodies for each slab, and how many slabs there are at most.
+const SLAB: usize = 256;
+const SLABS: usize = 16;
+
+/// The distances k at which body i meets body i + k, every pair once for k ≤ n/2, in the order in which they are summed.
+///
+/// Distances that are `LANES` apart form a group, groups form slabs, and a slab has sums of its own.
+pub fn partners(n: usize) -> Vec<Vec<Vec<usize>>> {
+    if n < LONG {
+        let pairs = n / 2 / (2 * LANES) * (2 * LANES);
+        let twos = (1..=pairs).step_by(2 * LANES).flat_map(|first| (first..first + LANES).map(|k| vec![k, k + LANES]));
+        return vec![twos.chain((pairs + 1..=n / 2).map(|k| vec![k])).collect()];
+    }
+    let last = (n - 1) / 2;
+    let length = last.div_ceil((n / SLAB).clamp(1, SLABS)).next_multiple_of(LANES);
+    let slab = |first: usize| {
+        let end = last.min(first + length - 1);
+        (first..=end.min(first + LANES - 1)).map(|k| (k..=end).step_by(LANES).collect()).collect()
+    };
+    let mut slabs: Vec<Vec<Vec<usize>>> = (1..=last).step_by(length).map(slab).collect();
+    if let (Some(slab), 0) = (slabs.last_mut(), n % 2) {
+        slab.push(vec![n / 2]); // opposite bodies
+    }
+    slabs
+}
+
+/// How many bodies meet a partner at this distance: all, but opposite ones meet once.
+pub fn meeting(n: usize, k: usize) -> usize {
+    if 2 * k == n { k } else { n }
+}
+
+/// The sum of a number of each body: body i in part i mod `LANES`, then part after part.
+fn total<N: Number>(values: impl IntoIterator<Item = N>) -> N {
+    let mut parts: Vec<N> = Vec::with_capacity(LANES);
+    for (i, value) in values.into_iter().enumerate() {
+        match parts.get_mut(i % LANES) {
+            Some(part) => *part += value,
+            None => parts.push(value),
+        }
+    }
+    parts.into_iter().reduce(|whole, part| whole + part).unwrap_or(N::of(0.0))
+}
+
+/// d·d
+fn square<N: Number>(d: &[N]) -> N {
+    d.iter().map(|d| *d * *d).reduce(|length, d| length + d).unwrap_or(N::of(0.0))
+}
+
+/// The bodies of one member, scaled to the step.
+struct Bodies<N: Number> {
+    h: N,
+    law: Law,
+    dim: usize,
+    masses: Vec<N>,
+    /// h·G·m
+    strength: Vec<N>,
+    soft: N,
+    /// ½·h·m
+    half: Vec<N>,
+}
+
+fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let (h, masses, softening) = (p.h, p.numbers("masses").to_vec(), p.number("softening"));
+    let strength = p.numbers("strength").iter().map(|strength| h * *strength).collect();
+    let half = masses.iter().map(|mass| (N::of(0.5) * h) * *mass).collect();
+    let law = law(p.given).unwrap_or(Law::Logarithmic); // `shape` has seen that there is one
+    Box::new(Bodies { h, law, dim: p.given.whole("dim"), masses, strength, soft: softening * softening, half })
+}
+
+impl<N: Number> Bodies<N> {
+    /// h·v̇ from every pair once, and with `wells` h·G·Σⱼ mⱼ·φ for each body, else zeros.
+    fn meet(&self, y: &Block<N>, with_wells: bool) -> (Block<N>, Vec<N>) {
+        let (n, dim, zero) = (self.masses.len(), self.dim, N::of(0.0));
+        let (mut dv, mut potential) = (Block::from_element(n * dim, zero), vec![zero; n]);
+        for slab in partners(n) {
+            let (mut after, mut before, mut wells) = (vec![zero; n * dim], vec![zero; 2 * n * dim], vec![zero; n]);
+            for group in slab {
+                let mut pushes = Vec::new();
+                for k in group {
+                    for i in 0..meeting(n, k) {
+                        let j = (i + k) % n;
+                        let d: Vec<N> = (0..dim).map(|c| y[dim * j + c] - y[dim * i + c]).collect();
+                        let r2 = square(&d) + self.soft;
+                        let pull = self.law.pull(r2);
+                        let (to_i, to_j) = (pull * self.strength[j], pull * self.strength[i]);
+                        for (c, d) in d.into_iter().enumerate() {
+                            after[dim * i + c] += d * to_i;
+                            pushes.push((dim * (i + k) + c, d * to_j));
+                        }
+                        if with_wells {
+                            wells[i] += self.law.potential(r2, pull, self.strength[j]);
+                        }
+                    }
+                }
+                // From the farthest distance to the nearest; what a body gets at one distance is a single push in each round.
+                for (at, push) in pushes.into_iter().rev() {
+                    before[at] -= push;
+                }
+            }
+            for r in 0..n * dim {
+                dv[r] += after[r] + (before[r] + before[n * dim + r]);
+            }
+            potential.iter_mut().zip(wells).for_each(|(sum, well)| *sum += well);
+        }
+        (dv, potential)
+    }
+
+    /// What is said of each body in turn: its mass, its place and its velocity.
+    fn each<'a>(&'a self, v: &'a Block<N>, y: &'a Block<N>) -> impl Iterator<Item = (N, &'a [N], &'a [N])> {
+        let (v, y) = (v.as_slice().chunks(self.dim), y.as_slice().chunks(self.dim));
+        self.masses.iter().zip(y.zip(v)).map(|(mass, (y, v))| (*mass, y, v))
+    }
+}
+
+impl<N: Number> System<N> for Bodies<N> {
+    fn dv(&self, _t: N, _v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.meet(y, false).0
+    }
+
+    fn dy(&self, _t: N, v: &Block<N>, _y: &Block<N>) -> Block<N> {
+        v * self.h
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|d| d / self.h)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        let (dv, potential) = self.meet(y, true);
+        let kinetic = total(self.half.iter().zip(v.as_slice().chunks(self.dim)).map(|(half, v)| *half * square(v)));
+        let whole = kinetic + total(self.masses.iter().zip(potential).map(|(mass, potential)| *mass * potential));
+        Some(Energies { dv, kinetic, whole })
+    }
+
+    /// m·v in the velocities and −m·a in the coordinates.
+    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        let of =
+            |block: &Block<N>| Block::from_iterator(block.len(), (0..block.len()).map(|r| self.masses[r / self.dim] * block[r]));
+        let (v, y) = (of(v), -of(&energies.dv.map(|dv| dv / self.h)));
+        let bodies = v.as_slice().chunks(self.dim).zip(y.as_slice().chunks(self.dim));
+        let square = total(bodies.map(|(v, y)| square(v) + square(y)));
+        Some(Gradient { v, y, square })
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        match quantity {
+            "energy" => Some(vec![self.energies(v, y)?.whole / self.h]),
+            "momentum" => Some((0..self.dim).map(|c| total(self.each(v, y).map(|(mass, _, v)| mass * v[c]))).collect()),
+            "angular_momentum" => {
+                let axes: &[(usize, usize)] = if self.dim == 2 { &[(0, 1)] } else { &[(1, 2), (2, 0), (0, 1)] };
+                let spin =
+                    |&(a, b): &(usize, usize)| total(self.each(v, y).map(|(mass, y, v)| mass * (y[a] * v[b] - y[b] * v[a])));
+                Some(axes.iter().map(spin).collect())
+            }
+            "closest" => {
+                let places: Vec<&[N]> = y.as_slice().chunks(self.dim).collect();
+                let mut least = N::of(f64::INFINITY);
+                for (i, from) in places.iter().enumerate() {
+                    for to in &places[i + 1..] {
+                        let d: Vec<N> = to.iter().zip(*from).map(|(to, from)| *to - *from).collect();
+                        let r2 = square(&d);
+                        least = N::choose(r2.below(least), r2, least);
+                    }
+                }
+                Some(vec![least.sqrt()])
+            }
+            _ => None,
+        }
+    }
+}
