@@ -164,7 +164,7 @@ def integrate(
     if isinstance(system, NBody) and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
-        t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
+        t=t0 + (start_step + plan.saves.astype(np.float64)) * dt,
         v=out.v,
         y=out.y,
         status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
