@@ -323,7 +323,8 @@ def _quantities(system: System, record: Sequence[str]) -> list[str]:
     for name in given:
         _checks.known("record", name, known)
     if "energy" in given and "energy" not in system.quantities:
-        system.energy(np.zeros(system.v_shape), np.zeros(system.y_shape))  # raises if there is none, before any work
+        v, y = (np.zeros((*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
+        system.energy(v, y)  # raises if there is none, before any work
     return list(dict.fromkeys(given))
 
 
