@@ -50,9 +50,14 @@ class Plan(NamedTuple):
         return getattr(self.system, "control", None) is not None
 
     @property
-    def saves(self) -> list[int]:
-        """The steps, counted from the first, at which the state is kept."""
-        return _core.saves(self.steps, self.every)
+    def saves(self) -> Whole:
+        """The steps, counted from the first, at which the state is kept: every so many, and the last."""
+        if self.every is None:
+            return np.array([self.steps], dtype=np.int64)
+        every = min(self.every, self.steps)
+        kept = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
+        kept[-1] = self.steps
+        return kept
 
     @property
     def block_axes(self) -> tuple[int, int]:
@@ -123,7 +128,7 @@ def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, b
         return step(t, v, y)
 
     return reference.run(
-        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves
+        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves.tolist()
     )
 
 
@@ -142,7 +147,7 @@ def _finished(plan: Plan, slot: Array, kept: list[Blocks], first_bad: Any) -> Ou
     y = [pair[1] for pair in kept]
     if plan.method.carry is not None:
         s = plan.system.scaled(plan.dt, plan.batch)
-        times = [plan.t0 + (plan.first + i) * plan.dt for i in plan.saves]
+        times = (plan.t0 + (plan.first + plan.saves) * plan.dt).tolist()
         with np.errstate(all="ignore"):
             v = [plan.method.steps.finish(s, plan.choice, *state) for state in zip(times, v, y, strict=True)]
     return Outcome(np.stack(v), np.stack(y), slot, np.asarray(first_bad, dtype=np.int64))
@@ -168,7 +173,7 @@ def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
-    kept = 1 if plan.every is None else len(plan.saves)
+    kept = len(plan.saves)
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
     carry = np.empty(v.shape if carries else 0)
     shapes = {name: plan.system.quantities[name] for name in plan.record}
@@ -307,14 +312,14 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
 
     drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
-    kept = []
+    kept, saves = [], plan.saves.tolist()
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=plan.saves)
+        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=saves)
         for i, s in enumerate(states, 1):
             kept.append((s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)))
             if plan.progress is not None:
-                plan.progress(i / len(plan.saves))
+                plan.progress(i / len(saves))
     return _finished(plan, kept[-1][0], kept, before)
 
 
