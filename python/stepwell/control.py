@@ -76,24 +76,20 @@ class EnergyControl:
             )
         return aimed
 
-    def scaled(self, h: float) -> dict[str, Any]:
-        """The NumPy reference, scaled to the step h, by the name that a system has for it."""
-        return {"control": reference.EnergyControl(h, self.form, np.asarray(self.gain), np.asarray(self.target))}
+    def around(self, s: Any, h: float) -> reference.EnergyControl:
+        """The NumPy reference, round that of a system, both scaled to the step h."""
+        return reference.EnergyControl(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
+
+    def given(self) -> dict[str, Any]:
+        """What describes it to the core, beside what describes the system."""
+        numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
+        return {"control": "energy", "control.form": self.form} | numbers
 
     def member(self, one: Callable[[Array], Array]) -> EnergyControl:
         """That of one member."""
         alone = copy.copy(self)
         alone.gain, alone.target = one(np.asarray(self.gain)), one(np.asarray(self.target))
         return alone
-
-    @property
-    def option(self) -> str:
-        """What the core calls it."""
-        return f"control:{self.form}"
-
-    def rows(self) -> list[Any]:
-        """Its parameters, as the core takes them."""
-        return [self.target, self.gain]
 
 
 WAYS = ("scaling", "nacozy")
@@ -132,24 +128,19 @@ class Projection:
             aimed.target = np.asarray(energy)
         return aimed
 
-    def scaled(self, h: float) -> dict[str, Any]:
-        """The NumPy reference, scaled to the step h, by the name that a system has for it."""
-        return {"projection": reference.Projection(h, self.way, np.asarray(self.target))}
+    def around(self, s: Any, h: float) -> reference.Projection:
+        """The NumPy reference, round that of a system, both scaled to the step h."""
+        return reference.Projection(s, h, self.way, np.asarray(self.target))
+
+    def given(self) -> dict[str, Any]:
+        """What describes it to the core, beside what describes the system."""
+        return {"control": "projection", "control.way": self.way, "control.target": np.asarray(self.target)}
 
     def member(self, one: Callable[[Array], Array]) -> Projection:
         """That of one member."""
         alone = copy.copy(self)
         alone.target = one(np.asarray(self.target))
         return alone
-
-    @property
-    def option(self) -> str:
-        """What the core calls it."""
-        return f"project:{self.way}"
-
-    def rows(self) -> list[Any]:
-        """Its parameters, as the core takes them."""
-        return [self.target]
 
 
 def _not_negative(argument: str, value: Any) -> Array:

@@ -20,8 +20,7 @@ from .methods import Method
 from .reference import run as reference
 from .reference.types import Blocks, Whole
 from .systems import Sampled, System
-from .systems.base import Parameters, rows
-from .systems.inputs import add_inputs
+from .systems.base import flat, rows
 
 Looped = tuple[Array, Array, list[Blocks], Whole]
 
@@ -45,19 +44,50 @@ class Plan(NamedTuple):
     record: tuple[str, ...] = ()
 
     @property
-    def controlled(self) -> bool:
-        """Whether the system adds up what a control does."""
-        return getattr(self.system, "control", None) is not None
+    def saves(self) -> Whole:
+        """The steps, counted from the first, at which the state is kept: every so many, and the last."""
+        if self.every is None:
+            return np.array([self.steps], dtype=np.int64)
+        every = min(self.every, self.steps)
+        kept = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
+        kept[-1] = self.steps
+        return kept
 
     @property
-    def saves(self) -> list[int]:
-        """The steps, counted from the first, at which the state is kept."""
-        return _core.saves(self.steps, self.every)
+    def members(self) -> int:
+        """How many trajectories."""
+        return prod(self.batch)
 
     @property
     def block_axes(self) -> tuple[int, int]:
         """How many axes a block of v and one of y have."""
         return len(self.system.v_shape), len(self.system.y_shape)
+
+
+class Arrays(NamedTuple):
+    """What a run begins with and what it fills, for the core.
+
+    Attributes:
+        v: rows of the v slot, of one number for each member or one for all.
+        y: rows of y, likewise.
+        carried: whether the v slot holds what the method carries, and no velocities.
+        saved_v: the kept velocities (of the matrix form: v slots), shape (kept, *block, *batch).
+        saved_y: the kept coordinates.
+        recorded: what is recorded, shape (kept, numbers, *batch).
+        tally: for each member what a control or projection added up; empty without one.
+        carry: the last v slots; empty if the method carries nothing but v.
+        first_bad: for each member the first step that was not finite, −1 for none; read and written.
+    """
+
+    v: Array
+    y: Array
+    carried: bool
+    saved_v: Array
+    saved_y: Array
+    recorded: Array
+    tally: Array
+    carry: Array
+    first_bad: Whole
 
 
 class Outcome(NamedTuple):
@@ -83,12 +113,12 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
         return _power(plan, v, y, before, carried)
     if plan.backend == "numpy":
         return _numpy(plan, v, y, before, carried)
-    return _rust(plan, _model(plan), v, y, before, carried)
+    return _rust(plan, model(plan), v, y, before, carried)
 
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
-    settle = getattr(s, "settle", None)  # only systems that are projected have it
+    settle = getattr(s, "settle", None)  # only what keeps a system on its energy has it
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         v, y = steps.step(s, t, plan.dt, v, y)
@@ -99,8 +129,8 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     out = _finished(plan, slot, kept, first_bad)
     with np.errstate(all="ignore"):
         states = list(zip(out.v, out.y, strict=True)) if plan.record else []
-        recorded = {name: np.stack([s.record(name, *state) for state in states]) for name in plan.record}  # type: ignore[attr-defined]
-    work = np.broadcast_to(np.asarray(s.work), plan.batch).copy() if plan.controlled else None  # type: ignore[attr-defined]
+        recorded = {name: np.stack([s.record(name, *state) for state in states]) for name in plan.record}
+    work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
     return out._replace(recorded=recorded, work=_per_step(plan, work))
 
 
@@ -108,7 +138,7 @@ def _per_step(plan: Plan, work: Array | None) -> Array | None:
     """What a control did, in units of energy, from h times the sum over all evaluations."""
     if work is None:
         return None
-    evaluations = plan.method.evaluations if isinstance(getattr(plan.system, "control", None), EnergyControl) else 1
+    evaluations = plan.method.evaluations if isinstance(plan.system.control, EnergyControl) else 1
     return np.asarray(work / (evaluations * plan.dt))
 
 
@@ -123,7 +153,7 @@ def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, b
         return step(t, v, y)
 
     return reference.run(
-        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves
+        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves.tolist()
     )
 
 
@@ -142,68 +172,36 @@ def _finished(plan: Plan, slot: Array, kept: list[Blocks], first_bad: Any) -> Ou
     y = [pair[1] for pair in kept]
     if plan.method.carry is not None:
         s = plan.system.scaled(plan.dt, plan.batch)
-        times = [plan.t0 + (plan.first + i) * plan.dt for i in plan.saves]
+        times = (plan.t0 + (plan.first + plan.saves) * plan.dt).tolist()
         with np.errstate(all="ignore"):
             v = [plan.method.steps.finish(s, plan.choice, *state) for state in zip(times, v, y, strict=True)]
     return Outcome(np.stack(v), np.stack(y), slot, np.asarray(first_bad, dtype=np.int64))
 
 
-def _model(plan: Plan) -> _core.ModelSpec:
-    return model(plan.system.kernel, plan.system.parameters(plan.batch), plan.method, record=plan.record)
-
-
-def model(
-    kernel: str,
-    p: Parameters,
-    method: Method,
-    matrix: tuple[list[float], int] | None = None,
-    record: Iterable[str] = (),
-) -> _core.ModelSpec:
+def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
-    tables = [(start, interval, values) for values, interval, start in p.tables]
-    return _core.ModelSpec(kernel, p.options, p.sizes, p.rows, tables, method.name, matrix, list(record))
+    given = plan.system.parameters(plan.batch)
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record))
 
 
 def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
-    kept = 1 if plan.every is None else len(plan.saves)
+    kept = len(plan.saves)
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
     carry = np.empty(v.shape if carries else 0)
     shapes = {name: plan.system.quantities[name] for name in plan.record}
     recorded = np.empty((kept, sum(prod(shape) for shape in shapes.values()), *plan.batch))
-    work = np.empty(plan.batch) if plan.controlled else None
-    _core.run(
-        model,
-        t0=plan.t0,
-        dt=plan.dt,
-        start=plan.choice,
-        first=plan.first,
-        steps=plan.steps,
-        every=plan.every,
-        threads=plan.threads,
-        carried=carried,
-        v=_flat(plan, v),
-        y=_flat(plan, y),
-        saved_v=saved_v,
-        saved_y=saved_y,
-        recorded=recorded,
-        tally=np.empty(0) if work is None else work.reshape(-1),
-        carry=carry,
-        first_bad=before.reshape(-1),
-        progress=plan.progress,
-    )
+    work = None if plan.system.control is None else np.empty(plan.batch)
+    tally = np.empty(0) if work is None else work.reshape(-1)
+    rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
+    _core.run(model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1)))
     by_name: dict[str, Array] = {}
     for name, shape in shapes.items():
         mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
         by_name[name] = mine.reshape(kept, *shape, *plan.batch)
     return Outcome(saved_v, saved_y, carry if carries else saved_v[-1], before, by_name, _per_step(plan, work))
-
-
-def _flat(plan: Plan, array: Array) -> Array:
-    """A block as rows for the core."""
-    return rows(array.reshape((prod(array.shape[: array.ndim - len(plan.batch)]), *plan.batch)), plan.batch)
 
 
 # ---- the transition-matrix form
@@ -276,10 +274,9 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
 
         flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, before, (1, 1))
     else:
-        maps = [rows(a.reshape((a.shape[0] * a.shape[1], *plan.batch)), plan.batch) for a in (p, q)]
-        parameters = Parameters(sizes=[n_v + n_y], rows=maps)
-        add_inputs(parameters, given.values(), plan.batch)
-        spec = model("matrix", parameters, plan.method, (list(plan.method.nodes), n_v))
+        linear_map = {"n": n_v + n_y, "n_v": n_v, "p": p, "q": q, "inputs": [each.signal() for each in given.values()]}
+        nodes = list(plan.method.nodes)
+        spec = _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(nodes, n_v))
         out = _rust(plan, spec, flat_v, flat_y, before, carried=True, carries=False)
         flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
     shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
@@ -289,32 +286,32 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
 def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """By powers of the transition matrix; the backend finds P and Q, the rest is the reference's."""
     from .reference import power  # only this form needs it
-    from .reference.signal import Held, Sine
+    from .reference.signal import Constant, Sine
 
-    def flat(array: Array) -> Array:
+    def wide(array: Array) -> Array:
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
     given = plan.system.given_inputs()
-    inputs: list[Held | Sine] = [
-        Held(flat(each.values[0])[np.newaxis], 1.0, 0.0)
+    inputs = [
+        Constant(wide(each.values[0]))
         if isinstance(each, Sampled)
-        else Sine(flat(each.amplitude), flat(each.omega), flat(each.phase))
+        else Sine(wide(each.amplitude), wide(each.omega), wide(each.phase))
         for each in given.values()
     ]
-    members, n_v = prod(plan.batch), prod(plan.system.v_shape)
+    members, n_v = plan.members, prod(plan.system.v_shape)
     slot = v if carried else _start(plan, v, y)
     s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
     p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
 
     drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
-    kept = []
+    kept, saves = [], plan.saves.tolist()
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=plan.saves)
+        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=saves)
         for i, s in enumerate(states, 1):
             kept.append((s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)))
             if plan.progress is not None:
-                plan.progress(i / len(plan.saves))
+                plan.progress(i / len(saves))
     return _finished(plan, kept[-1][0], kept, before)
 
 
@@ -322,13 +319,36 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
 
 
 class Pacing(NamedTuple):
-    """Where to be when, and how exactly. ``first``, ``relative`` and ``absolute`` broadcast over the batch."""
+    """Where to be when, and how exactly. ``first``, ``relative`` and ``absolute`` broadcast over the batch.
+
+    For the core they are rows, of one number for each member or one for all.
+    """
 
     at: list[float]
     first: Array
     relative: Array
     absolute: Array
     budget: int
+
+
+class PacedArrays(NamedTuple):
+    """What a run with a tolerance begins with and what it fills, for the core.
+
+    Attributes:
+        v: rows of v, of one number for each member or one for all.
+        y: rows of y, likewise.
+        saved_v: velocities at the asked times, shape (times, *block, *batch); NaN from where a member stopped.
+        saved_y: coordinates, likewise.
+        reached: the time that each member reached, and the step that it would try next, shape (2, members).
+        counts: accepted and rejected attempts and the status, shape (3, members).
+    """
+
+    v: Array
+    y: Array
+    saved_v: Array
+    saved_y: Array
+    reached: Array
+    counts: Whole
 
 
 class Adapted(NamedTuple):
@@ -345,43 +365,21 @@ class Adapted(NamedTuple):
 
 def adapt(plan: Plan, pacing: Pacing, v: Array, y: Array) -> Adapted:
     """Make the run."""
+    asked = ("first", "relative", "absolute")
     if plan.backend == "numpy":
-        from .reference import adaptive, tableau  # only such runs need it
+        from .reference import adaptive  # only such runs need it
 
-        pairs, s = plan.method.steps, plan.system.scaled(1.0, plan.batch)
-        steps: Any = pairs
-
-        coarse = getattr(steps, "COARSE", None)
-
-        def attempt(s: Any, t: Any, h: Any, v: Array, y: Array) -> tuple[Blocks, Blocks, Blocks | None]:
-            increments = steps.stages(s, t, h, v, y)
-            corrected = None if coarse is None else tableau.combined(coarse, increments)
-            return tableau.plus(v, y, steps.WEIGHTS, increments), tableau.combined(steps.ERROR, increments), corrected
-
-        wide: Any = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in ("first", "relative", "absolute")}
+        pair: Any = plan.method.steps
+        s = plan.system.scaled(1.0, plan.batch)
+        wide: Any = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in asked}
         timing: Any = {"t0": plan.t0, "at": pacing.at, "budget": pacing.budget, "order": plan.method.error_order}
-        whole = adaptive.run(attempt, s, v, y, plan.block_axes, **timing, **wide)
-        return Adapted(*whole)
-    kept, members = len(pacing.at), prod(plan.batch)
+        return Adapted(*adaptive.run(pair, s, v, y, plan.block_axes, **timing, **wide))
+    kept = len(pacing.at)
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
-    reached, counts = np.empty((2, members)), np.empty((3, members), dtype=np.int64)
-    _core.adapt(
-        _model(plan),
-        t0=plan.t0,
-        at=pacing.at,
-        first=rows(pacing.first[np.newaxis], plan.batch),
-        relative=rows(pacing.relative[np.newaxis], plan.batch),
-        absolute=rows(pacing.absolute[np.newaxis], plan.batch),
-        budget=pacing.budget,
-        threads=plan.threads,
-        v=_flat(plan, v),
-        y=_flat(plan, y),
-        saved_v=saved_v,
-        saved_y=saved_y,
-        reached=reached,
-        counts=counts,
-        progress=plan.progress,
-    )
+    reached, counts = np.empty((2, plan.members)), np.empty((3, plan.members), dtype=np.int64)
+    in_rows: Any = {name: rows(getattr(pacing, name), plan.batch) for name in asked}
+    arrays = PacedArrays(rows(v, plan.batch), rows(y, plan.batch), saved_v, saved_y, reached, counts)
+    _core.adapt(model(plan), plan, pacing._replace(**in_rows), arrays)
     t, h = (row.reshape(plan.batch) for row in reached)
     accepted, rejected, status = (row.reshape(plan.batch) for row in counts)
     return Adapted(saved_v, saved_y, t, h, accepted, rejected, status)

@@ -164,7 +164,7 @@ def integrate(
     if isinstance(system, NBody) and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
-        t=t0 + (start_step + np.asarray(plan.saves, dtype=np.float64)) * dt,
+        t=t0 + (start_step + plan.saves.astype(np.float64)) * dt,
         v=out.v,
         y=out.y,
         status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
@@ -323,7 +323,8 @@ def _quantities(system: System, record: Sequence[str]) -> list[str]:
     for name in given:
         _checks.known("record", name, known)
     if "energy" in given and "energy" not in system.quantities:
-        system.energy(np.zeros(system.v_shape), np.zeros(system.y_shape))  # raises if there is none, before any work
+        v, y = (np.zeros((*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
+        system.energy(v, y)  # raises if there is none, before any work
     return list(dict.fromkeys(given))
 
 

@@ -179,8 +179,8 @@ class Run:
             state["start"] = self.start
         if self.status.any():
             state["first_bad_step"] = self.first_bad_step
-        if (control := getattr(self.system, "control", None)) is not None:
-            state["control"] = control
+        if self.system.control is not None:
+            state["control"] = self.system.control
         return state | ({} if self.carry is None else {"carry": self.carry})
 
     def __repr__(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -78,17 +77,9 @@ class World:
             self.system = system = system.controlled(control, self._v, self._y, self.dt)
             fits_together(system, self.method)
         system.check_time(abs(t0) + first * self.dt)
-        model = engine.model(system.kernel, system.parameters(batch), self.method)
-        self._core = _core.World(
-            model,
-            t0=t0,
-            dt=self.dt,
-            start=self.method.start_choice(start),
-            first=first,
-            members=prod(batch),
-            v=self._v.reshape(-1),  # views: the core knows rows, not axes
-            y=self._y.reshape(-1),
-        )
+        plan = engine.Plan(system, self.method, batch, self.dt, t0, first, choice=self.method.start_choice(start))
+        # Views: the core knows rows, not axes.
+        self._core = _core.World(engine.model(plan), plan, self._v.reshape(-1), self._y.reshape(-1))
         #: ``step(n=1)`` makes n steps in place.
         self.step: Any = self._core.step
 

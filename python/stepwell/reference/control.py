@@ -1,17 +1,76 @@
-"""What keeps the energy near its target (§12, Appendix D): a push −g·v in every stage, or a projection after the step."""
+"""What keeps the energy near its target (§12, Appendix D): a push −g·v in every stage, or a projection after the step.
+
+Both are put round a system that tells its ``energies``, and are then a system themselves. Energies come times h.
+"""
+
+from typing import Any, Protocol
 
 import numpy as np
 
-from .types import Array
+from . import bits
+from .types import Array, Blocks, Scaled
+
+#: The square of what velocities are multiplied by is held between these, the factor between ½ and 2.
+LEAST, MOST = 0.25, 4.0
 
 
-class EnergyControl:
-    """Energies come times h. As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ¼ … 4."""
+class Conserving(Scaled, Protocol):
+    """A system whose motion keeps its energy."""
 
-    def __init__(self, h: float, form: str, gain: Array, target: Array) -> None:
+    def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
+        """h·v̇, h times the kinetic energy, and h times the whole energy."""
+
+    def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
+        """The gradient of the energy in v, that in y with its sign turned, and the square of its length; dv is h·v̇."""
+
+    def record(self, name: str, v: Array, y: Array) -> Array:
+        """A quantity of a state."""
+
+
+class Kept:
+    """A system, and what was changed of its energy."""
+
+    def __init__(self, s: Conserving, h: float, target: Array) -> None:
+        self.s = s
+        self.h = h
+        self.target = h * target
+        self.work: Any = 0.0  # h times what was changed of the energy
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇."""
+        return self.s.dv(t, v, y)
+
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
+        return self.s.dy(t, v, y)
+
+    def velocity(self, d: Array) -> Array:
+        """The v whose increment of y is d."""
+        return self.s.velocity(d)
+
+    def settle(self, v: Array, y: Array) -> Blocks:
+        """The state after a step, set right."""
+        return v, y
+
+    def record(self, name: str, v: Array, y: Array) -> Array:
+        """A quantity of a state."""
+        return self.s.record(name, v, y)
+
+
+class EnergyControl(Kept):
+    """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ½ … 2."""
+
+    def __init__(self, s: Conserving, h: float, form: str, gain: Array, target: Array) -> None:
+        super().__init__(s, h, target)
         self.form = form
         self.gain = gain
-        self.target = h * target
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇ and the push."""
+        dv, kinetic, energy = self.s.energies(v, y)
+        g = self.push(kinetic, energy)
+        self.work = self.work - (g * (2.0 - g)) * kinetic  # what the push alone would change: ((1 − g)² − 1)·K
+        return np.asarray(dv - g * v)
 
     def push(self, kinetic: Array, energy: Array) -> Array:
         """g, the share of the velocity that is taken away."""
@@ -20,26 +79,25 @@ class EnergyControl:
             return np.asarray(self.gain * off)
         twice = 2.0 * self.gain
         square = 1.0 - (twice * off) / (1.0 + twice * kinetic)
-        held = np.where(square < 0.25, 0.25, square)
-        held = np.where(held > 4.0, 4.0, held)
-        return np.asarray(1.0 - np.sqrt(held))
+        return np.asarray(1.0 - np.sqrt(bits.held(square, LEAST, MOST)))
 
 
-class Projection:
+class Projection(Kept):
     """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient."""
 
-    def __init__(self, h: float, way: str, target: Array) -> None:
-        self.h = h
+    def __init__(self, s: Conserving, h: float, way: str, target: Array) -> None:
+        super().__init__(s, h, target)
         self.way = way
-        self.target = h * target
 
-    def off(self, energy: Array) -> Array:
-        """H times how far the energy is off."""
-        return np.asarray(energy - self.target)
-
-    def factor(self, kinetic: Array, off: Array) -> Array:
-        """The factor of the velocities, between ½ and 2."""
-        square = 1.0 - off / kinetic
-        held = np.where(square < 0.25, 0.25, square)
-        held = np.where(held > 4.0, 4.0, held)
-        return np.asarray(np.sqrt(held))
+    def settle(self, v: Array, y: Array) -> Blocks:
+        """The state after a step, set back onto its energy."""
+        dv, kinetic, energy = self.s.energies(v, y)
+        off = energy - self.target
+        if self.way == "scaling":
+            factor = np.sqrt(bits.held(1.0 - off / kinetic, LEAST, MOST))
+            self.work = self.work + (factor * factor - 1.0) * kinetic
+            return v * factor, y
+        along_v, along_y, square = self.s.gradient(v, y, dv)  # Nacozy
+        step = (off / self.h) / square
+        self.work = self.work - off
+        return v - step * along_v, y + step * along_y

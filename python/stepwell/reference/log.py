@@ -5,6 +5,7 @@ Stability analysis has logarithms of numbers that the core never sees, as it has
 
 import numpy as np
 
+from . import bits
 from .types import Array
 
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
@@ -17,26 +18,19 @@ L = (
     1.531383769920937332e-01,
     1.479819860511658591e-01,
 )
-HALF_ROOT = np.uint64(0x3FE6A09E00000000)  # √½, cut: the mantissa is taken from √½ to √2
-TO_ONE = np.uint64(0x3FF0000000000000) - HALF_ROOT
-MANTISSA = np.uint64(0x000FFFFFFFFFFFFF)
-TWO_52 = np.uint64(0x4330000000000000)  # its low bits hold a whole number
+HALF_ROOT = 0x3FE6A09E00000000  # √½, cut: the mantissa is taken from √½ to √2
+TO_ONE = 0x3FF0000000000000 - HALF_ROOT
+MANTISSA = 0x000FFFFFFFFFFFFF
+TWO_52 = 0x4330000000000000  # its low bits hold a whole number
 
 
 def log(x: Array) -> Array:
     """Ln x of a normal number above zero: x = 2ᵏ·(1 + f), then fdlibm's polynomial in f/(2 + f)."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
         return log(x.real) + 1j * (x.imag / x.real)
-    if np.asarray(x).dtype == object:  # numbers without bits, which count what is done to them
-        return _log(np.zeros(()), x)
-    u = np.asarray(x, dtype=np.float64).view(np.uint64) + TO_ONE
-    k = np.asarray((u >> np.uint64(52)) | TWO_52).view(np.float64) - (4503599627370496.0 + 1023.0)
-    return _log(k, np.asarray((u & MANTISSA) + HALF_ROOT).view(np.float64))
-
-
-def _log(k: Array, mantissa: Array) -> Array:
-    """Ln of 2ᵏ times the mantissa."""
-    f = mantissa - 1.0
+    u = bits.add_bits(x, TO_ONE)
+    k = bits.or_bits(bits.shift_down(u, 52), TWO_52) - (4503599627370496.0 + 1023.0)
+    f = bits.add_bits(bits.and_bits(u, MANTISSA), HALF_ROOT) - 1.0
     s = f / (2.0 + f)
     z = s * s
     r = z * (L[0] + z * (L[1] + z * (L[2] + z * (L[3] + z * (L[4] + z * (L[5] + z * L[6]))))))

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import trig
 from .product import product, times
-from .signal import Held, Sine
+from .signal import Constant, Sine
 from .types import Array, Whole
 
 Chosen = np.ndarray[Any, np.dtype[np.bool_]]
@@ -74,8 +74,8 @@ class Drive:
         return made
 
 
-def one_step(p: Array, q: Array, inputs: Sequence[Held | Sine], nodes: Sequence[float], drive: Drive) -> Leap:
-    """The leap of one step; ``q`` has shape (nodes, inputs, rows, members), and each held input is a constant."""
+def one_step(p: Array, q: Array, inputs: Sequence[Constant | Sine], nodes: Sequence[float], drive: Drive) -> Leap:
+    """The leap of one step; ``q`` has shape (nodes, inputs, rows, members)."""
     total = np.zeros((len(p), 1 + 2 * len(drive.waves), p.shape[-1]))
     for at_node, node in zip(q, nodes, strict=True):
         columns, wave = np.zeros_like(total), 1
@@ -84,7 +84,7 @@ def one_step(p: Array, q: Array, inputs: Sequence[Held | Sine], nodes: Sequence[
                 columns[:, wave] = effect * given.amplitude
                 wave += 2
             else:
-                columns[:, 0] = columns[:, 0] + effect * given.at(0.0)
+                columns[:, 0] = columns[:, 0] + effect * given.value
         total = total + drive.later(columns, node * drive.h)
     return Leap(1, p, total)
 

@@ -6,6 +6,7 @@ imaginary part is infinitesimal, and ones that count what is done to them.
 
 import numpy as np
 
+from . import bits
 from .types import Array
 
 PER_HALF_TURN = 0.3183098861837907  # 1/π
@@ -27,14 +28,14 @@ def sin(x: Array) -> Array:
     """Sin x."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
         return sin(x.real) + 1j * (x.imag * cos(x.real))
-    y = np.asarray(x * PER_HALF_TURN + MAGIC)
+    y = x * PER_HALF_TURN + MAGIC
     n = y - MAGIC
     return _half_turn((x - n * PI[0]) - n * PI[1], y)
 
 
 def cos(x: Array) -> Array:
     """Cos x, which is the sine a quarter of a turn further."""
-    y = np.asarray((x * PER_HALF_TURN + 0.5) + MAGIC)
+    y = (x * PER_HALF_TURN + 0.5) + MAGIC
     n = (y - MAGIC) - 0.5
     return _half_turn((x - n * PI[0]) - n * PI[1], y)
 
@@ -46,7 +47,5 @@ def _half_turn(r: Array, y: Array) -> Array:
     odd = S[1] + w * (S[3] + w * (S[5] + w * S[7]))
     even = S[2] + w * (S[4] + w * S[6])
     s = r + (r * z) * (S[0] + z * (odd + z * even))
-    if y.dtype == object:
-        return s  # numbers without bits, which count what is done to them
-    signed: Array = (np.asarray(s).view(np.uint64) ^ (y.view(np.uint64) << np.uint64(63))).view(np.float64)
+    signed: Array = bits.turn_sign(s, y)
     return signed

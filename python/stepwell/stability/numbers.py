@@ -44,10 +44,19 @@ class Counting:
         """NumPy calls this for the square root of an object."""
         return self._count("square_roots")
 
-    def __lt__(self, other: object) -> bool:
-        """Whatever is held within bounds is."""
-        return False
+    def __lt__(self, other: object) -> Any:
+        """Comparisons, choices and work on bits are not counted."""
+        return NotImplemented if isinstance(other, np.ndarray) else self
 
+    def choose(self, yes: object, no: object) -> Any:
+        """Whatever is held within bounds is."""
+        return no
+
+    def xor_bits(self, other: object) -> Any:
+        """The same number, as far as counting goes; so are the others."""
+        return self
+
+    and_bits = or_bits = add_bits = shift_up = shift_down = xor_bits
     __gt__ = __lt__
     __radd__ = __sub__ = __rsub__ = __add__
     __rmul__ = __mul__

@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from math import prod
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from .._checks import Array, Shape
 from ..errors import UnsupportedError
-from ..reference.types import Scaled
+from ..reference.signal import Constant, Held, Sine
 
 if TYPE_CHECKING:
     from ..control import EnergyControl, Projection
     from .inputs import Input
 
-
-class Parameters:
-    """A system as the core takes it: options, sizes, rows of parameters, tables of samples (values, interval, start).
-
-    Arrays have two axes: what is counted, and the members, or 1 for all members.
-    """
-
-    def __init__(
-        self,
-        options: Iterable[str] = (),
-        sizes: Iterable[int] = (),
-        rows: Iterable[Array] = (),
-        tables: Iterable[tuple[Array, float, float]] = (),
-    ) -> None:
-        self.options = list(options)
-        self.sizes = list(sizes)
-        self.rows = list(rows)
-        self.tables = list(tables)
+#: A description as the core takes it: names with words, whole numbers, rows of numbers for each member (or one for all), and
+#: tables of samples: start, interval, a row for each sample.
+Given = list[tuple[str, Any]]
 
 
 class System(ABC):
@@ -42,6 +27,7 @@ class System(ABC):
 
     Attributes:
         kernel: name of its files in the core and in the reference.
+        reference: its class in the reference.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
         axes: names of the blocks' axes, for messages.
@@ -50,9 +36,11 @@ class System(ABC):
         linear: whether the rates are linear in v, y and the inputs.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
+        control: what keeps its energy, if anything does; ``integrate`` puts it there.
     """
 
     kernel: ClassVar[str]
+    reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
     linear: ClassVar[bool] = False
     second_order: bool = True
@@ -61,19 +49,41 @@ class System(ABC):
     velocity_term: str | None = None
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
+    control: EnergyControl | Projection | None = None
+
+    @abstractmethod
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
+
+    def __repr__(self) -> str:
+        said = self.said() + ([] if self.control is None else [repr(self.control)])
+        return f"{type(self).__name__}({', '.join(said)})"
+
+    @abstractmethod
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """What describes it, for states of that batch shape: the arguments of its reference class beside the step.
+
+        A word, a whole number, an array (its own axes first, then those of the batch), a signal, a list of signals, or None for
+        what is not there. The core takes the same under the same names.
+        """
+
+    def alone(self, h: float, batch: Shape) -> Any:
+        """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
+        return self.reference(h, **self.given(batch))
+
+    def scaled(self, h: float, batch: Shape) -> Any:
+        """The NumPy reference of this system and of what controls it, scaled to the step h, for states of that batch shape."""
+        s = self.alone(h, batch)
+        return s if self.control is None else self.control.around(s, h)
+
+    def parameters(self, batch: Shape) -> Given:
+        """This system and what controls it, as the core takes them."""
+        return flat(self.given(batch) | ({} if self.control is None else self.control.given()), batch)
 
     @property
     def quantities(self) -> dict[str, Shape]:
         """What the core can record beside the states, with the shape of each."""
         return {}
-
-    @abstractmethod
-    def scaled(self, h: float, batch: Shape) -> Scaled:
-        """The NumPy reference of this system, scaled to the step h, for states of that batch shape."""
-
-    @abstractmethod
-    def parameters(self, batch: Shape) -> Parameters:
-        """This system as the core takes it."""
 
     def energy(self, v: Array, y: Array) -> Array:
         """The energy of states with the blocks' axes first and axes of the batch last.
@@ -85,7 +95,9 @@ class System(ABC):
 
     def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
         """A quantity of states of a run with that step, the same to the bit as if it had been recorded."""
-        return self.energy(v, y)
+        if name not in self.quantities:
+            return self.energy(v, y)
+        return np.asarray(self.alone(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
 
     def auxiliary(self, t: float, v: Array, y: Array) -> Array:
         """The auxiliary outputs z (§3) of states at time t, shape (outputs, *batch).
@@ -104,13 +116,20 @@ class System(ABC):
         """The same system for states of these shapes; only a system that leaves its size open minds."""
         return self
 
-    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> System:
+    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> Self:
         """The same system under control, the target that of the state if the control has none.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        raise UnsupportedError(f"control: {self!r} has no energy control")
+        if not hasattr(self.reference, "energies"):
+            raise UnsupportedError(f"control: {self!r} has no energy control")
+        with np.errstate(all="ignore"):
+            _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
+        held = copy.copy(self)
+        held.control = control.aimed(kinetic, energy, dt)
+        held.velocity_term = "energy control"
+        return held
 
     # What the transition-matrix form and the analysis ask of a linear system.
 
@@ -127,25 +146,52 @@ class System(ABC):
         raise KeyError(name)
 
 
-def shown(given: dict[str, Any]) -> str:
+def shown(**given: Any) -> list[str]:
     """Arguments for a repr: those that are not None, arrays by their shape."""
     short = {k: f"array{v.shape}" if isinstance(v, np.ndarray) and v.ndim else v for k, v in given.items() if v is not None}
-    return ", ".join(f"{k}={v}" for k, v in short.items())
+    return [f"{k}={v}" for k, v in short.items()]
 
 
-def row(values: Array, batch: Shape) -> Array:
-    """One parameter as a row for the core."""
-    return rows(values[np.newaxis], batch)
+def flat(given: dict[str, Any], batch: Shape) -> Given:
+    """A description as the core takes it: what is not there is left out, a list is its length and its parts."""
+    entries: Given = []
+    for name, value in given.items():
+        match value:
+            case None:
+                pass
+            case str() | int():
+                entries.append((name, value))
+            case list():
+                entries.append((name, len(value)))
+                entries += flat({f"{name}[{i}]": each for i, each in enumerate(value)}, batch)
+            case Sine():
+                parts = {"amplitude": value.amplitude, "omega": value.omega, "phase": value.phase}
+                entries += flat({f"{name}.{part}": each for part, each in parts.items()}, batch)
+            case Constant():
+                entries.append((name, rows(value.value, batch)))
+            case Held():
+                entries.append((name, (value.start, value.interval, rows(value.values, batch, 1))))
+            case _:
+                entries.append((name, rows(value, batch)))
+    return entries
 
 
-def rows(values: Array, batch: Shape) -> Array:
-    """Parameters, counted along the first axis, as rows for the core."""
-    count, own = len(values), values.shape[1:]
-    if not any(values.strides[1:]):  # one number for all members, broadcast or not
-        for _ in own:
+def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
+    """Numbers as rows for the core, of one for each member or one for all.
+
+    ``own`` is how many axes there are before those of the batch; if None, those that are more than the batch has.
+    """
+    own = max(0, values.ndim - len(batch)) if own is None else own
+    counted, over = values.shape[:own], values.shape[own:]
+    if all(size == 1 or stride == 0 for size, stride in zip(over, values.strides[own:], strict=True)):
+        for _ in over:
             values = values[..., 0]
-        return np.ascontiguousarray(values.reshape(count, 1))
-    if own == batch:
-        return np.ascontiguousarray(values).reshape(count, prod(batch))
-    aligned = values.reshape(count, *(1,) * (len(batch) - len(own)), *own)
-    return np.ascontiguousarray(np.broadcast_to(aligned, (count, *batch))).reshape(count, prod(batch))
+        return np.ascontiguousarray(values.reshape(-1, 1))
+    if over != batch:
+        values = np.broadcast_to(aligned(values, own, batch), (*counted, *batch))
+    return np.ascontiguousarray(values.reshape(prod(counted), prod(batch)))
+
+
+def aligned(values: Array, own: int, batch: Shape) -> Array:
+    """Numbers with so many axes of their own first, and then as many axes as the batch has."""
+    return values.reshape(*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:])

@@ -9,8 +9,8 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
-from ..reference.systems import chain as reference
-from .base import Parameters, System, rows
+from ..reference.systems.chain import Chain as Reference
+from .base import System, aligned
 
 
 class Chain(System):
@@ -27,6 +27,7 @@ class Chain(System):
     """
 
     kernel = "chain"
+    reference = Reference
     axes = "masses"
     linear = True
 
@@ -41,28 +42,17 @@ class Chain(System):
         self.v_shape = self.y_shape = (self.n,)
         self.batch = _checks.batch_shape({"stiffness": self.stiffness.shape[1:], "mass": self.mass.shape[1:]})
 
-    def __repr__(self) -> str:
-        return f"Chain({self.n})"
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
+        return [str(self.n)]
 
-    def _rows(self, batch: Shape) -> tuple[Array, Array]:
-        """Stiffnesses and masses with as many batch axes as the states have."""
-
-        def aligned(array: Array) -> Array:
-            return array.reshape(len(array), *(1,) * (len(batch) - array.ndim + 1), *array.shape[1:])
-
-        return aligned(self.stiffness), aligned(self.mass)
-
-    def scaled(self, h: float, batch: Shape) -> reference.Chain:
-        """The NumPy reference, scaled to the step h."""
-        return reference.Chain(h, *self._rows(batch))
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """Size and rows for the core, as ``chain.rs`` documents them."""
-        return Parameters(sizes=[self.n], rows=[rows(array, batch) for array in (self.stiffness, self.mass)])
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """Stiffnesses and masses."""
+        return {"stiffness": aligned(self.stiffness, 1, batch), "mass": aligned(self.mass, 1, batch)}
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² + ½·Σ k·(difference of neighbours)², the walls at 0."""
-        k, m = self._rows(y.shape[1:])
+        k, m = self.given(y.shape[1:]).values()
         wall = np.zeros_like(y[:1])
         stretch = np.diff(np.concatenate([wall, y, wall]), axis=0)
         return np.asarray(0.5 * (m * v * v).sum(axis=0) + 0.5 * (k * stretch * stretch).sum(axis=0))

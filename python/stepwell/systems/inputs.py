@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from .. import _checks
-from .._checks import Array, Shape
+from .._checks import Shape
 from ..errors import ArgumentError, ShapeError
-from ..reference.signal import Held, Sine
-from .base import Parameters, row, rows
+from ..reference.signal import Constant, Held, Sine
 
 #: Beyond this angle a floating-point number cannot tell one part of a period from another.
 LAST_ANGLE = 2.0**50
@@ -81,9 +79,9 @@ class Sampled:
     def check(self, last: float) -> None:
         """Samples make sense at any time."""
 
-    def signal(self) -> Held:
+    def signal(self) -> Constant | Held:
         """The reference signal."""
-        return Held(self.values, self.interval, self.start)
+        return Constant(self.values[0]) if len(self.values) == 1 else Held(self.values, self.interval, self.start)
 
 
 Input = Sinusoid | Sampled
@@ -96,17 +94,6 @@ def as_input(argument: str, value: Any) -> Input | None:
     return Sampled(_checks.numbers(argument, value)[np.newaxis], interval=1.0)
 
 
-def table(sampled: Sampled, batch: Shape) -> tuple[Array, float, float]:
-    """The samples as the core takes them: a row per sample, of one number or one for each member."""
-    return rows(sampled.values, batch), sampled.interval, sampled.start
-
-
-def add_inputs(parameters: Parameters, inputs: Iterable[Input], batch: Shape) -> None:
-    """Add options, rows and tables of inputs as the core's ``Input::all`` takes them (``signal.rs``)."""
-    for each in inputs:
-        if isinstance(each, Sampled):
-            parameters.options.append("held")
-            parameters.tables.append(table(each, batch))
-        else:
-            parameters.options.append("sine")
-            parameters.rows += [row(array, batch) for array in (each.amplitude, each.omega, each.phase)]
+def signal(given: Input | None) -> Constant | Held | Sine | None:
+    """The reference signal of what may be given."""
+    return None if given is None else given.signal()

@@ -11,9 +11,9 @@ from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
 from ..reference.product import times
-from ..reference.systems import linear as reference
-from .base import Parameters, System, rows
-from .inputs import Input, Sampled, add_inputs, as_input
+from ..reference.systems.linear import Linear as Reference
+from .base import System, aligned
+from .inputs import Input, Sampled, as_input
 
 
 class LinearSystem(System):
@@ -42,6 +42,7 @@ class LinearSystem(System):
     """
 
     kernel = "linear"
+    reference = Reference
     axes = "states"
     linear = True
 
@@ -86,9 +87,10 @@ class LinearSystem(System):
         )
         self.velocity_term = "velocities in the rows of v" if self.A[v][:, v].any() else None
 
-    def __repr__(self) -> str:
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
-        return f"LinearSystem({len(self.A)} states, {self.v_shape[0]} of them velocities, {m} inputs, {r} outputs)"
+        return [f"{len(self.A)} states", f"{self.v_shape[0]} of them velocities", f"{m} inputs", f"{r} outputs"]
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs that it was given, by name."""
@@ -108,24 +110,20 @@ class LinearSystem(System):
     def _parts(self) -> list[Array]:
         """A and the columns of B of the inputs that were given, both in the order of the blocks."""
         order = [*self.velocities, *self.coordinates]
-        return [self.A[order][:, order]] + ([] if self.B is None else [self.B[order][:, self._given()]])
+        return [self.A[order][:, order]] + ([] if self.B is None else [self.B[order][:, self._columns()]])
 
-    def _given(self) -> list[int]:
+    def _columns(self) -> list[int]:
         """The columns of the inputs that were given; what was not given is zero and left out."""
         return [i for i, each in enumerate(self.x) if each is not None]
 
-    def scaled(self, h: float, batch: Shape) -> reference.Linear:
-        """The NumPy reference, scaled to the step h."""
-        signals = [each.signal() for each in self.given_inputs().values()]
-        return reference.Linear(h, self.v_shape[0], _side_by_side(self._parts(), batch), signals)
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """Options, sizes, rows and tables for the core, as ``linear.rs`` documents them."""
-        kind = ["acceleration"] if self.second_order and self.velocity_term is None else []
-        flat = [each.reshape(-1, *each.shape[2:]) for each in self._parts()]
-        parameters = Parameters(kind, [*self.v_shape, *self.y_shape], [rows(each, batch) for each in flat if len(each)])
-        add_inputs(parameters, self.given_inputs().values(), batch)
-        return parameters
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The matrix [A B] in the order of the blocks, the inputs, and whether it gives an acceleration."""
+        return {
+            "kind": "acceleration" if self.second_order and self.velocity_term is None else "",
+            "n_v": self.v_shape[0],
+            "rows": _side_by_side(self._parts(), batch),
+            "inputs": [each.signal() for each in self.given_inputs().values()],
+        }
 
     def split(self, state: Any) -> tuple[Array, Array]:
         """The blocks (v, y) of a state in the order of A, shape (n, *batch).
@@ -147,7 +145,7 @@ class LinearSystem(System):
         batch = _checks.batch_shape({"v": v.shape[1:], "y": y.shape[1:]})
         state = np.empty((len(self.A), *batch))
         for order, block in ((self.velocities, v), (self.coordinates, y)):
-            state[list(order)] = _aligned(block, 1, batch)
+            state[list(order)] = aligned(block, 1, batch)
         return state
 
     def auxiliary(self, t: float, v: Array, y: Array) -> Array:
@@ -164,7 +162,7 @@ class LinearSystem(System):
         batch = np.broadcast_shapes(state.shape[1:], self.batch)
         parts, columns = [self.C], [*state]
         if self.D is not None:
-            parts.append(self.D[:, self._given()])
+            parts.append(self.D[:, self._columns()])
             columns += [each.signal().at(t) for each in self.given_inputs().values()]
         z = times(_side_by_side(parts, batch), columns)
         return np.array(np.broadcast_to(z, (len(self.C), *batch)))
@@ -196,14 +194,9 @@ def _matrix(
     return array
 
 
-def _aligned(array: Array, axes: int, batch: Shape) -> Array:
-    """The array, whose first axes are its own, with as many batch axes as there are."""
-    return array.reshape(*array.shape[:axes], *(1,) * (len(batch) - array.ndim + axes), *array.shape[axes:])
-
-
 def _side_by_side(parts: list[Array], batch: Shape) -> Array:
     """Matrices of equally many rows as one, with as many batch axes as there are."""
-    parts = [_aligned(each, 2, batch) for each in parts]
+    parts = [aligned(each, 2, batch) for each in parts]
     common = np.broadcast_shapes(*(each.shape[2:] for each in parts))
     return np.concatenate([np.broadcast_to(each, (*each.shape[:2], *common)) for each in parts], axis=1)
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..control import EnergyControl, Projection
 from ..errors import ArgumentError, ShapeError
 from ..reference.systems import nbody as reference
-from .base import Parameters, System, rows
+from .base import System, aligned
 
 FORCES = ("logarithmic", "newton", "printed")
 
@@ -39,6 +38,7 @@ class NBody(System):
     """
 
     kernel = "nbody"
+    reference = reference.NBody
     axes = "bodies, dim"
 
     def __init__(
@@ -62,18 +62,17 @@ class NBody(System):
             raise ArgumentError(f"softening: expected lengths of zero or more, got {self.softening.min():g}")
         self.dim = None if dim is None else _checks.count("dim", dim, 2, 3)
         self._shape(self.dim or 2)
-        self.control: EnergyControl | Projection | None = None
         self.batch = _checks.batch_shape({"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape})
 
     def _shape(self, dim: int) -> None:
         self.v_shape = self.y_shape = (len(self.masses), dim)
 
-    def __repr__(self) -> str:
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
-        given = [f"masses={masses}", f"force={self.force!r}", f"G={self.G}"]
-        given += [f"softening={self.softening}"] * bool(self.softening.any()) + ([repr(self.control)] if self.control else [])
-        return f"NBody({', '.join(given)})"
+        softening = [f"softening={self.softening}"] * bool(self.softening.any())
+        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening]
 
     def sized(self, *states: Any) -> NBody:
         """The same bodies in as many dimensions as the states, v and y, have."""
@@ -101,8 +100,7 @@ class NBody(System):
         """One member of a batch, alone."""
 
         def one(values: Array, own: int = 0) -> Array:
-            wide = values.reshape((*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:]))
-            return _checks.member(np.broadcast_to(wide, (*values.shape[:own], *batch)), index)
+            return _checks.member(np.broadcast_to(aligned(values, own, batch), (*values.shape[:own], *batch)), index)
 
         alone = copy.copy(self)
         alone.masses, alone.G, alone.softening = one(self.masses, 1), one(self.G), one(self.softening)
@@ -122,57 +120,20 @@ class NBody(System):
                 best = (i, i + 1 + j), float(distance[j])
         return best
 
-    def _parts(self, batch: Shape) -> list[Array]:
-        """Masses, G·m and softening with as many batch axes as the states have."""
-        masses = self.masses.reshape(len(self.masses), *(1,) * (len(batch) - self.masses.ndim + 1), *self.masses.shape[1:])
-        return [masses, self.G * masses, np.asarray(self.softening)]
-
-    def scaled(self, h: float, batch: Shape) -> reference.NBody:
-        """The NumPy reference, scaled to the step h."""
-        masses, strength, softening = self._parts(batch)
-        keeps: dict[str, Any] = {} if self.control is None else self.control.scaled(h)
-        return reference.NBody(h, self.force, masses, strength, softening, **keeps)
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """Options, sizes and rows for the core, as ``nbody/mod.rs`` documents them."""
-        masses, strength, softening = self._parts(batch)
-        given = [rows(strength, batch), rows(masses, batch), rows(softening[np.newaxis], batch)]
-        options = [self.force]
-        if self.control is not None:
-            options.append(self.control.option)
-            given += [rows(np.asarray(each)[np.newaxis], batch) for each in self.control.rows()]
-        return Parameters(options, list(self.y_shape), given)
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """Force, dimensions, masses, G·m, softening."""
+        masses = aligned(self.masses, 1, batch)
+        sizes = {"force": self.force, "dim": self.y_shape[1]}
+        return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
 
     @property
     def quantities(self) -> dict[str, Shape]:
         """What can be recorded: energy, momentum, angular momentum (about the origin), and the least distance of two bodies."""
-        dim = self.dim or 2
-        return {"energy": (), "momentum": (dim,), "angular_momentum": () if dim == 2 else (3,), "closest": ()}
-
-    def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
-        """A quantity of states of a run with that step, the same to the bit as if it had been recorded."""
-        return self._left_alone().scaled(dt, np.broadcast_shapes(v.shape[2:], y.shape[2:])).record(name, v, y)
+        return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
 
     def energy(self, v: Array, y: Array) -> Array:
         """½·Σ m·v² and the potential of every pair; see the table above."""
-        return self._energies(v, y)[1]
-
-    def _energies(self, v: Array, y: Array) -> tuple[Array, Array]:
-        """The kinetic and the whole energy."""
         batch = np.broadcast_shapes(v.shape[2:], y.shape[2:])
         with np.errstate(all="ignore"):
-            _, kinetic, whole = self._left_alone().scaled(1.0, batch).energies(v, y)
-        return kinetic, whole
-
-    def _left_alone(self) -> NBody:
-        free = copy.copy(self)
-        free.control = None
-        free.velocity_term = None
-        return free
-
-    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> NBody:
-        """The same bodies under energy control, the target that of the state if the control has none."""
-        bound = self._left_alone()
-        bound.control = control.aimed(*self._energies(v, y), dt)
-        bound.velocity_term = "energy control"
-        return bound
+            energy: Array = self.alone(1.0, batch).energies(v, y)[2]
+        return energy

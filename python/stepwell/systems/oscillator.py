@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from .. import _checks
 from .._checks import Array, Shape
-from ..reference.systems import oscillator as reference
-from .base import Parameters, System, row, shown
-from .inputs import Input, Sampled, Sinusoid, as_input, table
+from ..reference.systems.oscillator import Oscillator as Reference
+from .base import System, shown
+from .inputs import Input, Sampled, as_input, signal
 
 FORMS = ("canonical", "physical")
 
@@ -31,6 +29,7 @@ class Oscillator(System):
     """
 
     kernel = "oscillator"
+    reference = Reference
     linear = True
     input_names = ("x", "a")
 
@@ -47,37 +46,18 @@ class Oscillator(System):
             | {name: given.batch for name, given in self.given_inputs().items()}
         )
 
-    def __repr__(self) -> str:
-        given = {"omega": self.omega, "damping": self.damping, "x": self.x, "a": self.a}
-        return f"Oscillator({shown(given)}, form={self.form!r})"
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
+        return [*shown(omega=self.omega, damping=self.damping, x=self.x, a=self.a), f"form={self.form!r}"]
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs that it was given, by name."""
         return {name: given for name, given in (("x", self.x), ("a", self.a)) if given is not None}
 
-    def scaled(self, h: float, batch: Shape) -> reference.Oscillator:
-        """The NumPy reference, scaled to the step h."""
-        signals = [None if given is None else given.signal() for given in (self.x, self.a)]
-        return reference.Oscillator(h, self.form, self.omega, self.damping, *signals)
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """Options, rows and tables for the core, as ``oscillator.rs`` documents them."""
-        options = [self.form] + ["damped"] * (self.damping is not None)
-        zero = np.zeros((1, 1))
-        rows = [row(self.omega, batch), zero if self.damping is None else row(self.damping, batch)]
-        tables = []
-        for name, given in (("x", self.x), ("a", self.a)):
-            sine = [zero] * 3
-            if isinstance(given, Sinusoid):
-                options.append(f"{name}:sine")
-                sine = [row(p, batch) for p in (given.amplitude, given.omega, given.phase)]
-            elif given is not None:
-                options.append(f"{name}:held")
-                tables.append(table(given, batch))
-            rows += sine
-        while rows[-1] is zero:
-            rows.pop()  # what the core is not told is zero
-        return Parameters(options, rows=rows, tables=tables)
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """Form, parameters, inputs."""
+        inputs = {"x": signal(self.x), "a": signal(self.a)}
+        return {"form": self.form, "omega": self.omega, "damping": self.damping} | inputs
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""

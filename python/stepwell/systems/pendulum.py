@@ -9,9 +9,9 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..reference import trig
-from ..reference.systems import pendulum as reference
-from .base import Parameters, System, row, shown
-from .inputs import Input, add_inputs, as_input
+from ..reference.systems.pendulum import Pendulum as Reference
+from .base import System, shown
+from .inputs import Input, as_input, signal
 
 
 class Pendulum(System):
@@ -29,6 +29,7 @@ class Pendulum(System):
     """
 
     kernel = "pendulum"
+    reference = Reference
 
     def __init__(self, omega: Any = 1.0, damping: Any = None, *, a: Any = None) -> None:
         self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
@@ -41,23 +42,17 @@ class Pendulum(System):
             | ({} if self.a is None else {"a": self.a.batch})
         )
 
-    def __repr__(self) -> str:
-        return f"Pendulum({shown({'omega': self.omega, 'damping': self.damping, 'a': self.a})})"
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
+        return shown(omega=self.omega, damping=self.damping, a=self.a)
 
     def given_inputs(self) -> dict[str, Input]:
         """The input that it was given, by name."""
         return {} if self.a is None else {"a": self.a}
 
-    def scaled(self, h: float, batch: Shape) -> reference.Pendulum:
-        """The NumPy reference, scaled to the step h."""
-        return reference.Pendulum(h, self.omega, self.damping, None if self.a is None else self.a.signal())
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """Options, rows and a table for the core, as ``pendulum.rs`` documents them."""
-        damping = np.zeros((1, 1)) if self.damping is None else row(self.damping, batch)
-        parameters = Parameters(["damped"] * (self.damping is not None), rows=[row(self.omega, batch), damping])
-        add_inputs(parameters, self.given_inputs().values(), batch)
-        return parameters
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """Parameters and input."""
+        return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest below."""

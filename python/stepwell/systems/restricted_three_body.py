@@ -9,8 +9,8 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from ..errors import ArgumentError
-from ..reference.systems import restricted_three_body as reference
-from .base import Parameters, System, row, shown
+from ..reference.systems.restricted_three_body import RestrictedThreeBody as Reference
+from .base import System, shown
 
 
 class RestrictedThreeBody(System):
@@ -30,6 +30,7 @@ class RestrictedThreeBody(System):
     """
 
     kernel = "restricted_three_body"
+    reference = Reference
     axes = "x and y"
     v_shape = y_shape = (2,)
     velocity_term = "the Coriolis force"
@@ -41,16 +42,13 @@ class RestrictedThreeBody(System):
             raise ArgumentError(f"mu: expected shares of the mass above 0 and below 1, got {wrong.flat[0]:g}")
         self.batch = self.mu.shape
 
-    def __repr__(self) -> str:
-        return f"RestrictedThreeBody({shown({'mu': self.mu})})"
+    def said(self) -> list[str]:
+        """What its repr says of its arguments."""
+        return shown(mu=self.mu)
 
-    def scaled(self, h: float, batch: Shape) -> reference.RestrictedThreeBody:
-        """The NumPy reference, scaled to the step h."""
-        return reference.RestrictedThreeBody(h, self.mu)
-
-    def parameters(self, batch: Shape) -> Parameters:
-        """The row for the core, as ``restricted_three_body.rs`` documents it."""
-        return Parameters(rows=[row(self.mu, batch)])
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """μ."""
+        return {"mu": self.mu}
 
     def energy(self, v: Array, y: Array) -> Array:
         """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, which the motion keeps; no other energy is kept here."""

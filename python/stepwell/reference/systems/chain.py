@@ -15,7 +15,7 @@ class Chain:
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇."""
-        wall = np.zeros_like(y[:1])
+        wall = np.zeros((1, *y.shape[1:]))
         places = np.concatenate([wall, y, wall])
         f = self.stiffness * (places[1:] - places[:-1])
         dv: Array = (f[1:] - f[:-1]) * self.by_mass

@@ -7,9 +7,12 @@ from ..types import Array, Signal
 
 
 class Linear:
-    """``rows`` is [A B], of shape (n, n + inputs, *batch); its first ``n_v`` rows and columns belong to v, the next to y."""
+    """``rows`` is [A B], of shape (n, n + inputs, *batch); its first ``n_v`` rows and columns belong to v, the next to y.
 
-    def __init__(self, h: float, n_v: int, rows: Array, inputs: Sequence[Signal]) -> None:
+    ``kind`` is "acceleration" if ẏ is v times a number and v̇ does not depend on v; nothing here asks for it.
+    """
+
+    def __init__(self, h: float, n_v: int, rows: Array, inputs: Sequence[Signal], kind: str = "") -> None:
         rows = h * rows
         self.of_v, self.of_y, self.inputs = rows[:n_v], rows[n_v:], inputs
 

@@ -1,10 +1,13 @@
 """Bodies that attract each other (Appendix C, D), each pair computed once."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 
-from ..control import EnergyControl, Projection
+from .. import bits
 from ..log import log
-from ..types import Array, Blocks
+from ..types import Array
 
 #: Sums over bodies are kept in this many parts, body i in part i mod LANES; distances that are taken together are so far apart.
 LANES = 8
@@ -56,34 +59,17 @@ class NBody:
     Blocks are of shape (bodies, dim, …), masses of shape (bodies, …).
     """
 
-    def __init__(
-        self,
-        h: float,
-        force: str,
-        masses: Array,
-        strength: Array,
-        softening: Array,
-        control: EnergyControl | None = None,
-        projection: Projection | None = None,
-    ) -> None:
+    def __init__(self, h: float, force: str, dim: int, masses: Array, strength: Array, softening: Array) -> None:
         self.h = h
-        self.control = control
-        self.projection = projection
         self.force = force
         self.masses = masses
         self.strength = h * strength  # h·G·m
         self.soft = softening * softening
         self.half = (0.5 * h) * masses
-        self.work: Array | float = 0.0  # h times what control or projection changed of the energy
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
-        """h·v̇, and the push of the control."""
-        if self.control is None:
-            return self.meet(y, None)
-        dv, kinetic, energy = self.energies(v, y)
-        g = self.control.push(kinetic, energy)
-        self.work = self.work - (g * (2.0 - g)) * kinetic  # what the push alone would change: ((1 − g)² − 1)·K
-        return np.asarray(dv - g * v)
+        """h·v̇."""
+        return self.meet(y, None)
 
     def dy(self, t: float, v: Array, y: Array) -> Array:
         """h·ẏ."""
@@ -100,10 +86,10 @@ class NBody:
         them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps.
         """
         n = len(y)
-        dv = np.zeros_like(y)
+        dv = np.full_like(y, 0.0)  # whatever y is made of
         twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
         for slab in partners(n):
-            after, before, wells = np.zeros_like(y), np.zeros_like(twice), np.zeros_like(y[:, 0])
+            after, before, wells = (np.full_like(each, 0.0) for each in (y, twice, y[:, 0]))
             for group in slab:
                 pushes = []
                 for k in group:
@@ -132,40 +118,58 @@ class NBody:
 
     def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
         """h·v̇, h times the kinetic energy, and h times the whole energy, in one pass over the pairs."""
-        potential = np.zeros_like(y[:, 0])
+        potential = np.full_like(y[:, 0], 0.0)
         dv = self.meet(y, potential)
         kinetic = total(self.half * square(v))
         return dv, kinetic, kinetic + total(self.masses * potential)
 
-    def settle(self, v: Array, y: Array) -> Blocks:
-        """The state after a step, set back onto its energy if there is a projection."""
-        if self.projection is None:
-            return v, y
-        dv, kinetic, energy = self.energies(v, y)
-        off = self.projection.off(energy)
-        if self.projection.way == "scaling":
-            factor = self.projection.factor(kinetic, off)
-            self.work = self.work + (factor * factor - 1.0) * kinetic
-            return v * factor, y
-        # Nacozy: along the gradient of the energy, m·v in the velocities and −m·a in the coordinates.
+    def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
+        """The gradient of the energy, m·v in the velocities and −m·a in the coordinates (its sign turned), and its square."""
         masses = self.masses[:, np.newaxis]
         along_v, along_y = masses * v, masses * (dv / self.h)
-        step = (off / self.h) / total(square(along_v) + square(along_y))
-        self.work = self.work - off
-        return v - step * along_v, y + step * along_y
+        return along_v, along_y, total(square(along_v) + square(along_y))
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state: a number for each member, or a vector along the first axis."""
-        if name == "energy":
-            return np.asarray(self.energies(v, y)[2] / self.h)
-        if name == "momentum":
-            return total(self.masses[:, np.newaxis] * v)
-        if name == "angular_momentum":
-            pairs = [(0, 1)] if y.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
-            spin = [total(self.masses * (y[:, a] * v[:, b] - y[:, b] * v[:, a])) for a, b in pairs]
-            return spin[0] if len(spin) == 1 else np.stack(spin)
-        least = np.full(y.shape[2:], np.inf)  # "closest": the least distance of two bodies
-        for i in range(len(y)):
-            for r2 in square(y[i + 1 :] - y[i]):
-                least = np.where(r2 < least, r2, least)
-        return np.asarray(np.sqrt(least))
+        return np.asarray(QUANTITIES[name].of(self, v, y))
+
+
+def energy(s: NBody, v: Array, y: Array) -> Array:
+    """½·Σ m·v² and the potential of every pair."""
+    return s.energies(v, y)[2] / s.h
+
+
+def momentum(s: NBody, v: Array, y: Array) -> Array:
+    """Σ m·v."""
+    return total(s.masses[:, np.newaxis] * v)
+
+
+def angular_momentum(s: NBody, v: Array, y: Array) -> Array:
+    """Σ m·y × v about the origin."""
+    pairs = [(0, 1)] if y.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
+    spin = [total(s.masses * (y[:, a] * v[:, b] - y[:, b] * v[:, a])) for a, b in pairs]
+    return spin[0] if len(spin) == 1 else np.stack(spin)
+
+
+def closest(s: NBody, v: Array, y: Array) -> Array:
+    """The least distance of two bodies."""
+    least = np.full(y.shape[2:], np.inf)
+    for i in range(len(y)):
+        for r2 in square(y[i + 1 :] - y[i]):
+            least = bits.where(bits.less(r2, least), r2, least)
+    return np.asarray(np.sqrt(least))
+
+
+class Quantity(NamedTuple):
+    """What can be recorded of a state: its shape in so many dimensions, and its formula."""
+
+    shape: Callable[[int], tuple[int, ...]]
+    of: Callable[[NBody, Array, Array], Array]
+
+
+QUANTITIES = {
+    "energy": Quantity(lambda dim: (), energy),
+    "momentum": Quantity(lambda dim: (dim,), momentum),
+    "angular_momentum": Quantity(lambda dim: () if dim == 2 else (3,), angular_momentum),
+    "closest": Quantity(lambda dim: (), closest),
+}

@@ -1,0 +1,34 @@
+"""The bits of runs that were recorded with the core that was compiled ahead of time, kernel by kernel, are those of today."""
+
+from __future__ import annotations
+
+import pytest
+import recorded
+import stepwell as sw
+
+RUNS = recorded.runs()
+WRITTEN = recorded.written()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_bits_are_those_that_were_recorded(name: str) -> None:
+    assert name in WRITTEN, f"{name}: not recorded yet; python tests/recorded.py --write"
+    bits, values = recorded.hashes(recorded.made(RUNS[name]))
+    assert values == WRITTEN[name][1], f"{name}: other values than were recorded"
+    assert bits == WRITTEN[name][0], f"{name}: the values that were recorded, but the sign of a zero is another"
+
+
+def test_no_recorded_run_is_left_out() -> None:
+    assert WRITTEN.keys() == RUNS.keys()
+
+
+def test_every_method_and_every_variant_is_recorded() -> None:
+    """In as many combinations as tell a fault of one from a fault of the other."""
+    drawn = recorded.drawn()
+    assert {case.start for case in drawn if case.method == "verlet"} == set(sw.method("verlet").starts)
+    for system in recorded.SYSTEMS:
+        assert len({case.method for case in drawn if case.system == system}) >= 4, system
+    for method in recorded.METHODS:
+        mine = [case for case in drawn if case.method == method]
+        assert len({case.system for case in mine}) >= 10, method
+        assert {case.form for case in mine} == {"direct", "matrix", "power"}, method
