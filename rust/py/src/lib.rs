@@ -69,110 +69,107 @@ fn isa_levels() -> Vec<&'static str> {
     Level::available().into_iter().map(Level::name).collect()
 }
 
-/// The steps, counted from the first, at which a run keeps its state.
-#[pyfunction]
-#[pyo3(signature = (steps, every))]
-fn saves(steps: i64, every: Option<i64>) -> Vec<i64> {
-    batch::saves(steps, every).collect()
-}
-
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
-#[pyfunction]
-#[pyo3(signature = (model, *, t0, dt, start, first, steps, every, threads, carried, v, y, saved_v, saved_y, recorded, tally, carry, first_bad, progress))]
-#[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
-fn run(
-    py: Python<'_>,
-    model: &ModelSpec,
+/// What is read of a plan: see `Plan` in `engine.py`.
+#[derive(FromPyObject)]
+struct PlanOf {
     t0: f64,
     dt: f64,
-    start: usize,
+    choice: usize,
     first: i64,
     steps: i64,
     every: Option<i64>,
     threads: usize,
-    carried: bool,
-    v: PyReadonlyArray2<'_, f64>,
-    y: PyReadonlyArray2<'_, f64>,
-    mut saved_v: PyReadwriteArrayDyn<'_, f64>,
-    mut saved_y: PyReadwriteArrayDyn<'_, f64>,
-    mut recorded: PyReadwriteArrayDyn<'_, f64>,
-    mut tally: PyReadwriteArrayDyn<'_, f64>,
-    mut carry: PyReadwriteArrayDyn<'_, f64>,
-    mut first_bad: PyReadwriteArray1<'_, i64>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<()> {
-    let machine = Machine { level: Level::choose().map_err(core_error)?, threads };
-    let arrays = Arrays {
-        saved_v: saved_v.as_slice_mut()?,
-        saved_y: saved_y.as_slice_mut()?,
-        recorded: recorded.as_slice_mut()?,
-        tally: tally.as_slice_mut()?,
-        carry: carry.as_slice_mut()?,
-        first_bad: first_bad.as_slice_mut()?,
-    };
-    let rows = model.rows(py)?;
-    let tables = model.tables(py)?;
-    let members = arrays.first_bad.len();
-    let plan = Plan {
-        model: model.model(model.started(start), &rows, &tables)?,
-        clock: Clock { t0, h: dt },
-        machine,
-        first,
-        steps,
-        every,
-        v: by_row(&v)?,
-        y: by_row(&y)?,
-        members,
-        carried,
-    };
-    detached(py, progress, |monitor| batch::run(&plan, arrays, monitor))
 }
 
-/// Makes a run of steps of chosen length from the rows of `v` and `y`, and fills what is kept at the times of `at`.
+/// What a run begins with and what it fills: see `Arrays` in `engine.py`.
+#[derive(FromPyObject)]
+struct ArraysOf<'py> {
+    v: PyReadonlyArray2<'py, f64>,
+    y: PyReadonlyArray2<'py, f64>,
+    carried: bool,
+    saved_v: PyReadwriteArrayDyn<'py, f64>,
+    saved_y: PyReadwriteArrayDyn<'py, f64>,
+    recorded: PyReadwriteArrayDyn<'py, f64>,
+    tally: PyReadwriteArray1<'py, f64>,
+    carry: PyReadwriteArrayDyn<'py, f64>,
+    first_bad: PyReadwriteArray1<'py, i64>,
+}
+
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
 #[pyfunction]
-#[pyo3(signature = (model, *, t0, at, first, relative, absolute, budget, threads, v, y, saved_v, saved_y, reached, counts, progress))]
-#[allow(clippy::too_many_arguments, reason = "a flat boundary; the callers on both sides have structures")]
-fn adapt(
-    py: Python<'_>,
-    model: &ModelSpec,
-    t0: f64,
-    at: Vec<f64>,
-    first: PyReadonlyArray2<'_, f64>,
-    relative: PyReadonlyArray2<'_, f64>,
-    absolute: PyReadonlyArray2<'_, f64>,
-    budget: i64,
-    threads: usize,
-    v: PyReadonlyArray2<'_, f64>,
-    y: PyReadonlyArray2<'_, f64>,
-    mut saved_v: PyReadwriteArrayDyn<'_, f64>,
-    mut saved_y: PyReadwriteArrayDyn<'_, f64>,
-    mut reached: PyReadwriteArray2<'_, f64>,
-    mut counts: PyReadwriteArray2<'_, i64>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<()> {
-    let members = counts.as_array().ncols();
-    let arrays = chosen::Arrays {
-        saved_v: saved_v.as_slice_mut()?,
-        saved_y: saved_y.as_slice_mut()?,
-        reached: reached.as_slice_mut()?,
-        counts: counts.as_slice_mut()?,
-    };
+fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<()> {
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
-    let plan = chosen::Plan {
-        model: model.model(model.attempts(), &rows, &tables)?,
-        machine: Machine { level: Level::choose().map_err(core_error)?, threads },
-        t0,
-        at: &at,
-        first: Row(first.as_slice()?),
-        relative: Row(relative.as_slice()?),
-        absolute: Row(absolute.as_slice()?),
-        budget,
-        v: by_row(&v)?,
-        y: by_row(&y)?,
-        members,
+    let plan_of_core = Plan {
+        model: model.model(model.started(plan.choice), &rows, &tables)?,
+        clock: Clock { t0: plan.t0, h: plan.dt },
+        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        first: plan.first,
+        steps: plan.steps,
+        every: plan.every,
+        v: by_row(&arrays.v)?,
+        y: by_row(&arrays.y)?,
+        members: arrays.first_bad.as_array().len(),
+        carried: arrays.carried,
     };
-    detached(py, progress, |monitor| chosen::run(&plan, arrays, monitor))
+    let to_fill = Arrays {
+        saved_v: arrays.saved_v.as_slice_mut()?,
+        saved_y: arrays.saved_y.as_slice_mut()?,
+        recorded: arrays.recorded.as_slice_mut()?,
+        tally: arrays.tally.as_slice_mut()?,
+        carry: arrays.carry.as_slice_mut()?,
+        first_bad: arrays.first_bad.as_slice_mut()?,
+    };
+    detached(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))
+}
+
+/// Where to be when, and how exactly: see `Pacing` in `engine.py`.
+#[derive(FromPyObject)]
+struct PacingOf<'py> {
+    at: Vec<f64>,
+    first: PyReadonlyArray2<'py, f64>,
+    relative: PyReadonlyArray2<'py, f64>,
+    absolute: PyReadonlyArray2<'py, f64>,
+    budget: i64,
+}
+
+/// What a run with a tolerance begins with and what it fills: see `PacedArrays` in `engine.py`.
+#[derive(FromPyObject)]
+struct PacedArraysOf<'py> {
+    v: PyReadonlyArray2<'py, f64>,
+    y: PyReadonlyArray2<'py, f64>,
+    saved_v: PyReadwriteArrayDyn<'py, f64>,
+    saved_y: PyReadwriteArrayDyn<'py, f64>,
+    reached: PyReadwriteArray2<'py, f64>,
+    counts: PyReadwriteArray2<'py, i64>,
+}
+
+/// Makes a run of steps of chosen length from the rows of `v` and `y`, and fills what is kept at the times of the pacing.
+#[pyfunction]
+fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf<'_>, mut arrays: PacedArraysOf<'_>) -> PyResult<()> {
+    let rows = model.rows(py)?;
+    let tables = model.tables(py)?;
+    let plan_of_core = chosen::Plan {
+        model: model.model(model.attempts(), &rows, &tables)?,
+        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        t0: plan.t0,
+        at: &pacing.at,
+        first: Row(pacing.first.as_slice()?),
+        relative: Row(pacing.relative.as_slice()?),
+        absolute: Row(pacing.absolute.as_slice()?),
+        budget: pacing.budget,
+        v: by_row(&arrays.v)?,
+        y: by_row(&arrays.y)?,
+        members: arrays.counts.as_array().ncols(),
+    };
+    let to_fill = chosen::Arrays {
+        saved_v: arrays.saved_v.as_slice_mut()?,
+        saved_y: arrays.saved_y.as_slice_mut()?,
+        reached: arrays.reached.as_slice_mut()?,
+        counts: arrays.counts.as_slice_mut()?,
+    };
+    detached(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
 /// Runs without the GIL, tells how far it is and hears Ctrl-C.
@@ -210,7 +207,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
-    m.add_function(wrap_pyfunction!(saves, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_class::<ModelSpec>()?;

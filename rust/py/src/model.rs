@@ -55,15 +55,16 @@ pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>
 
 #[pymethods]
 impl ModelSpec {
-    /// `given` is a list of names and what is given under them; `nodes` are those of the transition-matrix form, if it is asked for.
+    /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
+    /// in its v slot, if it is asked for.
     #[new]
-    #[pyo3(signature = (system, method, given, *, nodes=None, record=Vec::new()))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new()))]
     fn new(
         py: Python<'_>,
         system: String,
         method: String,
         given: Vec<(String, Value)>,
-        nodes: Option<Vec<f64>>,
+        matrix: Option<(Vec<f64>, usize)>,
         record: Vec<String>,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
@@ -84,9 +85,9 @@ impl ModelSpec {
                 }
             }
         }
-        let how = match nodes {
+        let how = match matrix {
             None => How::Method { name: method, choice: 0 },
-            Some(nodes) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+            Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
         ModelSpec { given: names, how, rows, tables, record }
     }

@@ -40,26 +40,25 @@ fn advance(py: Python<'_>, world: &mut world::World, patience: i64, mut n: i64, 
     Ok(())
 }
 
+/// What is read of a plan: see `Plan` in `engine.py`.
+#[derive(FromPyObject)]
+struct WorldPlan {
+    t0: f64,
+    dt: f64,
+    choice: usize,
+    first: i64,
+    members: usize,
+}
+
 #[pymethods]
 impl World {
     #[new]
-    #[pyo3(signature = (model, *, t0, dt, start, first, members, v, y))]
-    #[allow(clippy::too_many_arguments, reason = "a flat boundary")]
-    fn new(
-        py: Python<'_>,
-        model: &ModelSpec,
-        t0: f64,
-        dt: f64,
-        start: usize,
-        first: i64,
-        members: usize,
-        v: Py<PyArrayDyn<f64>>,
-        y: Py<PyArrayDyn<f64>>,
-    ) -> PyResult<Self> {
+    fn new(py: Python<'_>, model: &ModelSpec, plan: WorldPlan, v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>>) -> PyResult<Self> {
+        let WorldPlan { t0, dt, choice, first, members } = plan;
         let (clock, machine) = (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(core_error)?, threads: 1 });
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
-        let model = model.model(model.started(start), &rows, &tables)?;
+        let model = model.model(model.started(choice), &rows, &tables)?;
         let world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
         let sizes = world.sizes();
         let (v_size, y_size) =
