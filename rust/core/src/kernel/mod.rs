@@ -4,6 +4,12 @@
 //! code at run time ([`x86`]); the bits are the same.
 
 pub mod interpret;
+#[cfg(target_arch = "x86_64")]
+pub mod pages;
+#[cfg(target_arch = "x86_64")]
+mod registers;
+#[cfg(target_arch = "x86_64")]
+pub mod x86;
 
 use crate::tape::split::Body;
 
