@@ -4,9 +4,22 @@
 //! code at run time ([`x86`]); the bits are the same.
 
 pub mod interpret;
+#[cfg(target_arch = "x86_64")]
+pub mod pages;
+#[cfg(target_arch = "x86_64")]
+mod registers;
 pub mod runner;
+pub mod unwritten;
+#[cfg(target_arch = "x86_64")]
+pub mod x86;
 
-use crate::{isa::Level, tape::split::Body};
+/// The kernel writer of this machine.
+#[cfg(not(target_arch = "x86_64"))]
+pub use unwritten as writer;
+#[cfg(target_arch = "x86_64")]
+pub use x86 as writer;
+
+use crate::tape::split::Body;
 
 /// What a kernel works on. Rows are `lanes` numbers long, one for each member, and follow each other.
 #[derive(Debug)]
@@ -53,35 +66,4 @@ pub fn check(body: &Body, lanes: usize, tile: &Tile) {
             assert!(places.clone().all(|at| (*at as usize).saturating_add(lanes) <= tile.held.len()), "held");
         }
     }
-}
-
-/// How a body becomes machine code. There is none without a kernel writer for this machine.
-#[derive(Clone, Debug)]
-pub struct Shape {}
-
-impl Shape {
-    /// How long rows are.
-    pub fn lanes(&self) -> usize {
-        0
-    }
-
-    /// Costs
-    pub fn blocks(&self) -> usize {
-        0
-    }
-}
-
-/// c
-pub fn choose(_body: &Body, _level: Level, _width: runner::Width) -> Option<Shape> {
-    None
-}
-
-/// c
-pub fn choose_long(_body: &Body, _level: Level, _lanes: usize) -> Option<Shape> {
-    None
-}
-
-/// c
-pub fn write(_body: &Body, _shape: &Shape) -> Option<Box<dyn Kernel>> {
-    None
 }

@@ -5,7 +5,11 @@ use std::sync::{
     atomic::{AtomicU64, Ordering::Relaxed},
 };
 
-use super::{Kernel, interpret::Interpreter};
+use super::{
+    Kernel,
+    interpret::Interpreter,
+    writer::{self, Shape},
+};
 use crate::{isa::Level, tape::split::Body};
 
 /// How many members to expect: a wide tile has the throughput, a narrow one the latency.
@@ -30,13 +34,16 @@ const INTERPRETED: u64 = 2000;
 /// Lanes that the interpreter takes at once where nothing else sets their number: the values of a step stay in the first cache.
 const INTERPRETED_LANES: [usize; 3] = [64, 8, 1];
 
+/// Members to expect at each width.
+const MEMBERS: [usize; 3] = [usize::MAX, 8, 1];
+
 /// A body at a width.
 pub struct Runner {
     body: Body,
     lanes: usize,
     interpreter: Interpreter,
     /// How it would be written; none where no machine code can be.
-    shape: Option<super::Shape>,
+    shape: Option<Shape>,
     written: OnceLock<Option<Box<dyn Kernel>>>,
     /// Steps times lanes that were made so far.
     done: AtomicU64,
@@ -45,17 +52,17 @@ pub struct Runner {
 impl Runner {
     /// For so many members as the width says.
     pub fn new(body: &Body, level: Level, width: Width) -> Runner {
-        let shape = super::choose(body, level, width);
-        let lanes = shape.as_ref().map_or(INTERPRETED_LANES[width as usize], super::Shape::lanes);
+        let shape = writer::choose(body, level, MEMBERS[width as usize]);
+        let lanes = shape.as_ref().map_or(INTERPRETED_LANES[width as usize], Shape::lanes);
         Runner::shaped(body, level, lanes, shape)
     }
 
     /// For rows of so many lanes, each a number of a long block.
     pub fn long(body: &Body, level: Level, lanes: usize) -> Runner {
-        Runner::shaped(body, level, lanes, super::choose_long(body, level, lanes))
+        Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
-    fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<super::Shape>) -> Runner {
+    fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner {
         let interpreter = Interpreter::new(body, lanes, level);
         Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }
     }
@@ -65,9 +72,9 @@ impl Runner {
         self.lanes
     }
 
-    /// How many vectors of lanes a step of the tile costs, beside that of a narrow one.
-    pub fn blocks(&self) -> usize {
-        self.shape.as_ref().map_or(self.lanes.div_ceil(8), super::Shape::blocks)
+    /// What a step of the tile costs, in steps of a vector of lanes.
+    pub fn cost(&self) -> usize {
+        self.shape.as_ref().map_or(self.lanes.div_ceil(8), Shape::cost)
     }
 
     /// What it makes steps of.
@@ -81,7 +88,10 @@ impl Runner {
         if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED && self.written.get().is_none() {
             return (&self.interpreter, false);
         }
-        let write = || self.shape.as_ref().and_then(|shape| super::write(&self.body, shape));
+        let write = || {
+            let written = writer::write(&self.body, self.shape?)?;
+            Some(Box::new(written) as Box<dyn Kernel>)
+        };
         match self.written.get_or_init(write) {
             Some(written) => (written.as_ref(), true),
             None => (&self.interpreter, false),

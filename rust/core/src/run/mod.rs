@@ -51,7 +51,7 @@ impl Model<'_> {
     /// How many members a group of that width steps together, and about what a step costs beside one of few.
     pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> (usize, usize) {
         let runner = traced.step.runner(machine.level, width);
-        (runner.lanes(), runner.blocks())
+        (runner.lanes(), runner.cost())
     }
 
     /// A group that steps it.

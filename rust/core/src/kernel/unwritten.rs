@@ -1,0 +1,35 @@
+//! The kernel writer of a machine that has none: everything is interpreted.
+
+use super::interpret::Interpreter;
+use crate::{isa::Level, tape::split::Body};
+
+/// How a kernel goes through a tile. There is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {}
+
+impl Shape {
+    /// How long rows are.
+    pub fn lanes(&self) -> usize {
+        match *self {}
+    }
+
+    /// What a step of the tile costs, in steps of a vector of lanes.
+    pub fn cost(&self) -> usize {
+        match *self {}
+    }
+}
+
+/// The shape for so many members.
+pub fn choose(_: &Body, _: Level, _: usize) -> Option<Shape> {
+    None
+}
+
+/// The shape for rows of so many numbers.
+pub fn choose_long(_: &Body, _: Level, _: usize) -> Option<Shape> {
+    None
+}
+
+/// Writes a kernel, which cannot be.
+pub fn write(_: &Body, _: Shape) -> Option<Interpreter> {
+    None
+}

@@ -1,0 +1,263 @@
+//! The bytes of instructions: the few dozen forms that kernels are made of.
+//!
+//! An instruction on vectors is prefix, opcode, operands, and perhaps a byte behind. The prefix is VEX (AVX2: 16 registers, a memory
+//! operand is a whole vector) or EVEX (AVX-512: 32 registers, a memory operand may be one number for all lanes). Both say the same
+//! things, so that one table of [`Form`]s serves both. Intel's manual, volume 2, sections 2.3 and 2.7.
+
+/// An opcode and what selects it. All are for numbers of 64 bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Form {
+    /// The opcode map: 1 is 0F, 2 is 0F 38, 3 is 0F 3A.
+    pub map: u8,
+    /// Over vectors: the mandatory prefix (0 none, 1 is 66, 2 is F3, 3 is F2) and the opcode.
+    pub vector: (u8, u8),
+    /// The same for the first number of a vector only, if there is such an instruction.
+    pub single: Option<(u8, u8)>,
+}
+
+const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
+    Form { map, vector: (prefix, opcode), single: None }
+}
+
+const fn arithmetic(opcode: u8) -> Form {
+    Form { map: 1, vector: (P66, opcode), single: Some((PF2, opcode)) }
+}
+
+const P66: u8 = 1;
+const PF3: u8 = 2;
+const PF2: u8 = 3;
+
+pub const ADD: Form = arithmetic(0x58);
+pub const MUL: Form = arithmetic(0x59);
+pub const SUB: Form = arithmetic(0x5C);
+pub const DIV: Form = arithmetic(0x5E);
+pub const SQRT: Form = arithmetic(0x51);
+pub const COMPARE: Form = arithmetic(0xC2);
+/// Rounds to a whole number as the byte behind says.
+pub const ROUND: Form = Form { map: 3, vector: (P66, 0x09), single: Some((P66, 0x0B)) };
+pub const AND: Form = form(1, P66, 0x54);
+/// Not the first, and the second.
+pub const AND_NOT: Form = form(1, P66, 0x55);
+pub const OR: Form = form(1, P66, 0x56);
+pub const XOR: Form = form(1, P66, 0x57);
+pub const ADD_BITS: Form = form(1, P66, 0xD4);
+/// Shifts by the byte behind; the place of the result in the operands says which way, [`UP`] or [`DOWN`].
+pub const SHIFT: Form = form(1, P66, 0x73);
+pub const UP: u8 = 6;
+pub const DOWN: u8 = 2;
+/// The second where a bit of the mask is set, else the first (EVEX).
+pub const BLEND: Form = form(2, P66, 0x65);
+/// The second where the sign of a third register is set, else the first (VEX).
+pub const BLEND_BY_SIGN: Form = form(3, P66, 0x4B);
+/// Any function of three bits (EVEX).
+pub const BITS_OF_THREE: Form = form(3, P66, 0x25);
+/// All ones where a bit of the mask is set (EVEX).
+pub const SPREAD_MASK: Form = form(2, PF3, 0x38);
+pub const LOAD: Form = Form { map: 1, vector: (P66, 0x10), single: Some((PF2, 0x10)) };
+pub const STORE: Form = Form { map: 1, vector: (P66, 0x11), single: Some((PF2, 0x11)) };
+/// From register to register.
+pub const MOVE: Form = form(1, P66, 0x28);
+/// One number to all lanes.
+pub const BROADCAST: Form = form(2, P66, 0x19);
+
+/// A general register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum General {
+    Rax = 0,
+    Rcx = 1,
+    Rdx = 2,
+    Rbx = 3,
+    Rsi = 6,
+    Rdi = 7,
+    R8 = 8,
+    R9 = 9,
+    R10 = 10,
+    R11 = 11,
+}
+
+/// A place in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    pub base: General,
+    pub at: i32,
+    /// Eight times what is in rax is added.
+    pub indexed: bool,
+    /// One number, for all lanes.
+    pub broadcast: bool,
+}
+
+impl Memory {
+    pub fn new(base: General, at: i32) -> Memory {
+        Memory { base, at, indexed: false, broadcast: false }
+    }
+}
+
+/// Where an operand of a vector instruction is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operand {
+    Register(u8),
+    Memory(Memory),
+}
+
+/// A mark to jump back to.
+#[derive(Clone, Copy, Debug)]
+pub struct Mark(usize);
+
+/// Instructions, as bytes.
+#[derive(Debug)]
+pub struct Code {
+    pub bytes: Vec<u8>,
+    /// EVEX and not VEX.
+    pub evex: bool,
+    /// How many numbers a vector has: 1, 4 or 8.
+    pub width: usize,
+}
+
+impl Code {
+    /// An instruction on vectors: `to` ← `first`, `second`. In a kernel of width one it works on the first number only, where there is
+    /// such an instruction, and on 128 bits otherwise. What has no `first` is given 0.
+    pub fn vector(&mut self, form: Form, to: u8, first: u8, second: Operand) {
+        self.masked(form, to, first, second, 0);
+    }
+
+    /// As `vector`, with a byte behind.
+    pub fn vector_and_byte(&mut self, form: Form, to: u8, first: u8, second: Operand, byte: u8) {
+        self.vector(form, to, first, second);
+        self.bytes.push(byte);
+    }
+
+    /// As `vector`, with a mask register.
+    pub fn masked(&mut self, form: Form, to: u8, first: u8, second: Operand, mask: u8) {
+        let single = form.single.filter(|_| self.width == 1);
+        let (prefix, opcode) = single.unwrap_or(form.vector);
+        let no = |x: u8, bit: u8| (!x >> bit) & 1;
+        // The bits of the second operand's number that are in the prefix: of a register, or of base and index.
+        let (b, x) = match second {
+            Operand::Register(r) => (no(r, 3), no(r, 4)),
+            Operand::Memory(m) => (no(m.base as u8, 3), 1),
+        };
+        let length = if self.width == 8 { 2 } else { u8::from(self.width == 4) };
+        if self.evex {
+            let broadcast = matches!(second, Operand::Memory(Memory { broadcast: true, .. }));
+            let high = no(to, 3) << 7 | x << 6 | b << 5 | no(to, 4) << 4 | form.map;
+            let middle = 1 << 7 | (!first & 15) << 3 | 1 << 2 | prefix;
+            let low = length << 5 | u8::from(broadcast) << 4 | no(first, 4) << 3 | mask;
+            self.bytes.extend([0x62, high, middle, low, opcode]);
+            // A short displacement counts in units of what is read.
+            let unit = if single.is_some() || broadcast || form.vector == BROADCAST.vector { 8 } else { 8 * self.width as i32 };
+            self.operand(to & 7, second, unit);
+        } else {
+            self.bytes.extend([0xC4, no(to, 3) << 7 | 1 << 6 | b << 5 | form.map]);
+            self.bytes.extend([(!first & 15) << 3 | (length & 1) << 2 | prefix, opcode]);
+            self.operand(to & 7, second, 1);
+        }
+    }
+
+    fn operand(&mut self, register: u8, operand: Operand, unit: i32) {
+        let m = match operand {
+            Operand::Register(r) => return self.bytes.push(0xC0 | register << 3 | (r & 7)),
+            Operand::Memory(m) => m,
+        };
+        let short = i8::try_from(m.at / unit).ok().filter(|_| m.at % unit == 0);
+        let mode = match short {
+            Some(0) => 0,
+            Some(_) => 0x40,
+            None => 0x80,
+        };
+        let base = m.base as u8 & 7;
+        if m.indexed {
+            self.bytes.extend([mode | register << 3 | 4, 0xC0 | base]);
+        } else {
+            self.bytes.push(mode | register << 3 | base);
+        }
+        match short {
+            Some(0) => {}
+            Some(at) => self.bytes.push(at as u8),
+            None => self.bytes.extend(m.at.to_le_bytes()),
+        }
+    }
+
+    /// An instruction on a general register of 64 bits and a second operand.
+    fn general(&mut self, opcode: u8, register: u8, operand: Operand) {
+        let second = match operand {
+            Operand::Register(r) => r,
+            Operand::Memory(m) => m.base as u8,
+        };
+        self.bytes.extend([0x48 | (register >> 3) << 2 | second >> 3, opcode]);
+        self.operand(register & 7, operand, 1);
+    }
+
+    pub fn load_general(&mut self, to: General, from: Memory) {
+        self.general(0x8B, to as u8, Operand::Memory(from));
+    }
+
+    pub fn move_general(&mut self, to: General, from: General) {
+        self.general(0x8B, to as u8, Operand::Register(from as u8));
+    }
+
+    /// A number of at most 31 bits.
+    pub fn set_general(&mut self, to: General, value: i32) {
+        self.general(0xC7, 0, Operand::Register(to as u8));
+        self.bytes.extend(value.to_le_bytes());
+    }
+
+    pub fn add_general(&mut self, to: General, value: i32) {
+        if value != 0 {
+            self.general(0x81, 0, Operand::Register(to as u8));
+            self.bytes.extend(value.to_le_bytes());
+        }
+    }
+
+    /// Pads with nops, so that what follows stands at a multiple of 64 bytes: a loop then takes as few lines of the cache as it can.
+    pub fn align(&mut self) {
+        while !self.bytes.len().is_multiple_of(64) {
+            // Nops of up to eight bytes, as the manual recommends them.
+            const NOPS: [&[u8]; 8] = [
+                &[0x90],
+                &[0x66, 0x90],
+                &[0x0F, 0x1F, 0x00],
+                &[0x0F, 0x1F, 0x40, 0],
+                &[0x0F, 0x1F, 0x44, 0, 0],
+                &[0x66, 0x0F, 0x1F, 0x44, 0, 0],
+                &[0x0F, 0x1F, 0x80, 0, 0, 0, 0],
+                &[0x0F, 0x1F, 0x84, 0, 0, 0, 0, 0],
+            ];
+            let missing = 64 - self.bytes.len() % 64;
+            self.bytes.extend(NOPS[missing.min(8) - 1]);
+        }
+    }
+
+    pub fn mark(&self) -> Mark {
+        Mark(self.bytes.len())
+    }
+
+    /// Counts down, and jumps back unless that makes zero.
+    pub fn count_down(&mut self, counter: General, to: Mark) {
+        self.general(0xFF, 1, Operand::Register(counter as u8));
+        let from = self.bytes.len() + 6;
+        self.bytes.extend([0x0F, 0x85]);
+        self.bytes.extend((to.0 as i32 - from as i32).to_le_bytes());
+    }
+
+    /// Keeps rbx, which belongs to the caller, and puts the argument there.
+    pub fn enter(&mut self) {
+        self.bytes.push(0x53);
+        self.move_general(General::Rbx, General::Rdi);
+    }
+
+    pub fn leave(&mut self) {
+        self.bytes.extend([0xC5, 0xF8, 0x77]); // vzeroupper
+        self.bytes.extend([0x5B, 0xC3]); // pop rbx, ret
+    }
+
+    /// Keeps how numbers are rounded.
+    pub fn keep_rounding(&mut self, to: Memory) {
+        self.bytes.extend([0x0F, 0xAE]);
+        self.operand(3, Operand::Memory(to), 1);
+    }
+
+    pub fn set_rounding(&mut self, from: Memory) {
+        self.bytes.extend([0x0F, 0xAE]);
+        self.operand(2, Operand::Memory(from), 1);
+    }
+}

@@ -1,0 +1,284 @@
+//! The whole function: what is kept in registers, and the loops over steps and blocks around one step.
+
+use super::{
+    Shape,
+    encode::{Code, General, Mark, Memory},
+    plan::{Plan, Source},
+    write::{ARGUMENTS, BLOCKS, HELD, PER_STEP, POOL, ROWS, SCRATCH, STATE, STEPS, Value, Where, Writer},
+};
+use crate::{
+    isa::Level,
+    kernel::{
+        pages::place,
+        registers::{NONE, Registers, Uses},
+    },
+};
+
+/// The code of a plan in a shape, and how many vectors of scratch it needs. None if it cannot be done with the registers there are.
+pub fn function(plan: &Plan, shape: Shape) -> Option<(Vec<u8>, usize)> {
+    let mut writer = Writer::new(plan, shape);
+    let pinned = writer.share_out();
+    writer.code.enter();
+    writer.arguments();
+    if shape.resident {
+        writer.steps_inside(&pinned)?;
+    } else {
+        writer.blocks_inside(&pinned)?;
+    }
+    let code = &mut writer.code;
+    code.set_rounding(Memory::new(ARGUMENTS, place::ROUNDING));
+    code.leave();
+    Some((std::mem::take(&mut code.bytes), writer.slots as usize))
+}
+
+/// What stays in a register for the whole of the inner loop.
+#[derive(Debug, Default)]
+struct Pinned {
+    /// The old values of numbers of the state: number, vector, register.
+    state: Vec<(u32, usize, u8)>,
+    /// Leaves that do not change.
+    leaves: Vec<(Value, u8)>,
+}
+
+/// How many values are under way at once, and when each is needed last.
+struct Pressure {
+    most: u32,
+    /// Of each value how often it is read.
+    reads: Vec<u32>,
+}
+
+impl<'a> Writer<'a> {
+    fn new(plan: &'a Plan, shape: Shape) -> Writer<'a> {
+        let evex = shape.level == Level::Avx512;
+        let values = plan.sources.len() * shape.abreast;
+        let mut replaces = vec![None; plan.sources.len()];
+        for (s, id) in plan.next.iter().enumerate() {
+            if let Some(id) = id {
+                replaces[*id as usize] = Some(s as u32);
+            }
+        }
+        let leaf = |source: &Source| if *source == Source::Made { Where::Nowhere } else { Where::Leaf };
+        Writer {
+            plan,
+            shape,
+            code: Code { bytes: Vec::with_capacity(16 * plan.steps.len() * shape.abreast + 512), evex, width: shape.width },
+            registers: Registers::new(if evex { 32 } else { 16 }, values),
+            uses: Uses::new(values),
+            memory: plan.sources.iter().flat_map(|source| std::iter::repeat_n(leaf(source), shape.abreast)).collect(),
+            replaces,
+            homes: vec![None; plan.next.len() * shape.abreast],
+            waits: vec![false; plan.next.len() * shape.abreast],
+            now: 0,
+            free_slots: Vec::new(),
+            slots: 0,
+        }
+    }
+
+    /// When an operation is made for a vector. One later what it has made goes where it belongs.
+    pub fn time(&self, step: usize, vector: usize) -> u32 {
+        2 * (step * self.shape.abreast + vector) as u32 + 2
+    }
+
+    /// Finds out when each value is needed, and how many are at once if every number of the state has a register.
+    fn look_ahead(&mut self) -> Pressure {
+        let (plan, abreast) = (self.plan, self.shape.abreast);
+        let values = plan.sources.len() * abreast;
+        let mut made = vec![NONE; plan.sources.len()];
+        for (at, step) in plan.steps.iter().enumerate() {
+            made[step.id as usize] = at as u32;
+        }
+        let mut last = vec![0u32; values];
+        let mut reads = vec![0u32; values];
+        for (at, step) in plan.steps.iter().enumerate().rev() {
+            for vector in (0..abreast).rev() {
+                let now = self.time(at, vector);
+                for id in step.of() {
+                    let value = self.value(*id, vector);
+                    reads[value as usize] += 1;
+                    if !self.uses.tell(value, now) {
+                        continue;
+                    }
+                    last[value as usize] = now;
+                    // When the old number of the state has been read for the last time, the next one is brought to its place.
+                    if let Source::State(s) = plan.sources[*id as usize]
+                        && let Some(next) = plan.next[s as usize]
+                        && self.time(made[next as usize] as usize, vector) < now
+                    {
+                        let next = self.value(next, vector);
+                        if self.uses.tell(next, now + 1) {
+                            last[next as usize] = now;
+                        }
+                    }
+                }
+            }
+        }
+        let (mut under_way, mut most) = (0u32, 0);
+        for (at, step) in plan.steps.iter().enumerate() {
+            for vector in 0..abreast {
+                let now = self.time(at, vector);
+                let value = self.value(step.id, vector) as usize;
+                for id in step.of() {
+                    let read = self.value(*id, vector) as usize;
+                    if last[read] == now && plan.sources[*id as usize] == Source::Made {
+                        under_way = under_way.saturating_sub(1);
+                        last[read] = 0;
+                    }
+                }
+                let goes_home = self.replaces[step.id as usize]
+                    .is_some_and(|s| plan.old[s as usize].is_none_or(|old| last[self.value(old, vector) as usize] <= now));
+                if goes_home {
+                    last[value] = 0;
+                } else {
+                    under_way += 1;
+                    most = most.max(under_way);
+                }
+            }
+        }
+        Pressure { most, reads }
+    }
+
+    /// Gives registers to what is in use through the whole loop, as far as those that are under way leave any.
+    fn share_out(&mut self) -> Pinned {
+        let Pressure { most, reads } = self.look_ahead();
+        let (plan, abreast, resident) = (self.plan, self.shape.abreast, self.shape.resident);
+        let mut pinned = Pinned::default();
+        // One more than are under way: an operand may have to be loaded. At least five: no instruction asks for more.
+        let needed = (most + 1).max(5);
+        if resident {
+            for s in (0..plan.next.len()).filter(|s| plan.next[*s].is_some()) {
+                for vector in 0..abreast {
+                    if self.registers.free() > needed
+                        && let Some(register) = self.registers.keep_one()
+                    {
+                        self.homes[s * abreast + vector] = Some(register);
+                        pinned.state.push((s as u32, vector, register));
+                    }
+                }
+            }
+        }
+        let stays = |value: Value| match plan.sources[value as usize / abreast] {
+            Source::Pool(_) => true,
+            Source::Row(_) | Source::Kept(_) => resident,
+            Source::PerStep(_) => !resident,
+            Source::Made | Source::State(_) | Source::Held(_) => false,
+        };
+        let mut leaves: Vec<Value> =
+            (0..reads.len() as Value).filter(|value| reads[*value as usize] > 0 && stays(*value)).collect();
+        leaves.sort_by_key(|value| std::cmp::Reverse(reads[*value as usize]));
+        for value in leaves {
+            if self.registers.free() <= needed {
+                break;
+            }
+            let Some(register) = self.registers.keep_one() else { break };
+            pinned.leaves.push((value, register));
+        }
+        pinned
+    }
+
+    fn arguments(&mut self) {
+        let code = &mut self.code;
+        code.keep_rounding(Memory::new(ARGUMENTS, place::ROUNDING));
+        code.set_rounding(Memory::new(ARGUMENTS, place::ROUNDING + 4));
+        let arguments = [
+            (STATE, place::STATE),
+            (ROWS, place::ROWS),
+            (POOL, place::POOL),
+            (HELD, place::HELD),
+            (SCRATCH, place::SCRATCH),
+            (PER_STEP, place::PER_STEP),
+            (STEPS, place::STEPS),
+        ];
+        for (register, at) in arguments {
+            code.load_general(register, Memory::new(ARGUMENTS, at));
+        }
+    }
+
+    /// Block after block, each over all steps: the state stays in registers.
+    fn steps_inside(&mut self, pinned: &Pinned) -> Option<()> {
+        let next_block = self.blocks();
+        self.code.load_general(PER_STEP, Memory::new(ARGUMENTS, place::PER_STEP));
+        self.code.load_general(STEPS, Memory::new(ARGUMENTS, place::STEPS));
+        for &(s, vector, register) in &pinned.state {
+            if let Some(old) = self.plan.old[s as usize] {
+                let value = self.value(old, vector);
+                self.load(value, register);
+            }
+        }
+        self.load_leaves(pinned);
+        self.code.align();
+        let next_step = self.code.mark();
+        self.step()?;
+        self.code.add_general(PER_STEP, 8 * self.plan.per_step as i32);
+        self.code.count_down(STEPS, next_step);
+        for &(s, vector, register) in &pinned.state {
+            if let Some(next) = self.plan.next[s as usize] {
+                let value = self.value(next, vector);
+                self.store(s, value, register);
+            }
+        }
+        self.move_on(1);
+        self.end_of_blocks(next_block);
+        Some(())
+    }
+
+    /// Step after step, each over all blocks: the state passes through registers.
+    fn blocks_inside(&mut self, pinned: &Pinned) -> Option<()> {
+        let next_step = self.code.mark();
+        self.load_leaves(pinned);
+        let next_block = self.blocks();
+        self.step()?;
+        self.move_on(1);
+        self.end_of_blocks(next_block);
+        self.move_on(-(self.shape.blocks as i32));
+        self.code.add_general(PER_STEP, 8 * self.plan.per_step as i32);
+        self.code.count_down(STEPS, next_step);
+        Some(())
+    }
+
+    fn blocks(&mut self) -> Mark {
+        if self.shape.blocks > 1 {
+            self.code.set_general(BLOCKS, self.shape.blocks as i32);
+        }
+        self.code.align();
+        self.code.mark()
+    }
+
+    fn end_of_blocks(&mut self, next_block: Mark) {
+        if self.shape.blocks > 1 {
+            self.code.count_down(BLOCKS, next_block);
+        }
+    }
+
+    /// To the rows of a block so many further on.
+    fn move_on(&mut self, blocks: i32) {
+        let bytes = (self.shape.width * self.shape.abreast * 8) as i32 * blocks;
+        if self.shape.blocks > 1 {
+            let sources = &self.plan.sources;
+            let reads = |kind: fn(&Source) -> bool| sources.iter().any(kind);
+            let moves: [(General, bool); 3] = [
+                (STATE, true),
+                (ROWS, reads(|source| matches!(source, Source::Row(_)))),
+                (HELD, reads(|source| matches!(source, Source::Held(_)))),
+            ];
+            for (register, is_read) in moves {
+                self.code.add_general(register, if is_read { bytes } else { 0 });
+            }
+        }
+    }
+
+    fn load_leaves(&mut self, pinned: &Pinned) {
+        for &(value, register) in &pinned.leaves {
+            self.load(value, register);
+        }
+    }
+
+    fn step(&mut self) -> Option<()> {
+        for (at, step) in self.plan.steps.iter().enumerate() {
+            for vector in 0..self.shape.abreast {
+                self.now = self.time(at, vector);
+                self.make(step, vector)?;
+            }
+        }
+        Some(())
+    }
+}

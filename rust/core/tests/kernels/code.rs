@@ -1,0 +1,103 @@
+//! Machine code, read back: that it touches nothing but its frame, and does nothing but arithmetic.
+
+use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
+use stepwell_core::kernel::x86::Written;
+
+/// Panics if anything is in the code that should not be.
+pub fn read(kernel: &Written) {
+    let (code, frame, shape) = (kernel.code(), kernel.frame(), kernel.shape());
+    let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);
+    let mut starts = Vec::new();
+    let mut branches = 0;
+    let row = 8 * frame.lanes as u64;
+    let block = 8 * (shape.width * shape.abreast) as u64;
+    let in_rows = |at: u64, size: u64, rows: usize| at / row < rows as u64 && at % row + size <= block;
+    loop {
+        let i = decoder.decode();
+        assert!(!i.is_invalid(), "no instruction at {:#x}", i.ip());
+        starts.push(i.ip());
+        assert!(is_known(i.mnemonic()), "{i}");
+        match i.flow_control() {
+            FlowControl::Next => {}
+            FlowControl::Return => break,
+            FlowControl::ConditionalBranch => {
+                branches += 1;
+                let to = i.near_branch_target();
+                assert!(i.mnemonic() == Mnemonic::Jne && starts.binary_search(&to).is_ok(), "{i} does not go back");
+            }
+            _ => panic!("{i}"),
+        }
+        for register in
+            i.op_kinds().enumerate().filter(|(_, kind)| *kind == OpKind::Register).map(|(n, _)| i.op_register(n as u32))
+        {
+            let general = register.is_gpr();
+            let full = register.full_register();
+            let ours = [
+                Register::RAX,
+                Register::RCX,
+                Register::RDX,
+                Register::RBX,
+                Register::RSI,
+                Register::RDI,
+                Register::R8,
+                Register::R9,
+                Register::R10,
+                Register::R11,
+            ];
+            assert!(!general || ours.contains(&full), "{i}");
+        }
+        moves_on(&i, block, shape.blocks as u64);
+        if i.mnemonic() != Mnemonic::Nop && i.op_kinds().any(|kind| kind == OpKind::Memory) {
+            let (size, at) = (i.memory_size().size() as u64, i.memory_displacement64());
+            let writes = writes(&i);
+            let is_held = i.memory_index() == Register::RAX && i.memory_index_scale() == 8;
+            assert!(is_held || i.memory_index() == Register::None, "{i}");
+            let (inside, may_write) = match (i.memory_base(), is_held) {
+                (Register::RDI, false) => (in_rows(at, size, frame.body.next.len()), true),
+                (Register::RSI, false) => (in_rows(at, size, frame.body.rows), false),
+                (Register::R10, true) => (in_rows(at, size, 1), false),
+                (Register::RDX, false) => (at + size <= 8 * frame.pool as u64, false),
+                (Register::R8, false) => (at + size <= 8 * frame.body.per_step as u64, false),
+                (Register::R9, false) => (at + size <= 8 * frame.scratch as u64, true),
+                (Register::RBX, false) => (at + size <= 64, at == 56 && size == 4),
+                _ => (false, false),
+            };
+            assert!(inside && (!writes || may_write), "{i}: {at:#x} and {size} bytes are outside of {frame:?}, {shape:?}");
+        }
+    }
+    assert!(branches <= 2);
+}
+
+fn writes(i: &Instruction) -> bool {
+    let mut factory = iced_x86::InstructionInfoFactory::new();
+    let info = factory.info(i);
+    let reads = |access: OpAccess| matches!(access, OpAccess::Read | OpAccess::CondRead | OpAccess::None | OpAccess::NoMemAccess);
+    info.used_memory().iter().any(|memory| !reads(memory.access()))
+}
+
+/// What points to rows moves by blocks only.
+fn moves_on(i: &Instruction, block: u64, blocks: u64) {
+    let to = i.op0_register();
+    if i.mnemonic() == Mnemonic::Add {
+        let by = i.immediate(1) as i64;
+        match to {
+            Register::RDI | Register::RSI | Register::R10 => {
+                assert!(by == block as i64 || by == -((block * blocks) as i64), "{i}");
+            }
+            Register::R8 => assert!(by > 0),
+            _ => panic!("{i}"),
+        }
+    }
+}
+
+/// What kernels are made of. What is not here is not exact, or not the same on all machines.
+fn is_known(mnemonic: Mnemonic) -> bool {
+    use Mnemonic::*;
+    #[rustfmt::skip]
+    let known = [
+        Vaddpd, Vaddsd, Vsubpd, Vsubsd, Vmulpd, Vmulsd, Vdivpd, Vdivsd, Vsqrtpd, Vsqrtsd, Vcmppd, Vcmpsd, Vroundpd, Vroundsd,
+        Vrndscalepd, Vrndscalesd, Vandpd, Vandnpd, Vorpd, Vxorpd, Vpaddq, Vpsllq, Vpsrlq, Vblendmpd, Vblendvpd, Vpternlogq, Vpmovm2q,
+        Vmovupd, Vmovapd, Vmovsd, Vbroadcastsd, Mov, Add, Dec, Jne, Push, Pop, Ret, Stmxcsr, Ldmxcsr, Vstmxcsr, Vldmxcsr, Vzeroupper, Nop,
+    ];
+    known.contains(&mnemonic)
+}

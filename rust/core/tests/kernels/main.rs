@@ -1,0 +1,230 @@
+//! Kernels that are written at run time: every bit as the interpreter has it, nothing touched that is not theirs, pages given back.
+#![cfg(target_arch = "x86_64")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
+
+mod code;
+mod process;
+mod random;
+
+use random::Random;
+use stepwell_core::{
+    isa::Level,
+    kernel::{
+        Kernel, Tile,
+        interpret::Interpreter,
+        x86::{Shape, Written, write},
+    },
+    tape::{Op, split::Body},
+};
+
+/// Inputs of a kernel.
+#[derive(Clone)]
+struct Inputs {
+    state: Vec<f64>,
+    rows: Vec<f64>,
+    uniforms: Vec<f64>,
+    per_step: Vec<u64>,
+    held: Vec<f64>,
+    steps: usize,
+}
+
+impl Inputs {
+    fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs {
+        let mut numbers = |n: usize| (0..n).map(|_| random.number()).collect::<Vec<f64>>();
+        let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
+        let held = numbers(3 * lanes + 5);
+        let mut per_step: Vec<u64> = numbers(body.per_step * steps).into_iter().map(f64::to_bits).collect();
+        for op in &body.ops {
+            if let Op::Held(i) = *op {
+                per_step
+                    .iter_mut()
+                    .skip(i as usize)
+                    .step_by(body.per_step)
+                    .for_each(|at| *at = random.below(2 * lanes + 6) as u64);
+            }
+        }
+        Inputs { state, rows, uniforms, per_step, held, steps }
+    }
+
+    fn run(&self, kernel: &dyn Kernel, scratch: &mut Vec<f64>) -> Vec<f64> {
+        let mut state = self.state.clone();
+        let pool = kernel.pool(&self.uniforms);
+        kernel.run(
+            &mut Tile {
+                state: &mut state,
+                rows: &self.rows,
+                pool: &pool,
+                steps: self.steps,
+                per_step: &self.per_step,
+                held: &self.held,
+            },
+            scratch,
+        );
+        state
+    }
+}
+
+fn widths() -> Vec<(Level, usize)> {
+    let all = [(Level::Avx2, 1), (Level::Avx2, 4), (Level::Avx512, 1), (Level::Avx512, 4), (Level::Avx512, 8)];
+    all.into_iter().filter(|(level, _)| level.here()).collect()
+}
+
+fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
+    let abreast = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
+    let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
+    Shape { level, width, abreast, blocks, resident: random.once_in(2) }
+}
+
+/// The same bits, or both NaN.
+fn same(a: f64, b: f64) -> bool {
+    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+}
+
+/// A random body in a random shape: how many inputs it was held against the interpreter with.
+fn one_case(seed: u64, read_code: bool) -> usize {
+    let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95));
+    let operations = match random.below(8) {
+        0 => 3 + random.below(6),
+        7 => 200 + random.below(300),
+        _ => 8 + random.below(80),
+    };
+    let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
+    let body = random::body(random, operations, states);
+    let (level, width) = random.one_of(&widths());
+    let shape = shape(random, level, width);
+    let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
+    if read_code {
+        code::read(&kernel);
+    }
+    let lanes = shape.lanes();
+    let oracle = Interpreter::new(&body, lanes, Level::Baseline);
+    let mut scratch = Vec::new();
+    for steps in [0, 1, 2, 7] {
+        let inputs = Inputs::new(random, &body, lanes, steps);
+        let (want, got) = (inputs.run(&oracle, &mut Vec::new()), inputs.run(&kernel, &mut scratch));
+        for (at, (want, got)) in want.iter().zip(&got).enumerate() {
+            let (s, lane) = (at / lanes, at % lanes);
+            assert!(same(*want, *got), "seed {seed}, {shape:?}, {steps} steps: state {s}, lane {lane} is {got:?}, not {want:?}");
+        }
+    }
+    4 * lanes
+}
+
+/// `STEPWELL_FUZZ` says with how many inputs, all in all.
+#[test]
+fn random_bodies_have_the_bits_of_the_interpreter() {
+    let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse().ok());
+    let (mut seen, mut seed) = (0, 0);
+    while seen < wanted.unwrap_or(400_000) {
+        seen += one_case(seed, seed % 4 == 0);
+        seed += 1;
+    }
+    println!("{seed} bodies, {seen} pairs of a body and an input");
+}
+
+fn oscillator() -> Body {
+    // v' = v − φy, y' = y + φv'
+    let ops = vec![Op::State(0), Op::State(1), Op::Row(0), Op::Mul(1, 2), Op::Sub(0, 3), Op::Mul(2, 4), Op::Add(1, 5)];
+    Body { ops, next: vec![4, 6], rows: 1, uniforms: 0, per_step: 0 }
+}
+
+fn written(body: &Body) -> Written {
+    let (level, width) = *widths().last().expect("AVX2");
+    write(body, Shape { level, width, abreast: 2, blocks: 3, resident: true }).expect("a kernel")
+}
+
+#[test]
+fn states_that_change_places_do() {
+    let body = Body { ops: vec![Op::State(0), Op::State(1), Op::Copy(1), Op::Copy(0)], next: vec![2, 3], ..Body::default() };
+    for (level, width) in widths() {
+        for resident in [false, true] {
+            let shape = Shape { level, width, abreast: 2, blocks: 2, resident };
+            let inputs = Inputs::new(&mut Random(7), &body, shape.lanes(), 3);
+            let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
+            let lanes = shape.lanes();
+            assert!(got[..lanes].iter().zip(&inputs.state[lanes..]).all(|(a, b)| same(*a, *b)));
+            assert!(got[lanes..].iter().zip(&inputs.state[..lanes]).all(|(a, b)| same(*a, *b)));
+        }
+    }
+}
+
+#[test]
+fn what_is_no_body_is_not_written() {
+    let (level, width) = *widths().last().expect("AVX2");
+    let shape = Shape { level, width, abreast: 1, blocks: 1, resident: true };
+    let good = oscillator();
+    assert!(write(&good, shape).is_some());
+    let bad = [
+        Body { rows: 0, ..good.clone() },
+        Body { next: vec![4, 4], ..good.clone() },
+        Body { next: vec![4, 0], ..good.clone() },
+        Body { next: vec![4, 7], ..good.clone() },
+        Body { next: vec![4, 6, 2], ..good.clone() },
+        Body { ops: vec![Op::State(0), Op::State(1), Op::Neg(3), Op::Neg(2), Op::Time, Op::Step, Op::Neg(0)], ..good.clone() },
+        Body { ops: vec![Op::ShiftUp(0, 64)], next: vec![0], ..Body::default() },
+        Body { ops: vec![Op::State(0), Op::ShiftUp(0, 64)], next: vec![1], ..Body::default() },
+    ];
+    assert!(bad.iter().all(|body| write(body, shape).is_none()));
+    for wrong in [
+        Shape { abreast: 0, ..shape },
+        Shape { blocks: 0, ..shape },
+        Shape { width: 2, ..shape },
+        Shape { level: Level::Baseline, ..shape },
+        Shape { blocks: usize::MAX / 2, ..shape },
+        Shape { blocks: 1 << 26, ..shape },
+    ] {
+        assert!(write(&good, wrong).is_none(), "{wrong:?}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "rows")]
+fn a_tile_that_is_too_small_is_refused() {
+    let kernel = written(&oscillator());
+    let mut inputs = Inputs::new(&mut Random(1), &oscillator(), kernel.lanes(), 1);
+    inputs.rows.pop();
+    inputs.run(&kernel, &mut Vec::new());
+}
+
+#[test]
+fn four_threads_run_one_kernel() {
+    let kernel = written(&oscillator());
+    let inputs = Inputs::new(&mut Random(3), &oscillator(), kernel.lanes(), 1000);
+    let want = inputs.run(&kernel, &mut Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                for _ in 0..50 {
+                    let got = inputs.run(&kernel, &mut Vec::new());
+                    assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn long_rows_are_gone_through_once() {
+    // One step over 100 000 numbers, as elementwise functions are.
+    let (level, width) = *widths().last().expect("AVX2");
+    let body = oscillator();
+    let shape = Shape { level, width, abreast: 1, blocks: 100_000 / width, resident: false };
+    let inputs = Inputs::new(&mut Random(9), &body, shape.lanes(), 2);
+    let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
+    let want = inputs.run(&Interpreter::new(&body, shape.lanes(), level), &mut Vec::new());
+    assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
+}
+
+/// Upwards, and small numbers are taken for zero, as operands and as results.
+const OTHER_ROUNDING: u32 = 0x4000 | 0x40 | 0x8000;
+
+/// A caller that rounds otherwise gets the same bits, and goes on rounding as it did.
+#[test]
+fn rounding_is_to_nearest_whatever_the_caller_does() {
+    let kernel = written(&oscillator());
+    let inputs = Inputs::new(&mut Random(5), &oscillator(), kernel.lanes(), 50);
+    let want = inputs.run(&kernel, &mut Vec::new());
+    let (got, after) = process::with_other_rounding(|| inputs.run(&kernel, &mut Vec::new()));
+    assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
+    assert_eq!(after & OTHER_ROUNDING, OTHER_ROUNDING);
+}
