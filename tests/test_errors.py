@@ -388,51 +388,38 @@ def test_one_tree() -> None:
 
 def test_the_core_refuses_too() -> None:
     """Python checks first; whoever uses the core directly still gets an error and no panic."""
-    from stepwell import _core
+    from stepwell import _core, engine
 
-    def core(
-        system: str = "oscillator", options: Any = ("canonical",), method: str = "rk4", sizes: Any = (), **arrays: Any
-    ) -> None:
-        row = arrays.pop("row", np.ones((1, 1)))
-        model = _core.ModelSpec(system, list(options), list(sizes), [row], [], method)
-        given = {
-            "v": np.zeros((1, 4)),
-            "y": np.zeros((1, 1)),
-            "saved_v": np.zeros((1, 1, 4)),
-            "saved_y": np.zeros((1, 1, 4)),
-            "recorded": np.zeros(0),
-            "tally": np.zeros(0),
-            "carry": np.zeros(0),
-        }
-        clock = {
-            "t0": 0.0,
-            "dt": 0.1,
-            "start": 0,
-            "first": 0,
-            "steps": 1,
-            "every": None,
-            "threads": 1,
-            "carried": False,
-        }
-        _core.run(model, **clock, **(given | arrays), first_bad=np.full(4, -1), progress=None)  # type: ignore[arg-type]
+    one, system = np.ones((1, 1)), sw.Oscillator()
+    free: dict[str, Any] = {"form": "canonical", "omega": one}
+
+    def core(kernel: str = "oscillator", method: str = "rk4", given: dict[str, Any] = free, **arrays: Any) -> None:
+        model = _core.ModelSpec(kernel, method, list(given.items()))
+        plan = engine.Plan(system, sw.method("rk4"), (4,), 0.1, threads=1)
+        blocks: dict[str, Any] = {"v": np.zeros((1, 4)), "y": np.zeros((1, 1))}
+        blocks |= {"saved_v": np.zeros((1, 1, 4)), "saved_y": np.zeros((1, 1, 4)), "first_bad": np.full(4, -1)}
+        none = {name: np.zeros(0) for name in ("recorded", "tally", "carry")}
+        _core.run(model, plan, engine.Arrays(carried=False, **(blocks | none | arrays)))
 
     core()
+    linear: dict[str, Any] = {"kernel": "linear", "given": {"kind": "", "n_v": 1, "rows": np.ones((4, 1)), "inputs": 0}}
     for options, text in (
-        ({"system": "oscilator"}, 'there is no system "oscilator"'),
+        ({"kernel": "oscilator"}, 'there is no system "oscilator"'),
         ({"method": "rk5"}, 'there is no method "rk5"'),
-        ({"options": ["canonical", "physical"]}, "has no kernel for the options"),
+        ({"given": free | {"form": "round"}}, "has no kernel for the options"),
         (
-            {"options": ["canonical", "damped"], "method": "verlet"},
-            "verlet needs forces that do not depend on the velocity",
+            {"given": free | {"damping": one}, "method": "verlet"},
+            "verlet needs forces that do not depend on the velocity, but oscillator has damping",
         ),
-        ({"system": "chain", "options": [], "sizes": [0]}, "has no kernel for the options"),
-        ({"system": "chain", "options": []}, "has no kernel for the options"),
-        ({"system": "linear", "options": [], "sizes": [0, 0]}, "has no kernel for the options"),
-        ({"system": "linear", "options": ["noise"], "sizes": [0, 1]}, "has no kernel for the options"),
-        ({"system": "linear", "options": ["held"], "sizes": [0, 1]}, "has no kernel for the options"),
-        ({"system": "linear", "options": [], "sizes": [1, 1]}, "parameters: expected 4, got 1"),
+        ({"given": {"form": "canonical"}}, "omega: expected 1, got 0"),
+        ({"given": free | {"omega": np.ones((2, 1))}}, "omega: expected 1, got 2"),
+        ({"given": free | {"control": "energy"}}, "has no kernel for the options"),
+        ({"kernel": "chain", "given": {"stiffness": one, "mass": one}}, "stiffness: expected 2, got 1"),
+        (linear | {"given": linear["given"] | {"kind": "noise"}}, "has no kernel for the options"),
+        (linear | {"given": linear["given"] | {"rows": one}}, "rows: expected 4, got 1"),
+        (linear | {"given": linear["given"] | {"inputs": 1}}, "inputs: expected 1, got 0"),
         (
-            {"system": "linear", "options": [], "sizes": [0, 1], "method": "verlet"},
+            linear | {"method": "verlet"},
             "verlet needs forces that do not depend on the velocity, but linear has rates of another kind",
         ),
         ({"v": np.zeros((2, 4))}, "v: expected 1, got 2"),
@@ -441,7 +428,7 @@ def test_the_core_refuses_too() -> None:
         ({"saved_y": np.zeros((3, 1, 4))}, "saved_y: expected 4, got 12"),
         ({"recorded": np.zeros((1, 1, 4))}, "recorded: expected 0, got 4"),
         ({"tally": np.zeros(3)}, "tally: expected 4, got 3"),
-        ({"row": np.ones((1, 3))}, "a parameter: expected 4, got 3"),
+        ({"given": free | {"omega": np.ones((1, 3))}}, "a parameter: expected 4, got 3"),
     ):
         with pytest.raises(ValueError, match=re.escape(text)):
-            core(**options)  # type: ignore[arg-type]
+            core(**options)

@@ -27,7 +27,7 @@ class ModelSpec:
     ``control.target``).
 
     ``matrix`` is the nodes and the number of rows in the v slot, for the transition-matrix form of the system "matrix": ``n`` and
-    ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (a column of n rows for each node and, within it, each input), ``inputs``.
+    ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
     """
 
     def __new__(

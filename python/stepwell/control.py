@@ -76,9 +76,9 @@ class EnergyControl:
             )
         return aimed
 
-    def around(self, s: Any, h: float) -> reference.EnergyControl:
+    def around(self, s: Any, h: float) -> reference.Controlled:
         """The NumPy reference, round that of a system, both scaled to the step h."""
-        return reference.EnergyControl(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
+        return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
         """What describes it to the core, beside what describes the system."""
@@ -128,9 +128,9 @@ class Projection:
             aimed.target = np.asarray(energy)
         return aimed
 
-    def around(self, s: Any, h: float) -> reference.Projection:
+    def around(self, s: Any, h: float) -> reference.Projected:
         """The NumPy reference, round that of a system, both scaled to the step h."""
-        return reference.Projection(s, h, self.way, np.asarray(self.target))
+        return reference.Projected(s, h, self.way, np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
         """What describes it to the core, beside what describes the system."""

@@ -74,8 +74,8 @@ def integrate(
         at: with a tolerance, the times at which to keep the state, ascending, from t0 on. They are reached exactly.
         max_steps: with a tolerance, the most steps of a member, rejected ones counted.
         every: keep the state every so many steps, with the first and the last; None keeps the last alone.
-        record: quantities to record of every kept state, ``run.recorded``: "energy", and for ``NBody`` also "momentum",
-            "angular_momentum" and "closest". Bodies find them beside the force of the next step, at little cost.
+        record: quantities to record of every kept state, ``run.recorded``: "energy", and what else the system names in its
+            ``quantities``. Bodies find their energy beside the force of the next step, at little cost.
         t0: time of step 0. Step k is at t0 + k·dt, computed so and never accumulated.
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how a method with a choice starts; see ``method(…).starts``.

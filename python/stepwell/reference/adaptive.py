@@ -31,8 +31,8 @@ class Pair(Protocol):
     WEIGHTS: Weights
     ERROR: Weights
 
-    def stages(self, s: Scaled, t: float, h: float, v: Array, y: Array, /) -> Increments:
-        """The increments of all stages."""
+    def stages(self, s: Any, t: Any, h: Any, v: Array, y: Array, /) -> Increments:
+        """The increments of all stages; time and step are each member's own."""
 
 
 class Pace(NamedTuple):
@@ -200,7 +200,7 @@ def over(error: Blocks, tolerated: Sequence[Array], block_axes: tuple[int, int])
 def length2(block: Array, axes: int) -> Array:
     """The square of a block's length, number after number."""
     block = np.asarray(block)
-    total: Any = np.zeros(block.shape[axes:])
+    total: Array = np.zeros(block.shape[axes:])
     for number in block.reshape((-1, *block.shape[axes:])):
         total = total + number * number
     return total

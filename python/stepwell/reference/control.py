@@ -21,7 +21,7 @@ class Conserving(Scaled, Protocol):
         """h·v̇, h times the kinetic energy, and h times the whole energy."""
 
     def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
-        """The gradient of the energy in v, that in y with its sign turned, and the square of its length; dv is h·v̇."""
+        """The gradient of the energy in v and in y, and the square of its length; dv is h·v̇."""
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state."""
@@ -57,7 +57,7 @@ class Kept:
         return self.s.record(name, v, y)
 
 
-class EnergyControl(Kept):
+class Controlled(Kept):
     """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ½ … 2."""
 
     def __init__(self, s: Conserving, h: float, form: str, gain: Array, target: Array) -> None:
@@ -82,7 +82,7 @@ class EnergyControl(Kept):
         return np.asarray(1.0 - np.sqrt(bits.held(square, LEAST, MOST)))
 
 
-class Projection(Kept):
+class Projected(Kept):
     """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient."""
 
     def __init__(self, s: Conserving, h: float, way: str, target: Array) -> None:
@@ -100,4 +100,4 @@ class Projection(Kept):
         along_v, along_y, square = self.s.gradient(v, y, dv)  # Nacozy
         step = (off / self.h) / square
         self.work = self.work - off
-        return v - step * along_v, y + step * along_y
+        return v - step * along_v, y - step * along_y

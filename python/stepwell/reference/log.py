@@ -1,4 +1,4 @@
-"""Natural logarithm, the same to the last bit as the core's: see ``log.rs`` for its error.
+"""Natural logarithm, the same to the last bit as the core's: see ``functions.rs`` for its error.
 
 Stability analysis has logarithms of numbers that the core never sees, as it has sines of them: see ``trig``.
 """

@@ -1,4 +1,4 @@
-"""Sine, the same to the last bit as the core's: see ``trig.rs`` for its error. The core needs no cosine.
+"""Sine, the same to the last bit as the core's: see ``functions.rs`` for its error. The core needs no cosine.
 
 Stability analysis steps the reference on numbers that the core never sees, and these have a sine here as well: complex ones whose
 imaginary part is infinitesimal, and ones that count what is done to them.

@@ -194,4 +194,4 @@ def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
 
 def aligned(values: Array, own: int, batch: Shape) -> Array:
     """Numbers with so many axes of their own first, and then as many axes as the batch has."""
-    return values.reshape(*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:])
+    return values.reshape((*values.shape[:own], *(1,) * (len(batch) - values.ndim + own), *values.shape[own:]))

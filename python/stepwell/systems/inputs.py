@@ -81,7 +81,7 @@ class Sampled:
 
     def signal(self) -> Constant | Held:
         """The reference signal."""
-        return Constant(self.values[0]) if len(self.values) == 1 else Held(self.values, self.interval, self.start)
+        return Constant(np.asarray(self.values[0])) if len(self.values) == 1 else Held(self.values, self.interval, self.start)
 
 
 Input = Sinusoid | Sampled

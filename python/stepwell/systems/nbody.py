@@ -128,7 +128,7 @@ class NBody(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """What can be recorded: energy, momentum, angular momentum (about the origin), and the least distance of two bodies."""
+        """What can be recorded, with the shape of each; what they are stands in the reference."""
         return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
 
     def energy(self, v: Array, y: Array) -> Array:

@@ -124,9 +124,9 @@ class NBody:
         return dv, kinetic, kinetic + total(self.masses * potential)
 
     def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
-        """The gradient of the energy, m·v in the velocities and −m·a in the coordinates (its sign turned), and its square."""
+        """The gradient of the energy, m·v in the velocities and −m·a in the coordinates, and the square of its length."""
         masses = self.masses[:, np.newaxis]
-        along_v, along_y = masses * v, masses * (dv / self.h)
+        along_v, along_y = masses * v, -(masses * (dv / self.h))
         return along_v, along_y, total(square(along_v) + square(along_y))
 
     def record(self, name: str, v: Array, y: Array) -> Array:

@@ -1,0 +1,181 @@
+"""The reference runs over symbols: whatever a step executes can be written on a tape, and the tape computes the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from stepwell.reference import adaptive
+from stepwell.systems.base import flat
+from symbols import Symbol, Tape, evaluate
+from tracing import Tracer
+
+METHODS = sw.methods()
+ABLE = [m for m in METHODS if m.error_order is not None]
+MEMBERS, T, H = 3, 0.37, 0.1
+
+CONTROLS: dict[str, Any] = {
+    "limited": sw.EnergyControl(0.7, target=-0.3),
+    "printed": sw.EnergyControl(0.3, "printed", target=-0.3),
+    "scaling": sw.Projection("scaling", target=-0.3),
+    "nacozy": sw.Projection("nacozy", target=-0.3),
+}
+
+
+def made(name: str) -> tuple[sw.System, Any, Any]:
+    """A system of some members, and a state."""
+    rng = np.random.default_rng(7)
+    system = SYSTEMS[name](rng, MEMBERS)
+    v, y = (0.5 * rng.normal(size=(*shape, MEMBERS)) for shape in (system.v_shape, system.y_shape))
+    system.batch = (MEMBERS,)
+    return system, v, y
+
+
+def fits(system: sw.System, method: sw.Method) -> bool:
+    return not method.needs_acceleration or (system.second_order and system.velocity_term is None)
+
+
+def numbers(system: sw.System, tape: Tape, symbols: list[Symbol], *state: Any, h: float = H, budget: float = 0.0) -> list[Any]:
+    """What the tape computes."""
+    rows, tables = [], []
+    for _, value in system.parameters(system.batch):
+        if isinstance(value, tuple):
+            tables.append(value)
+        elif isinstance(value, np.ndarray):
+            rows += list(value)
+    leaves = {("param", i): row for i, row in enumerate(rows)}
+    flat_state = [row for block in state for row in np.asarray(block).reshape(-1, MEMBERS)]
+    leaves |= {("state", i): row for i, row in enumerate(flat_state)}
+    leaves |= {("step",): h, ("time",): T, ("budget",): budget}
+
+    def sample(table: int, t: Any) -> Any:
+        start, interval, samples = tables[table]
+        return sw.reference.signal.Held(samples, interval, start).sample(np.broadcast_to(t, MEMBERS))
+
+    return [np.broadcast_to(value, MEMBERS) for value in evaluate(tape, symbols, leaves, sample)]
+
+
+def assert_computes(found: list[Any], *expected: Any) -> None:
+    """To the bit, NaN but for its payload."""
+    wanted = [row for each in expected for row in np.broadcast_to(each, np.shape(each) or MEMBERS).reshape(-1, MEMBERS)]
+    assert len(found) == len(wanted)
+    for ours, theirs in zip(found, wanted, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_array_equal(np.signbit(ours), np.signbit(theirs))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_every_method_on_every_system(name: str) -> None:
+    system, v, y = made(name)
+    large = v.size + y.size > 150 * MEMBERS
+    for method in METHODS[:3] if large else METHODS:
+        if fits(system, method):
+            tape = Tape()
+            symbols = Tracer(system, tape).step(method)
+            expected = method.steps.step(system.scaled(H, system.batch), T, H, v, y)
+            assert_computes(numbers(system, tape, symbols, v, y), *expected)
+
+
+@pytest.mark.parametrize("name", ["free", "sinusoid x", "sampled x and a, physical", "three bodies, newton", "linear, masses"])
+def test_what_a_method_carries(name: str) -> None:
+    system, v, y = made(name)
+    for method in METHODS:
+        if method.carry is None or not fits(system, method):
+            continue
+        for choice in range(max(1, len(method.starts))):
+            for which in ("start", "finish"):
+                tape = Tape()
+                symbols = Tracer(system, tape).slot(method, which, choice)
+                s = system.scaled(H, system.batch)
+                assert_computes(numbers(system, tape, symbols, v, y), getattr(method.steps, which)(s, choice, T, v, y), y)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", ["three bodies", "three bodies in space, newton", "two bodies"])
+def test_every_control_with_every_method(name: str, control: str) -> None:
+    system, v, y = made(name)
+    system = system.controlled(CONTROLS[control], v, y, H)
+    for method in METHODS:
+        if fits(system, method):
+            tape = Tape()
+            symbols = Tracer(system, tape).step(method)
+            s = system.scaled(H, system.batch)
+            before = s.work = np.linspace(-1.0, 1.0, MEMBERS)
+            after = s.settle(*method.steps.step(s, T, H, v, y))
+            assert_computes(numbers(system, tape, symbols, v, y, before), *after, s.work)
+
+
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if not name.startswith("thirty-five")])
+def test_every_quantity(name: str) -> None:
+    system, v, y = made(name)
+    for quantity, shape in system.quantities.items():
+        tape = Tape()
+        symbols = Tracer(system, tape).record([quantity])
+        expected = system.scaled(H, system.batch).record(quantity, v, y)
+        assert np.shape(expected) == (*shape, MEMBERS)
+        assert_computes(numbers(system, tape, symbols, v, y), expected)
+
+
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if not name.startswith("thirty-five")])
+def test_every_attempt(name: str) -> None:
+    """Steps that are accepted, rejected, cut at the target, and none at all."""
+    system, v, y = made(name)
+    row: Callable[..., Any] = lambda *values: np.array(values)  # noqa: E731
+    pace = adaptive.Pace(
+        t=row(T, T, T),
+        h=row(0.3, 1e-3, 0.3),
+        target=row(0.4, 2.0, T),
+        relative=row(1e-3, 1e-2, 1e-3),
+        absolute=row(1e-9, 1e-2, 1e-3),
+        before=row(0.9, 0.6, 1.0),
+        most=row(5.0, 1.0, 5.0),
+        accepted=row(0.0, 3.0, 7.0),
+        rejected=row(1.0, 0.0, 2.0),
+        error=row(0.0, 2.0, 0.5),
+    )
+    axes = len(system.v_shape), len(system.y_shape)
+    for method in ABLE:
+        tape = Tape()
+        symbols = Tracer(system, tape).attempt(method)
+        s, steps = system.scaled(1.0, system.batch), method.steps
+        with np.errstate(all="ignore"):
+            after, v1, y1 = adaptive.attempt(steps, s, method.error_order, axes, pace, 9.0, v, y)  # type: ignore[arg-type]
+        assert_computes(numbers(system, tape, symbols, v, y, *pace, budget=9.0), v1, y1, *after)
+
+
+def test_the_matrix_form() -> None:
+    system, _, _ = made("linear, five states, two inputs")
+    rng = np.random.default_rng(2)
+    nodes, inputs = [0.0, 0.5, 1.0], system.given(system.batch)["inputs"]
+    tape = Tape()
+    symbols = Tracer(system, tape).matrix(nodes, 5, inputs)
+    p, q, s = rng.normal(size=(5, 5, MEMBERS)), rng.normal(size=(3, 2, 5, MEMBERS)), rng.normal(size=(5, MEMBERS))
+    expected = sw.reference.run.linear_step(p, q.reshape(6, 5, MEMBERS), inputs, nodes, H)(T, s)
+
+    class Matrix:
+        batch = system.batch
+
+        @staticmethod
+        def parameters(batch: tuple[int, ...]) -> Any:
+            return flat({"p": p, "q": q, "inputs": inputs}, batch)
+
+    assert_computes(numbers(Matrix, tape, symbols, s), expected)  # type: ignore[arg-type]
+
+
+def test_a_symbol_has_no_truth_value() -> None:
+    symbol = Tape().state(0)
+    for wrong in (lambda: bool(symbol < 1.0), lambda: 1.0 if symbol else 0.0, lambda: symbol == symbol, lambda: float(symbol)):
+        with pytest.raises(TypeError, match="no truth value"):
+            wrong()
+
+
+def test_equal_operations_are_written_once() -> None:
+    tape = Tape()
+    a, b = tape.state(0), tape.state(1)
+    assert (a + b).id == (a + b).id
+    assert (a + b).id != (b + a).id
+    assert (0.0 * a).id != (-0.0 * a).id

@@ -1,0 +1,123 @@
+"""The NumPy reference, run with symbols in place of numbers: its tape.
+
+Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step``, ``time``, ``budget`` and ``sample``.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from itertools import count
+from math import prod
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+from stepwell.reference import adaptive
+from stepwell.reference.run import linear_step
+from stepwell.reference.signal import Constant, Held, Sine
+
+
+def _array(shape: tuple[int, ...], symbols: Any) -> Any:
+    """An array of the next symbols."""
+    array = np.empty(shape, dtype=object)
+    for index in np.ndindex(shape):
+        array[index] = next(symbols)
+    return array
+
+
+class Sampled(Held):
+    """A sampled input whose samples are the tape's."""
+
+    def __init__(self, tape: Any, table: int) -> None:
+        self.tape, self.table = tape, table
+
+    def sample(self, t: Any) -> Any:
+        """The sample that holds at time t."""
+        return self.tape.sample(self.table, np.asarray(t)[()])
+
+
+class Tracer:
+    """A system of symbols, for one member, and what can be traced of it."""
+
+    def __init__(self, system: sw.System, tape: Any) -> None:
+        self.system, self.tape = system, tape
+        self._params, self._tables = map(tape.param, count()), count()
+
+    def state(self) -> tuple[Any, Any, Any]:
+        """Both blocks, and the symbols of the state that come after them."""
+        symbols = map(self.tape.state, count())
+        return _array(self.system.v_shape, symbols), _array(self.system.y_shape, symbols), symbols
+
+    def symbols(self, value: Any, batch: tuple[int, ...]) -> Any:
+        """What is given, with symbols for its numbers."""
+        match value:
+            case list():
+                return [self.symbols(each, batch) for each in value]
+            case Constant():
+                return Constant(self.symbols(value.value, batch))
+            case Sine():
+                return Sine(*(self.symbols(each, batch) for each in (value.amplitude, value.omega, value.phase)))
+            case Held():
+                return Sampled(self.tape, next(self._tables))
+            case np.ndarray():
+                return _array(value.shape[: max(0, value.ndim - len(batch))], self._params)
+            case _:
+                return value
+
+    def scaled(self, h: Any) -> Any:
+        """The system under its control, scaled to the step h."""
+        batch = self.system.batch
+        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
+        s = self.system.reference(h, **given)
+        if self.system.control is None:
+            return s
+        control: Any = copy.copy(self.system.control)
+        for name, value in control.given().items():
+            if isinstance(value, np.ndarray):
+                setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
+        return control.around(s, h)
+
+    def step(self, method: sw.Method) -> list[Any]:
+        """The state after a step, and what a control has added up by then."""
+        h = self.tape.step()
+        s, (v, y, more) = self.scaled(h), self.state()
+        if hasattr(s, "work"):
+            s.work = next(more)
+        v, y = method.steps.step(s, self.tape.time(), h, v, y)
+        if hasattr(s, "settle"):
+            v, y = s.settle(v, y)
+        return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
+
+    def slot(self, method: sw.Method, which: str, choice: int) -> list[Any]:
+        """The state after a method's ``start`` or ``finish``."""
+        s, (v, y, _) = self.scaled(self.tape.step()), self.state()
+        return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
+
+    def attempt(self, method: sw.Method) -> list[Any]:
+        """The state and the pace after an attempt at a step of chosen length."""
+        s, (v, y, more) = self.scaled(1.0), self.state()
+        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        axes = len(self.system.v_shape), len(self.system.y_shape)
+        steps: Any = method.steps
+        assert method.error_order is not None
+        following, v, y = adaptive.attempt(steps, s, method.error_order, axes, pace, self.tape.budget(), v, y)
+        return self.flat(v, y, *following)
+
+    def record(self, names: Sequence[str]) -> list[Any]:
+        """Quantities of a state."""
+        s, (v, y, _) = self.scaled(self.tape.step()), self.state()
+        return self.flat(*(s.record(name, v, y) for name in names))
+
+    def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any]) -> list[Any]:
+        """The state after a step in transition-matrix form, with these inputs."""
+        p, q = (_array(shape, self._params) for shape in ((n, n), (len(nodes), len(inputs), n)))
+        inputs = self.symbols(inputs, self.system.batch)
+        s = _array((n,), map(self.tape.state, count()))
+        step = linear_step(p, q.reshape(prod(q.shape[:2]), n), inputs, nodes, self.tape.step())
+        return self.flat(step(self.tape.time(), s))
+
+    def flat(self, *blocks: Any) -> list[Any]:
+        """The symbols of blocks, one after the other; what is known beforehand is one as well."""
+        numbers = [number for block in blocks for number in np.asarray(block, dtype=object).reshape(-1).tolist()]
+        return [self.tape.number(number) if isinstance(number, float) else number for number in numbers]
