@@ -99,6 +99,8 @@ pub struct Kind {
     pub velocity_term: fn(&Given) -> Option<&'static str>,
     /// Quantities that can be recorded, and how many numbers each has. The `energy` is among them if it can be controlled.
     pub quantities: fn(&Given) -> Vec<(&'static str, usize)>,
+    /// About how many operations an evaluation of both rates takes: of many, a step becomes no tape.
+    pub operations: fn(&Given) -> usize,
     /// The system over numbers, for tests.
     pub numbers: Make<f64>,
     /// The system over symbols.

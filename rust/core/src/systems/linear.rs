@@ -17,6 +17,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |given| (given.word("kind") != "acceleration").then_some("rates of another kind"),
     quantities: |_| Vec::new(),
+    operations: |given| 2 * given.count("rows"),
     numbers: make,
     symbols: make,
 };

@@ -19,6 +19,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |given| given.has("damping").then_some("damping"),
     quantities: |_| Vec::new(),
+    operations: |_| 40,
     numbers: make,
     symbols: make,
 };

@@ -16,6 +16,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |_| Some("the Coriolis force"),
     quantities: |_| Vec::new(),
+    operations: |_| 40,
     numbers: make,
     symbols: make,
 };
