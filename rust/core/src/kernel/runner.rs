@@ -28,8 +28,11 @@ impl Width {
     pub const ALL: [Width; 3] = [Width::Wide, Width::Few, Width::One];
 }
 
-/// Steps times lanes that are interpreted before machine code is written: writing takes about as long as interpreting so many.
-const INTERPRETED: u64 = 2000;
+/// What is interpreted before machine code is written, in operations over one lane for each operation of the body: writing an
+/// operation takes about as long as interpreting it so often.
+const INTERPRETED: u64 = 4000;
+/// What the interpreter pays to begin an operation over a row of lanes, in lanes.
+const TO_BEGIN: usize = 10;
 
 /// Lanes that the interpreter takes at once where nothing else sets their number: the values of a step stay in the first cache.
 const INTERPRETED_LANES: [usize; 3] = [64, 8, 1];
@@ -45,7 +48,7 @@ pub struct Runner {
     /// How it would be written; none where no machine code can be.
     shape: Option<Shape>,
     written: OnceLock<Option<Box<dyn Kernel>>>,
-    /// Steps times lanes that were made so far.
+    /// What was done so far, as [`INTERPRETED`] counts it.
     done: AtomicU64,
 }
 
@@ -84,7 +87,7 @@ impl Runner {
 
     /// What makes so many more steps, and whether that is machine code.
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
-        let coming = (steps * self.lanes) as u64;
+        let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
         if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED && self.written.get().is_none() {
             return (&self.interpreter, false);
         }
