@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use pyo3::{
     exceptions::{PyIndexError, PyTypeError, PyValueError},
     prelude::*,
+    pyclass::CompareOp,
 };
 use stepwell_core::{
     tape::{self, Id, Op, print},
@@ -38,6 +39,10 @@ pub struct Symbol {
 enum Value<'py> {
     Symbol(PyRef<'py, Symbol>),
     Number(f64),
+}
+
+fn no_truth() -> PyErr {
+    PyTypeError::new_err("a symbol has no truth value and is no number yet: choose between two values instead of branching")
 }
 
 impl Symbol {
@@ -114,13 +119,15 @@ impl Symbol {
     fn floor(&self) -> Symbol {
         self.on(Op::Floor)
     }
-    /// x < y
-    fn below(&self, other: Value) -> PyResult<Symbol> {
-        self.with(&other, Op::Less)
-    }
-    /// x ≤ y
-    fn at_most(&self, other: Value) -> PyResult<Symbol> {
-        self.with(&other, Op::LessEqual)
+    /// Comparisons are values; what is equal is asked for by `equals`, since == is asked for a truth.
+    fn __richcmp__(&self, other: Value, op: CompareOp) -> PyResult<Symbol> {
+        match op {
+            CompareOp::Lt => self.with(&other, Op::Less),
+            CompareOp::Le => self.with(&other, Op::LessEqual),
+            CompareOp::Gt => self.with(&other, |a, b| Op::Less(b, a)),
+            CompareOp::Ge => self.with(&other, |a, b| Op::LessEqual(b, a)),
+            CompareOp::Eq | CompareOp::Ne => Err(no_truth()),
+        }
     }
     /// x = y
     fn equals(&self, other: Value) -> PyResult<Symbol> {
@@ -156,10 +163,10 @@ impl Symbol {
         self.on(|id| Op::ShiftDown(id, places & 63))
     }
     fn __bool__(&self) -> PyResult<bool> {
-        Err(PyTypeError::new_err("a symbol has no truth value: choose between two values instead of branching"))
+        Err(no_truth())
     }
     fn __float__(&self) -> PyResult<f64> {
-        Err(PyTypeError::new_err("a symbol is not known as a number yet"))
+        Err(no_truth())
     }
     fn __repr__(&self) -> String {
         print::line(self.id, lock(&self.tape).op(self.id))
@@ -179,7 +186,7 @@ impl Tape {
     }
 
     /// A row of parameters.
-    fn parameter(&self, i: u32) -> Symbol {
+    fn param(&self, i: u32) -> Symbol {
         self.leaf(Op::Param(i))
     }
 
@@ -199,7 +206,7 @@ impl Tape {
     }
 
     /// A number.
-    fn constant(&self, x: f64) -> Symbol {
+    fn number(&self, x: f64) -> Symbol {
         self.leaf(Op::Const(x.to_bits()))
     }
 

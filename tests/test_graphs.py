@@ -1,0 +1,105 @@
+"""Equal bits for every input, proven and not sampled: what the core traces of a step and what the reference does are one graph.
+
+Both write to one tape, on which equal operations stand once. So they are the same graph if they end in the same values of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from stepwell import _core, engine
+from test_tracing import ABLE, CONTROLS, METHODS, fits, made
+from tracing import Tracer
+
+#: Bodies whose graphs are compared with one method of each kind alone: they have tens of thousands of operations.
+MANY = 100
+
+
+def assert_one_graph(tape: Any, core: list[Any], reference: list[Any]) -> None:
+    """Or show where both begin to differ."""
+    assert len(core) == len(reference)
+    for i, (ours, theirs) in enumerate(zip(core, reference, strict=True)):
+        if ours.id != theirs.id:
+            a, b = (tape.listing(each).splitlines() for each in (ours, theirs))
+            line = next(n for n, pair in enumerate(zip([*a, "end"], [*b, "end"], strict=False)) if pair[0] != pair[1])
+            pytest.fail(f"number {i} of the state: the core has  {a[line:][:1]}  where the reference has  {b[line:][:1]}")
+
+
+def model(system: sw.System, method: sw.Method) -> Any:
+    return engine.model(engine.Plan(system, method, system.batch, 0.1))
+
+
+def methods(system: sw.System) -> Iterator[sw.Method]:
+    large = int(np.prod(system.v_shape)) > MANY
+    for method in METHODS[:4] if large else METHODS:
+        if fits(system, method):
+            yield method
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_step(name: str) -> None:
+    system, _, _ = made(name)
+    for method in methods(system):
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "step"), Tracer(system, tape).step(method))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if "bod" in name and "restricted" not in name])
+def test_a_step_under_control(name: str, control: str) -> None:
+    system, v, y = made(name)
+    with np.errstate(all="ignore"):
+        system = system.controlled(CONTROLS[control], v, y, 1e-3)
+    for method in methods(system):
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "step"), Tracer(system, tape).step(method))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_what_a_method_carries(name: str) -> None:
+    system, _, _ = made(name)
+    for method in methods(system):
+        for choice in range(len(method.starts) or 1) if method.carry else ():
+            for which in ("start", "finish"):
+                tape = _core.Tape()
+                core = tape.trace(model(system, method), f"{which} {choice}")
+                assert_one_graph(tape, core, Tracer(system, tape).slot(method, which, choice))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_an_attempt(name: str) -> None:
+    system, _, _ = made(name)
+    for method in ABLE[:1] if int(np.prod(system.v_shape)) > MANY else ABLE:
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_recorded_quantities(name: str) -> None:
+    system, _, _ = made(name)
+    for quantity in system.quantities:
+        tape = _core.Tape()
+        core = tape.trace(model(system, METHODS[0]), f"record {quantity}")
+        numbers = int(np.prod(system.v_shape)) + int(np.prod(system.y_shape))
+        assert_one_graph(tape, core[numbers:], Tracer(system, tape).record([quantity]))
+
+
+def test_a_difference_is_shown() -> None:
+    system, _, _ = made("pendulum")
+    tape = _core.Tape()
+    core = tape.trace(model(system, sw.method("false_euler")), "step")
+    with pytest.raises(pytest.fail.Exception, match="the core has .* where the reference has"):
+        assert_one_graph(tape, core, Tracer(system, tape).step(sw.method("damped_euler")))
+
+
+def test_symbols_cannot_be_branched_on() -> None:
+    symbol = _core.Tape().state(0)
+    with pytest.raises(TypeError, match="no truth value"):
+        bool(symbol < 1.0)
+    with pytest.raises(TypeError, match="no truth value"):
+        float(symbol)
