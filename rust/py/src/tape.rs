@@ -6,6 +6,7 @@ use pyo3::{
     exceptions::{PyIndexError, PyTypeError, PyValueError},
     prelude::*,
     pyclass::CompareOp,
+    types::{PyFloat, PyInt},
 };
 use stepwell_core::{
     tape::{self, Id, Op, print},
@@ -35,10 +36,24 @@ pub struct Symbol {
 }
 
 /// A symbol, or a number that becomes one.
-#[derive(FromPyObject)]
 enum Value<'py> {
     Symbol(PyRef<'py, Symbol>),
     Number(f64),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Value<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(symbol) = object.cast::<Symbol>() {
+            return Ok(Value::Symbol(symbol.to_owned().borrow()));
+        }
+        // Not whatever can become a number: an array has to take the operation to its own elements.
+        if object.is_instance_of::<PyFloat>() || object.is_instance_of::<PyInt>() {
+            return object.extract().map(Value::Number);
+        }
+        Err(PyTypeError::new_err("expected a symbol or a number"))
+    }
 }
 
 fn no_truth() -> PyErr {

@@ -56,7 +56,7 @@ struct Aside {
 
 impl Aside {
     fn new(stage: &Stage, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> Aside {
-        let loaded = Loaded::with(stage, stage.runner_of(level, lanes), spec, level, clock, f64::INFINITY);
+        let loaded = Loaded::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
         Aside { loaded, state: vec![0.0; stage.split.body.next.len() * lanes] }
     }
 

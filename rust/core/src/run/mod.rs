@@ -50,7 +50,7 @@ impl Model<'_> {
 
     /// How many members a group of that width steps together, and about what a step costs beside one of few.
     pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> (usize, usize) {
-        let runner = traced.step.runner(machine.level, width);
+        let runner = &traced.step.kit(machine.level, width).runner;
         (runner.lanes(), runner.cost())
     }
 

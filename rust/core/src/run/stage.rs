@@ -19,15 +19,41 @@ use crate::{
 pub struct Stage {
     /// The tape.
     pub split: Split,
-    runners: [[OnceLock<Arc<Runner>>; Width::ALL.len()]; Level::ALL.len()],
+    kits: [[OnceLock<Arc<Kit>>; Width::ALL.len()]; Level::ALL.len()],
     /// Those for rows of a length that something else has set.
-    long: Mutex<Vec<(Level, usize, Arc<Runner>)>>,
+    long: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
+}
+
+/// What makes the steps of a stage, and what is computed before them, over rows of one length.
+pub struct Kit {
+    /// The hot loop.
+    pub runner: Runner,
+    /// Once a run.
+    run: Interpreter,
+    /// Once for each member.
+    member: Interpreter,
+    /// Once for each member that takes a lane by itself.
+    lone: Interpreter,
+    /// Once for each step.
+    step: Interpreter,
+}
+
+impl Kit {
+    fn new(split: &Split, level: Level, runner: Runner) -> Arc<Kit> {
+        Arc::new(Kit {
+            run: Interpreter::new(&split.run, 1, Level::Baseline),
+            member: Interpreter::new(&split.member, runner.lanes(), level),
+            lone: Interpreter::new(&split.member, 1, Level::Baseline),
+            step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
+            runner,
+        })
+    }
 }
 
 impl Stage {
     /// Of a tape that was cut.
     pub fn new(split: Split) -> Stage {
-        Stage { split, runners: Default::default(), long: Mutex::default() }
+        Stage { split, kits: Default::default(), long: Mutex::default() }
     }
 
     /// Operations of all its bodies.
@@ -37,18 +63,18 @@ impl Stage {
     }
 
     /// What makes its steps at a width.
-    pub fn runner(&self, level: Level, width: Width) -> Arc<Runner> {
-        let slot = &self.runners[level as usize][width as usize];
-        Arc::clone(slot.get_or_init(|| Arc::new(Runner::new(&self.split.body, level, width))))
+    pub fn kit(&self, level: Level, width: Width) -> &Arc<Kit> {
+        let make = || Kit::new(&self.split, level, Runner::new(&self.split.body, level, width));
+        self.kits[level as usize][width as usize].get_or_init(make)
     }
 
     /// What makes its steps over rows of so many lanes.
-    pub fn runner_of(&self, level: Level, lanes: usize) -> Arc<Runner> {
+    pub fn kit_of(&self, level: Level, lanes: usize) -> Arc<Kit> {
         let mut long = self.long.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, known)) = long.iter().find(|(at, wide, _)| (*at, *wide) == (level, lanes)) {
             return Arc::clone(known);
         }
-        let made = Arc::new(Runner::long(&self.split.body, level, lanes));
+        let made = Kit::new(&self.split, level, Runner::long(&self.split.body, level, lanes));
         long.push((level, lanes, Arc::clone(&made)));
         made
     }
@@ -76,9 +102,7 @@ const MOST_ENTRIES: usize = 1 << 16;
 
 /// A stage with the numbers of some members: all that its hot loop reads.
 pub struct Loaded {
-    runner: Arc<Runner>,
-    member: Interpreter,
-    step: Interpreter,
+    kit: Arc<Kit>,
     /// What is the same for all members, in the order of [`Split::given`].
     given: Vec<f64>,
     /// The uniforms of the hot loop.
@@ -101,12 +125,12 @@ pub struct Loaded {
 impl Loaded {
     /// For tiles of so many lanes as the width says. `budget` is the most attempts of a member, for those.
     pub fn new(stage: &Stage, spec: &Spec, level: Level, width: Width, clock: &Clock, budget: f64) -> Loaded {
-        Loaded::with(stage, stage.runner(level, width), spec, level, clock, budget)
+        Loaded::with(stage, Arc::clone(stage.kit(level, width)), spec, clock, budget)
     }
 
     /// With a kernel that was chosen already.
-    pub fn with(stage: &Stage, runner: Arc<Runner>, spec: &Spec, level: Level, clock: &Clock, budget: f64) -> Loaded {
-        let split = &stage.split;
+    pub fn with(stage: &Stage, kit: Arc<Kit>, spec: &Spec, clock: &Clock, budget: f64) -> Loaded {
+        let (split, lanes) = (&stage.split, kit.runner.lanes());
         let last = |input: u32| spec.tables[input as usize].samples.len() as f64 - 1.0;
         let before = |input: u32| spec.tables[..input as usize].iter().map(|table| table.samples.len()).sum::<usize>();
         let number = |given: &Given| match *given {
@@ -116,19 +140,16 @@ impl Loaded {
             Given::Start(input) => spec.tables[input as usize].start,
             Given::Interval(input) => spec.tables[input as usize].interval,
             Given::Last(input) => last(input),
-            Given::First(input) => (before(input) * runner.lanes()) as f64,
-            Given::Lanes => runner.lanes() as f64,
+            Given::First(input) => (before(input) * lanes) as f64,
+            Given::Lanes => lanes as f64,
         };
         let given: Vec<f64> = split.given.iter().map(number).collect();
         let mut uniforms = vec![0.0; split.run.next.len()];
         let mut scratch = Vec::new();
         let tile = &mut Tile { state: &mut uniforms, rows: &[], pool: &given, steps: 1, per_step: &[], held: &[] };
-        Interpreter::new(&split.run, 1, Level::Baseline).run(tile, &mut scratch);
-        let lanes = runner.lanes();
+        kit.run.run(tile, &mut scratch);
         let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
         Loaded {
-            member: Interpreter::new(&split.member, lanes, level),
-            step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
             given,
             uniforms,
             pool: Aligned::new(0),
@@ -140,18 +161,13 @@ impl Loaded {
             tables: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
             scratch,
-            runner,
+            kit,
         }
     }
 
     /// How long rows are.
     pub fn lanes(&self) -> usize {
-        self.runner.lanes()
-    }
-
-    /// What makes the steps.
-    pub fn runner(&self) -> &Arc<Runner> {
-        &self.runner
+        self.kit.runner.lanes()
     }
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last.
@@ -162,7 +178,7 @@ impl Loaded {
         }
         let (rows, given) = (&mut self.rows, &self.given);
         let tile = &mut Tile { state: rows, rows: &self.raw, pool: given, steps: 1, per_step: &[], held: &[] };
-        self.member.run(tile, &mut self.scratch);
+        self.kit.member.run(tile, &mut self.scratch);
         self.take_samples(stage, spec, |row, to| row.fill(first, count, to));
     }
 
@@ -172,7 +188,7 @@ impl Loaded {
         let raw: Vec<f64> = split.params.iter().map(|param| spec.rows[*param as usize].at(member)).collect();
         let mut made = vec![0.0; split.member.next.len()];
         let tile = &mut Tile { state: &mut made, rows: &raw, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        Interpreter::new(&split.member, 1, Level::Baseline).run(tile, &mut self.scratch);
+        self.kit.lone.run(tile, &mut self.scratch);
         let lanes = self.lanes();
         for (row, number) in self.rows.chunks_exact_mut(lanes).zip(made) {
             row[lane] = number;
@@ -219,7 +235,7 @@ impl Loaded {
     }
 
     fn steps(&mut self, steps: usize, table: Option<(usize, usize)>, state: &mut [f64]) {
-        let (kernel, written) = self.runner.kernel(steps);
+        let (kernel, written) = self.kit.runner.kernel(steps);
         if self.pool_for != Some(written) {
             self.pool = Aligned::from(&kernel.pool(&self.uniforms));
             self.pool_for = Some(written);
@@ -241,7 +257,7 @@ impl Loaded {
         let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
         let mut values = vec![0.0; entries.len() * steps];
         let tile = &mut Tile { state: &mut values, rows: &times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        self.step.run(tile, &mut self.scratch);
+        self.kit.step.run(tile, &mut self.scratch);
         let lanes = self.lanes();
         let mut table = vec![0; steps * entries.len()];
         for (e, entry) in entries.iter().enumerate() {
