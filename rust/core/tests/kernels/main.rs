@@ -12,7 +12,7 @@ use stepwell_core::{
     kernel::{
         Kernel, Tile,
         interpret::Interpreter,
-        x86::{Shape, Written, write},
+        x86::{Shape, Written, choose, write},
     },
     tape::{Op, split::Body},
 };
@@ -72,7 +72,8 @@ fn widths() -> Vec<(Level, usize)> {
 fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
     let abreast = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
     let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
-    Shape { level, width, abreast, blocks, resident: random.once_in(2) }
+    let together = if random.once_in(3) { 1 + random.below(abreast) } else { abreast };
+    Shape { level, width, abreast, together, blocks, resident: random.once_in(2) }
 }
 
 /// The same bits, or both NaN.
@@ -91,7 +92,12 @@ fn one_case(seed: u64, read_code: bool) -> usize {
     let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
     let body = random::body(random, operations, states);
     let (level, width) = random.one_of(&widths());
-    let shape = shape(random, level, width);
+    let shape = if random.once_in(8) {
+        let members = random.one_of(&[1, 2, 4, 5, 8, 9, 60, 1000]);
+        choose(&body, level, members)
+    } else {
+        shape(random, level, width)
+    };
     let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
     if read_code {
         code::read(&kernel);
@@ -130,7 +136,7 @@ fn oscillator() -> Body {
 
 fn written(body: &Body) -> Written {
     let (level, width) = *widths().last().expect("AVX2");
-    write(body, Shape { level, width, abreast: 2, blocks: 3, resident: true }).expect("a kernel")
+    write(body, Shape { level, width, abreast: 2, together: 2, blocks: 3, resident: true }).expect("a kernel")
 }
 
 #[test]
@@ -138,7 +144,7 @@ fn states_that_change_places_do() {
     let body = Body { ops: vec![Op::State(0), Op::State(1), Op::Copy(1), Op::Copy(0)], next: vec![2, 3], ..Body::default() };
     for (level, width) in widths() {
         for resident in [false, true] {
-            let shape = Shape { level, width, abreast: 2, blocks: 2, resident };
+            let shape = Shape { level, width, abreast: 2, together: 2, blocks: 2, resident };
             let inputs = Inputs::new(&mut Random(7), &body, shape.lanes(), 3);
             let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
             let lanes = shape.lanes();
@@ -151,7 +157,7 @@ fn states_that_change_places_do() {
 #[test]
 fn what_is_no_body_is_not_written() {
     let (level, width) = *widths().last().expect("AVX2");
-    let shape = Shape { level, width, abreast: 1, blocks: 1, resident: true };
+    let shape = Shape { level, width, abreast: 1, together: 1, blocks: 1, resident: true };
     let good = oscillator();
     assert!(write(&good, shape).is_some());
     let bad = [
@@ -167,6 +173,7 @@ fn what_is_no_body_is_not_written() {
     assert!(bad.iter().all(|body| write(body, shape).is_none()));
     for wrong in [
         Shape { abreast: 0, ..shape },
+        Shape { together: 0, ..shape },
         Shape { blocks: 0, ..shape },
         Shape { width: 2, ..shape },
         Shape { level: Level::Baseline, ..shape },
@@ -208,7 +215,7 @@ fn long_rows_are_gone_through_once() {
     // One step over 100 000 numbers, as elementwise functions are.
     let (level, width) = *widths().last().expect("AVX2");
     let body = oscillator();
-    let shape = Shape { level, width, abreast: 1, blocks: 100_000 / width, resident: false };
+    let shape = Shape { level, width, abreast: 1, together: 1, blocks: 100_000 / width, resident: false };
     let inputs = Inputs::new(&mut Random(9), &body, shape.lanes(), 2);
     let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
     let want = inputs.run(&Interpreter::new(&body, shape.lanes(), level), &mut Vec::new());

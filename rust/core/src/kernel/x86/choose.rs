@@ -1,22 +1,94 @@
 //! Which shape is quick.
+//!
+//! A vector unit is busy when enough operations are there that wait for none of each other. One vector has few of them: a step is
+//! mostly one long chain. So several vectors go abreast, the more the longer the chain is in comparison with the work.
 
 use super::Shape;
-use crate::{isa::Level, tape::split::Body};
+use crate::{
+    isa::Level,
+    tape::{Op, split::Body},
+};
 
-/// The shape for so many members.
-pub fn choose(_body: &Body, level: Level, members: usize) -> Option<Shape> {
+/// A kernel's code is at most about so many operations, to stay in the cache of instructions.
+const MOST_CODE: usize = 2000;
+/// The machine looks ahead over several steps of fewer operations than that.
+const SHORT: usize = 48;
+/// How many bytes a tile's rows may take of the cache of data.
+const MOST_ROWS: usize = 12 << 10;
+
+/// The shape for a run of so many members; none if the level has no machine code.
+pub fn choose(body: &Body, level: Level, members: usize) -> Option<Shape> {
+    (level > Level::Baseline).then(|| quickest(body, level, members))
+}
+
+/// The shape for rows of so many numbers, each a number of a long block; none if they are no whole vectors.
+pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     let width = match level {
-        _ if members == 1 => 1,
+        _ if lanes == 1 => 1,
         Level::Avx512 => 8,
         _ => 4,
     };
-    (level > Level::Baseline).then_some(Shape { level, width, abreast: 1, blocks: 1, resident: true })
+    let fits = level > Level::Baseline && lanes.is_multiple_of(width);
+    let vectors = lanes / width;
+    let abreast = [4, 2, 1].into_iter().find(|n| vectors.is_multiple_of(*n))?;
+    fits.then_some(Shape { level, width, abreast, together: 1, blocks: vectors / abreast, resident: false })
 }
 
-/// The shape for rows of so many numbers, each a number of a long block: none if they are no whole vectors.
-pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
-    let most = if level == Level::Avx512 { 8 } else { 4 };
-    let width = if lanes == 1 { 1 } else { most };
-    let fits = level > Level::Baseline && lanes.is_multiple_of(width);
-    fits.then_some(Shape { level, width, abreast: 1, blocks: lanes / width, resident: false })
+fn quickest(body: &Body, level: Level, members: usize) -> Shape {
+    let width = match (level, members) {
+        (_, 0..=1) => 1,
+        (Level::Avx512, 5..) => 8,
+        _ => 4,
+    };
+    let vectors = members.div_ceil(width).max(1);
+    let changed = (0..body.next.len()).filter(|s| !body.keeps(*s)).count().max(1);
+    // A step of few operations is over before its state would be through the cache: it stays in registers. There are too few of
+    // them with AVX2, but some help; and the machine sees the end of so short a step, so that vectors can go one after the other.
+    if body.work() <= 5 * changed || vectors == 1 {
+        let (most, together) = if level == Level::Avx512 { (24, 4) } else { (40, 1) };
+        let abreast = even(vectors, (most / changed).clamp(1, 20));
+        return Shape { level, width, abreast, together, blocks: 1, resident: true };
+    }
+    let most = (MOST_CODE / body.work()).max(1);
+    let abreast = even(vectors, wanted(body, level).min(most));
+    let row = 8 * width * abreast * (body.next.len() + body.rows);
+    let blocks = (MOST_ROWS / row).clamp(1, 4).min(vectors.div_ceil(abreast));
+    // Of short steps the machine sees several at once by itself.
+    let together = if body.work() < SHORT { abreast.min(3) } else { abreast };
+    Shape { level, width, abreast, together, blocks, resident: false }
+}
+
+/// At most so many of all vectors at once, so that the last turn has not fewer than it must.
+fn even(vectors: usize, most: usize) -> usize {
+    vectors.div_ceil(vectors.div_ceil(most))
+}
+
+/// How many vectors abreast keep the machine busy.
+fn wanted(body: &Body, level: Level) -> usize {
+    let (mut work, mut longest) = (0.0, 0.0f64);
+    let mut after = vec![0.0; body.ops.len()];
+    for (id, op) in body.ops.iter().enumerate() {
+        let (wait, cost) = price(*op);
+        let (operands, n) = op.operands();
+        after[id] = wait + operands[..n].iter().map(|operand| after[*operand as usize]).fold(0.0, f64::max);
+        work += cost;
+        longest = longest.max(after[id]);
+    }
+    // Found by trying all on the scenes of the benchmarks. With 16 registers more than five are in each other's way.
+    match level {
+        Level::Avx512 => (3.8 * longest / work - 1.3).round().clamp(1.0, 8.0) as usize,
+        _ => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
+    }
+}
+
+/// After how many cycles an operation is done, and for how many it occupies the machine, for a vector of 512 bits.
+fn price(op: Op) -> (f64, f64) {
+    match op {
+        _ if op.is_leaf() => (0.0, 0.0),
+        Op::Add(..) | Op::Sub(..) | Op::Mul(..) => (3.0, 0.5),
+        Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) | Op::Floor(_) => (4.0, 0.5),
+        Op::Div(..) => (13.0, 8.0),
+        Op::Sqrt(_) => (20.0, 13.0),
+        _ => (1.0, 0.5),
+    }
 }

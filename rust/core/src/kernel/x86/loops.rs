@@ -57,10 +57,16 @@ impl<'a> Writer<'a> {
                 replaces[*id as usize] = Some(s as u32);
             }
         }
+        let mut order = Vec::with_capacity(plan.steps.len() * shape.abreast);
+        for first in (0..shape.abreast).step_by(shape.together) {
+            let team = first..shape.abreast.min(first + shape.together);
+            order.extend(plan.steps.iter().flat_map(|step| team.clone().map(move |vector| (step, vector))));
+        }
         let leaf = |source: &Source| if *source == Source::Made { Where::Nowhere } else { Where::Leaf };
         Writer {
             plan,
             shape,
+            order,
             code: Code { bytes: Vec::with_capacity(16 * plan.steps.len() * shape.abreast + 512), evex, width: shape.width },
             registers: Registers::new(if evex { 32 } else { 16 }, values),
             uses: Uses::new(values),
@@ -74,64 +80,58 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// When an operation is made for a vector. One later what it has made goes where it belongs.
-    pub fn time(&self, step: usize, vector: usize) -> u32 {
-        2 * (step * self.shape.abreast + vector) as u32 + 2
+    /// When the operation at a place of the order is made. One later what it has made goes where it belongs.
+    fn time(place: usize) -> u32 {
+        2 * place as u32 + 2
     }
 
     /// Finds out when each value is needed, and how many are at once if every number of the state has a register.
     fn look_ahead(&mut self) -> Pressure {
         let (plan, abreast) = (self.plan, self.shape.abreast);
         let values = plan.sources.len() * abreast;
-        let mut made = vec![NONE; plan.sources.len()];
-        for (at, step) in plan.steps.iter().enumerate() {
-            made[step.id as usize] = at as u32;
+        let mut made = vec![0u32; values];
+        for (place, (step, vector)) in self.order.iter().enumerate() {
+            made[self.value(step.id, *vector) as usize] = Self::time(place);
         }
         let mut last = vec![0u32; values];
         let mut reads = vec![0u32; values];
-        for (at, step) in plan.steps.iter().enumerate().rev() {
-            for vector in (0..abreast).rev() {
-                let now = self.time(at, vector);
-                for id in step.of() {
-                    let value = self.value(*id, vector);
-                    reads[value as usize] += 1;
-                    if !self.uses.tell(value, now) {
-                        continue;
-                    }
-                    last[value as usize] = now;
-                    // When the old number of the state has been read for the last time, the next one is brought to its place.
-                    if let Source::State(s) = plan.sources[*id as usize]
-                        && let Some(next) = plan.next[s as usize]
-                        && self.time(made[next as usize] as usize, vector) < now
-                    {
-                        let next = self.value(next, vector);
-                        if self.uses.tell(next, now + 1) {
-                            last[next as usize] = now;
-                        }
-                    }
+        for place in (0..self.order.len()).rev() {
+            let ((step, vector), now) = (self.order[place], Self::time(place));
+            for id in step.of() {
+                let value = self.value(*id, vector);
+                reads[value as usize] += 1;
+                if !self.uses.tell(value, now) {
+                    continue;
+                }
+                last[value as usize] = now;
+                // When the old number of the state has been read for the last time, the next one is brought to its place.
+                if let Source::State(s) = plan.sources[*id as usize]
+                    && let Some(next) = plan.next[s as usize].map(|next| self.value(next, vector))
+                    && made[next as usize] < now
+                    && self.uses.tell(next, now + 1)
+                {
+                    last[next as usize] = now;
                 }
             }
         }
         let (mut under_way, mut most) = (0u32, 0);
-        for (at, step) in plan.steps.iter().enumerate() {
-            for vector in 0..abreast {
-                let now = self.time(at, vector);
-                let value = self.value(step.id, vector) as usize;
-                for id in step.of() {
-                    let read = self.value(*id, vector) as usize;
-                    if last[read] == now && plan.sources[*id as usize] == Source::Made {
-                        under_way = under_way.saturating_sub(1);
-                        last[read] = 0;
-                    }
+        for (place, (step, vector)) in self.order.iter().enumerate() {
+            let now = Self::time(place);
+            let value = self.value(step.id, *vector) as usize;
+            for id in step.of() {
+                let read = self.value(*id, *vector) as usize;
+                if last[read] == now && plan.sources[*id as usize] == Source::Made {
+                    under_way = under_way.saturating_sub(1);
+                    last[read] = 0;
                 }
-                let goes_home = self.replaces[step.id as usize]
-                    .is_some_and(|s| plan.old[s as usize].is_none_or(|old| last[self.value(old, vector) as usize] <= now));
-                if goes_home {
-                    last[value] = 0;
-                } else {
-                    under_way += 1;
-                    most = most.max(under_way);
-                }
+            }
+            let goes_home = self.replaces[step.id as usize]
+                .is_some_and(|s| plan.old[s as usize].is_none_or(|old| last[self.value(old, *vector) as usize] <= now));
+            if goes_home {
+                last[value] = 0;
+            } else {
+                under_way += 1;
+                most = most.max(under_way);
             }
         }
         Pressure { most, reads }
@@ -273,11 +273,9 @@ impl<'a> Writer<'a> {
     }
 
     fn step(&mut self) -> Option<()> {
-        for (at, step) in self.plan.steps.iter().enumerate() {
-            for vector in 0..self.shape.abreast {
-                self.now = self.time(at, vector);
-                self.make(step, vector)?;
-            }
+        for (place, (step, vector)) in std::mem::take(&mut self.order).into_iter().enumerate() {
+            self.now = Self::time(place);
+            self.make(step, vector)?;
         }
         Some(())
     }

@@ -24,8 +24,11 @@ pub struct Shape {
     pub level: Level,
     /// Numbers in a vector: 1, 4, or 8 (AVX-512).
     pub width: usize,
-    /// Vectors that go side by side, operation by operation.
+    /// Vectors that are stepped by one turn of the loop.
     pub abreast: usize,
+    /// How many of them go operation by operation; so many after so many. All, or few where registers are, and the machine itself looks
+    /// far enough ahead.
+    pub together: usize,
     /// Vectors that go one after the other, in units of those abreast.
     pub blocks: usize,
     /// Whether a block makes all steps before the next one does, with the state in registers. Otherwise each step is made by all blocks.
@@ -65,6 +68,7 @@ impl Shape {
         let rows = body.next.len().max(body.rows).max(1);
         is_known
             && self.abreast > 0
+            && self.together > 0
             && self.blocks > 0
             && self.level.here()
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])

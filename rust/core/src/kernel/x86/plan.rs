@@ -218,7 +218,7 @@ fn is_sound(body: &Body) -> bool {
             Op::Uniform(i) => (i as usize) < body.uniforms,
             Op::PerStep(i) | Op::Held(i) => (i as usize) < body.per_step,
             Op::ShiftUp(_, places) | Op::ShiftDown(_, places) => places < 64,
-            Op::Param(_) | Op::Step | Op::Time | Op::Sample(..) => false,
+            Op::Param(_) | Op::Step | Op::Time | Op::Sample(..) | Op::Gather(_) => false,
             _ => true,
         };
         is_in_range && operands[..n].iter().all(|operand| (*operand as usize) < id)

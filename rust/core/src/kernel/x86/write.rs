@@ -30,6 +30,8 @@ pub type Value = u32;
 pub struct Writer<'a> {
     pub plan: &'a Plan,
     pub shape: Shape,
+    /// The operations, each for a vector, in the order in which they are made.
+    pub order: Vec<(&'a Step, usize)>,
     pub code: Code,
     pub registers: Registers,
     pub uses: Uses,
@@ -40,7 +42,7 @@ pub struct Writer<'a> {
     pub homes: Vec<Option<u8>>,
     /// Of the same, whether the next value waits for the old one to be read.
     pub waits: Vec<bool>,
-    /// When it is: see [`Writer::time`].
+    /// When it is: twice the place in the order.
     pub now: u32,
     pub free_slots: Vec<u32>,
     pub slots: u32,
