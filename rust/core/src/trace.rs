@@ -181,8 +181,7 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
 fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let s = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
-    let numbers: [Symbol; Pace::<f64>::NUMBERS] =
-        std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
+    let numbers: [Symbol; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
     let budget = Symbol::new(Op::Param(BUDGET));
     let (pace, v, y) = attempt(program, s.as_ref(), order, Pace::of(numbers), budget, &v, &y);
     let mut next = ids([&v, &y]);
@@ -252,9 +251,7 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let choice = which.parse().unwrap_or(0);
     match what {
         "step" => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
-        "attempt" => {
-            trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next))
-        }
+        "attempt" => trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next)),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),

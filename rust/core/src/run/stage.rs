@@ -199,8 +199,8 @@ impl Loaded {
     /// Fills the rows of samples of inputs of which members have their own.
     fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
         let lanes = self.lanes();
-        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)))
-            || stage.split.given.contains(&Given::Lanes);
+        let of_members =
+            stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_))) || stage.split.given.contains(&Given::Lanes);
         if !of_members {
             return;
         }
