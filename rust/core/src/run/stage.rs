@@ -118,6 +118,12 @@ pub struct Loaded {
     common: Vec<Vec<f64>>,
     /// Tables of steps, by their first step.
     tables: Vec<(i64, Vec<u64>)>,
+    /// How many of them are kept at most, and which makes place next.
+    most_tables: usize,
+    oldest: usize,
+    /// What they are computed from and in: the times of the steps, and a row of them for each entry.
+    times: Vec<f64>,
+    values: Vec<f64>,
     raw: Vec<f64>,
     scratch: Vec<f64>,
 }
@@ -159,6 +165,10 @@ impl Loaded {
             inputs: Vec::new(),
             common,
             tables: Vec::new(),
+            most_tables: (MOST_ENTRIES / (STEPS_AT_ONCE as usize * split.entries.len()).max(1)).max(1),
+            oldest: 0,
+            times: Vec::new(),
+            values: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
             scratch,
             kit,
@@ -199,8 +209,8 @@ impl Loaded {
     /// Fills the rows of samples of inputs of which members have their own.
     fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
         let lanes = self.lanes();
-        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)))
-            || stage.split.given.contains(&Given::Lanes);
+        let of_members =
+            stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_))) || stage.split.given.contains(&Given::Lanes);
         if !of_members {
             return;
         }
@@ -216,6 +226,12 @@ impl Loaded {
         for (to, row) in self.held.chunks_exact_mut(lanes).zip(rows) {
             take(row, to);
         }
+    }
+
+    /// Writes now what would be written when it pays, and keeps no more than a loop needs that goes on and on.
+    pub fn settle(&mut self) {
+        self.kit.runner.write();
+        self.most_tables = 1;
     }
 
     /// So many steps of a state from step `k`.
@@ -251,18 +267,25 @@ impl Loaded {
             return at;
         }
         let (entries, steps) = (&stage.split.entries, STEPS_AT_ONCE as usize);
-        if self.tables.iter().map(|(_, table)| table.len()).sum::<usize>() + steps * entries.len() > MOST_ENTRIES {
-            self.tables.clear();
-        }
-        let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
-        let mut values = vec![0.0; entries.len() * steps];
-        let tile = &mut Tile { state: &mut values, rows: &times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
+        self.times.clear();
+        self.times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        self.values.resize(entries.len() * steps, 0.0);
+        let (values, rows) = (&mut self.values, &self.times);
+        let tile = &mut Tile { state: values, rows, pool: &self.given, steps: 1, per_step: &[], held: &[] };
         self.kit.step.run(tile, &mut self.scratch);
+        let at = if self.tables.len() < self.most_tables {
+            self.tables.push((first, vec![0; steps * entries.len()]));
+            self.tables.len() - 1
+        } else {
+            self.oldest = (self.oldest + 1) % self.most_tables;
+            self.tables[self.oldest].0 = first;
+            self.oldest
+        };
         let lanes = self.lanes();
-        let mut table = vec![0; steps * entries.len()];
+        let table = &mut self.tables[at].1;
         for (e, entry) in entries.iter().enumerate() {
             for step in 0..steps {
-                let value = values[e * steps + step];
+                let value = self.values[e * steps + step];
                 table[step * entries.len() + e] = match *entry {
                     Entry::Value => value.to_bits(),
                     Entry::Sample(input) => self.common[input as usize][value as usize].to_bits(),
@@ -270,8 +293,7 @@ impl Loaded {
                 };
             }
         }
-        self.tables.push((first, table));
-        self.tables.len() - 1
+        at
     }
 }
 
