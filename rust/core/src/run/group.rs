@@ -26,6 +26,9 @@ pub trait Group: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
+    /// Makes now what would be made when it pays: for a loop that cannot wait.
+    fn settle(&mut self) {}
+
     /// Both slots.
     fn slots(&self) -> (&[f64], &[f64]);
 
@@ -135,6 +138,11 @@ impl Group for Lanes {
             aside.loaded.prepare(stage, spec, first, count);
         }
         self.tally_mut().fill(0.0);
+    }
+
+    fn settle(&mut self) {
+        self.step.settle();
+        self.asides().for_each(|(aside, _)| aside.loaded.settle());
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {

@@ -121,7 +121,12 @@ pub struct Loaded {
     common: Vec<Vec<f64>>,
     /// Tables of steps, by their first step.
     tables: Vec<(i64, Vec<u64>)>,
-    /// The entries of one time, and the values that they are made of.
+    /// How many of them are kept at most, and which makes place next.
+    most_tables: usize,
+    oldest: usize,
+    /// The times of the steps of a table.
+    times: Vec<f64>,
+    /// The entries of one time, and the values that entries are made of.
     moment: Vec<u64>,
     values: Vec<f64>,
     raw: Vec<f64>,
@@ -165,6 +170,9 @@ impl Loaded {
             inputs: Vec::new(),
             common,
             tables: Vec::new(),
+            most_tables: (MOST_ENTRIES / (STEPS_AT_ONCE as usize * split.entries.len()).max(1)).max(1),
+            oldest: 0,
+            times: Vec::new(),
             moment: Vec::new(),
             values: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
@@ -226,6 +234,12 @@ impl Loaded {
         }
     }
 
+    /// Writes now what would be written when it pays, and keeps no more than a loop needs that goes on and on.
+    pub fn settle(&mut self) {
+        self.kit.runner.write();
+        self.most_tables = 1;
+    }
+
     /// So many steps of a state from step `k`.
     pub fn advance(&mut self, stage: &Stage, clock: &Clock, k: i64, n: usize, state: &mut [f64]) {
         if stage.split.entries.is_empty() {
@@ -272,15 +286,22 @@ impl Loaded {
         if let Some(at) = self.tables.iter().position(|(from, _)| *from == first) {
             return at;
         }
-        let numbers = stage.split.entries.len() * STEPS_AT_ONCE as usize;
-        if self.tables.iter().map(|(_, table)| table.len()).sum::<usize>() + numbers > MOST_ENTRIES {
-            self.tables.clear();
-        }
-        let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
-        let (kit, mut table) = (Arc::clone(&self.kit), Vec::new());
+        let at = if self.tables.len() < self.most_tables {
+            self.tables.push((first, Vec::new()));
+            self.tables.len() - 1
+        } else {
+            self.oldest = (self.oldest + 1) % self.most_tables;
+            self.tables[self.oldest].0 = first;
+            self.oldest
+        };
+        // What is there already is filled anew: a step of a world allocates nothing.
+        let (mut times, mut table) = (std::mem::take(&mut self.times), std::mem::take(&mut self.tables[at].1));
+        times.clear();
+        times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        let kit = Arc::clone(&self.kit);
         self.fill(stage, &kit.step, &times, &mut table);
-        self.tables.push((first, table));
-        self.tables.len() - 1
+        (self.times, self.tables[at].1) = (times, table);
+        at
     }
 
     /// The entries of steps at these times, as many as the interpreter has lanes.

@@ -52,6 +52,7 @@ impl World {
             let mut group = model.group(&traced, machine, width, &clock)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
+            group.settle();
             shares.push(Share { group, first, count });
             first += count;
         }
