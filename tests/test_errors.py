@@ -416,7 +416,7 @@ def test_the_core_refuses_too() -> None:
         ({"given": free | {"control": "energy"}}, "has no kernel for the options"),
         ({"kernel": "chain", "given": {"stiffness": one, "mass": one}}, "stiffness: expected 2, got 1"),
         (linear | {"given": linear["given"] | {"kind": "noise"}}, "has no kernel for the options"),
-        (linear | {"given": linear["given"] | {"rows": one}}, "rows: expected 4, got 1"),
+        (linear | {"given": linear["given"] | {"rows": one}}, "y: expected 0, got 1"),
         (linear | {"given": linear["given"] | {"inputs": 1}}, "inputs: expected 1, got 0"),
         (
             linear | {"method": "verlet"},

@@ -99,30 +99,27 @@ fn system(kind: &Kind, p: &Parameters<Symbol>, tally: Symbol) -> Box<dyn System<
     controls::wrap(p, (kind.symbols)(p), tally)
 }
 
-/// How large the blocks of a scene are.
-pub fn shape(given: &Given) -> Result<Shape, Error> {
-    if given.system == "matrix" {
-        let n = given.whole("n");
-        let v = given.whole("n_v").min(n);
-        return Ok(Shape { v, y: n - v });
-    }
-    (kind(given)?.shape)(given)
-}
-
 /// The kind of system that is given.
-pub fn kind(given: &Given) -> Result<&'static Kind, Error> {
-    crate::systems::KINDS.iter().copied().find(|kind| kind.name == given.system).ok_or_else(|| Error::UnknownSystem {
-        name: given.system.clone(),
-        known: crate::systems::KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", "),
-    })
+fn kind(given: &Given) -> Result<&'static Kind, Error> {
+    let known = || crate::systems::KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
+    crate::system::kind(&given.system).ok_or_else(|| Error::UnknownSystem { name: given.system.clone(), known: known() })
 }
 
 /// The record of a method.
-pub fn method(name: &str) -> Result<&'static Record, Error> {
-    crate::steppers::RECORDS.iter().copied().find(|r| r.name == name).ok_or_else(|| Error::UnknownMethod {
-        name: name.to_owned(),
-        known: crate::steppers::RECORDS.iter().map(|r| r.name).collect::<Vec<_>>().join(", "),
-    })
+fn method(name: &str) -> Result<&'static Record, Error> {
+    let known = || crate::steppers::RECORDS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
+    crate::method::record(name).ok_or_else(|| Error::UnknownMethod { name: name.to_owned(), known: known() })
+}
+
+/// How large the blocks of a scene are, or why its system cannot be made of what was given, or not be stepped so.
+pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
+    match how {
+        How::Matrix { .. } => {
+            let (n, v) = (given.whole("n"), given.whole("n_v").min(given.whole("n")));
+            Ok(Shape { v, y: n - v })
+        }
+        How::Method { name, .. } | How::Attempts { name } => kind(given)?.fit(given, method(name)?),
+    }
 }
 
 /// Numbers of a recorded quantity.
@@ -144,7 +141,7 @@ pub const BUDGET: u32 = u32::MAX / 4;
 
 /// Traces one step of a scene onto a tape that may hold something already.
 pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> {
-    let shape = shape(given)?;
+    let shape = shape(given, how)?;
     match how {
         How::Matrix { nodes } => {
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
@@ -216,7 +213,8 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
 
 /// Traces a program that changes the block v alone.
 fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
-    let (shape, kind) = (shape(given)?, kind(given)?);
+    let kind = kind(given)?;
+    let shape = (kind.shape)(given)?;
     Ok(record(tape, || {
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
@@ -228,7 +226,8 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
 
 /// Traces the recorded quantities of a state onto a tape: a number behind v and y for each.
 pub fn trace_record(tape: Tape, given: &Given, names: &[String]) -> Result<(Tape, Vec<Id>), Error> {
-    let (shape, kind) = (shape(given)?, kind(given)?);
+    let kind = kind(given)?;
+    let shape = (kind.shape)(given)?;
     recorded(given, names)?;
     Ok(record(tape, || {
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));

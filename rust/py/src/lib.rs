@@ -9,7 +9,7 @@ use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
     isa::Level,
-    method::{Needs, Record},
+    method::{Fact, Record},
     run::{
         Machine,
         batch::{self, Arrays, Plan},
@@ -25,23 +25,17 @@ use model::{ModelSpec, by_row, core_error};
 /// Everything that a method says of itself.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
-    let program = r.program();
-    d.set_item("name", r.name)?;
-    d.set_item("title", r.title)?;
-    d.set_item("other_names", r.other_names)?;
-    d.set_item("false_friends", r.false_friends)?;
-    d.set_item("order", r.order)?;
-    d.set_item("evaluations", program.evaluations())?;
-    d.set_item("family", r.family)?;
-    d.set_item("limit", r.limit)?;
-    d.set_item("nodes", program.nodes(r.needs == Needs::Rates))?;
-    d.set_item("needs_acceleration", r.needs == Needs::Acceleration)?;
-    d.set_item("carry", r.carry.as_ref().map(|c| c.name))?;
-    d.set_item("starts", r.carry.as_ref().map_or(&[][..], |c| c.starts))?;
-    d.set_item("error_order", r.estimate.as_ref().map(|e| e.order))?;
-    d.set_item("section", r.section)?;
-    d.set_item("reference", r.reference)?;
-    d.set_item("about", r.about)?;
+    for (name, fact) in r.facts() {
+        match fact {
+            Fact::Text(text) => d.set_item(name, text)?,
+            Fact::MaybeText(text) => d.set_item(name, text)?,
+            Fact::Texts(texts) => d.set_item(name, texts)?,
+            Fact::Whole(whole) => d.set_item(name, whole)?,
+            Fact::Number(number) => d.set_item(name, number)?,
+            Fact::Numbers(numbers) => d.set_item(name, numbers)?,
+            Fact::Truth(truth) => d.set_item(name, truth)?,
+        }
+    }
     Ok(d)
 }
 

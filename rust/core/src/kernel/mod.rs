@@ -59,7 +59,7 @@ pub trait Kernel: Send + Sync {
 pub fn check(body: &Body, lanes: usize, tile: &Tile) {
     assert!(tile.state.len() >= body.next.len() * lanes, "state");
     assert!(tile.rows.len() >= body.rows * lanes, "rows");
-    assert!(tile.per_step.len() >= body.per_step * tile.steps, "steps");
+    assert!(tile.per_step.len() >= body.per_step.saturating_mul(tile.steps), "steps");
     for op in &body.ops {
         if let crate::tape::Op::Held(i) = op {
             let places = tile.per_step.iter().skip(*i as usize).step_by(body.per_step).take(tile.steps);

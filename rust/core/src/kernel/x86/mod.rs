@@ -71,10 +71,14 @@ impl Shape {
             && self.together > 0
             && self.blocks > 0
             && self.level.here()
+            && body.ops.len().saturating_mul(self.abreast) < MOST_OPERATIONS
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])
             && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.abreast])
     }
 }
+
+/// More operations than that are no kernel: jumps could not be named by 31 bits.
+const MOST_OPERATIONS: usize = 1 << 22;
 
 /// A kernel as machine code.
 #[derive(Debug)]
