@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def test_does_not_depend_on_company(case: Case) -> None:
     system, arguments = case.make(90)
     for i in (0, 7, 63, 89):
         alone = sw.integrate(
-            _member(system, i),
+            _member(system, i, 90),
             **(arguments | {"v": arguments["v"][..., i], "y": arguments["y"][..., i]}),
             steps=23,
             every=5,
@@ -159,33 +160,21 @@ def test_every_variant_is_tried() -> None:
     assert {make(rng, 1).kernel for make in SYSTEMS.values()} == set(_core.systems())
 
 
-def _member(system: sw.System, i: int) -> sw.System:
-    """The i-th member of a batch of systems, alone."""
+def _member(system: sw.System, i: int, b: int) -> sw.System:
+    """The i-th of b systems, alone: of what it holds, the arrays whose last axis is that of the members."""
 
     def one(value: Any) -> Any:
-        if isinstance(value, sw.Sinusoid):
-            return sw.Sinusoid(one(value.amplitude), one(value.omega), one(value.phase))
-        if isinstance(value, sw.Sampled):
-            return sw.Sampled(value.values[..., i] if value.values.ndim > 1 else value.values, value.interval, value.start)
-        return value[i] if isinstance(value, np.ndarray) and value.ndim else value
+        match value:
+            case np.ndarray() if value.ndim and value.shape[-1] == b:
+                return value[..., i]
+            case list() | tuple():
+                return type(value)(map(one, value))
+            case sw.System() | sw.Sinusoid() | sw.Sampled():
+                alone = copy.copy(value)
+                vars(alone).update({name: one(each) for name, each in vars(value).items()})
+                return alone
+        return value
 
-    if isinstance(system, sw.Oscillator):
-        return sw.Oscillator(one(system.omega), one(system.damping), x=one(system.x), a=one(system.a), form=system.form)
-    if isinstance(system, sw.Pendulum):
-        return sw.Pendulum(one(system.omega), one(system.damping), a=one(system.a))
-    if isinstance(system, sw.RestrictedThreeBody):
-        return sw.RestrictedThreeBody(one(system.mu))
-    if isinstance(system, sw.NBody):
-        return sw.NBody(
-            system.masses[..., i] if system.masses.ndim > 1 else system.masses,
-            force=system.force,
-            G=one(system.G),
-            softening=one(system.softening),
-            dim=system.dim,
-        )
-    if isinstance(system, sw.LinearSystem):
-        A, B = (a if a is None or a.ndim == 2 else a[..., i] for a in (system.A, system.B))
-        return sw.LinearSystem(A, B, x=None if B is None else [one(x) for x in system.x], velocities=system.velocities)
-    assert isinstance(system, sw.Chain)
-    k, m = (a[..., i] if a.ndim > 1 and a.shape[-1] > 1 else a for a in (system.stiffness, system.mass))
-    return sw.Chain(system.n, stiffness=k, mass=m)
+    alone: sw.System = one(system)
+    alone.batch = ()
+    return alone
