@@ -88,7 +88,7 @@ fn a_batch_of_any_size_is_its_members() {
     };
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
     let whole = pendulums(385);
-    let tile = |width: Width| whole.lanes(&whole.traced().unwrap(), machine(1), width).0;
+    let tile = |width: Width| whole.lanes(&whole.traced().unwrap(), machine(1), width).unwrap().0;
     let edges = [tile(Width::Wide), tile(Width::Few)].into_iter().flat_map(|tile| [tile - 1, tile, tile + 1, 2 * tile + 1]);
     let sizes = [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384];
     for members in sizes.into_iter().chain(edges).filter(|members| (1..=385).contains(members)) {
@@ -156,6 +156,26 @@ fn a_world_in_pieces_is_a_run() {
         let (sv, sy, _) = last(&plan(model, 0.1, 100, 91, 1)).unwrap();
         assert_eq!((v, y), (sv, sy), "{}", record.name);
         assert_eq!((world.step_number(), world.time()), (100, 100.0 * 0.1));
+    }
+}
+
+#[test]
+fn kernels_are_chosen_by_name() {
+    let asked = |kernels: &str, isa: &str| Level::asked(Some(kernels.into()), Some(isa.into()));
+    let best = Level::available().last().copied().unwrap();
+    assert_eq!(Level::asked(None, None), Ok(best));
+    assert_eq!(asked("", ""), Ok(best));
+    for level in Level::available() {
+        assert_eq!(asked(level.kernels(), ""), Ok(level));
+        assert_eq!(asked("", level.name()), Ok(level));
+        assert_eq!(asked("interpret", level.name()), Ok(Level::Baseline), "the newer name counts");
+    }
+    let known = |name: fn(Level) -> &'static str| Level::available().into_iter().map(name).collect::<Vec<_>>().join(", ");
+    for given in ["baseline", "avx1024", "Interpret"] {
+        assert_eq!(asked(given, "baseline"), Err(Error::Kernels { given: given.to_owned(), known: known(Level::kernels) }));
+    }
+    for given in ["interpret", "avx1024"] {
+        assert_eq!(asked("", given), Err(Error::Isa { given: given.to_owned(), known: known(Level::name) }));
     }
 }
 
