@@ -159,6 +159,26 @@ fn a_world_in_pieces_is_a_run() {
 }
 
 #[test]
+fn kernels_are_chosen_by_name() {
+    let asked = |kernels: &str, isa: &str| Level::asked(Some(kernels.into()), Some(isa.into()));
+    let best = Level::available().last().copied().unwrap();
+    assert_eq!(Level::asked(None, None), Ok(best));
+    assert_eq!(asked("", ""), Ok(best));
+    for level in Level::available() {
+        assert_eq!(asked(level.kernels(), ""), Ok(level));
+        assert_eq!(asked("", level.name()), Ok(level));
+        assert_eq!(asked("interpret", level.name()), Ok(Level::Baseline), "the newer name counts");
+    }
+    let known = |name: fn(Level) -> &'static str| Level::available().into_iter().map(name).collect::<Vec<_>>().join(", ");
+    for given in ["baseline", "avx1024", "Interpret"] {
+        assert_eq!(asked(given, "baseline"), Err(Error::Kernels { given: given.to_owned(), known: known(Level::kernels) }));
+    }
+    for given in ["interpret", "avx1024"] {
+        assert_eq!(asked("", given), Err(Error::Isa { given: given.to_owned(), known: known(Level::name) }));
+    }
+}
+
+#[test]
 fn kept_steps() {
     let kept = |steps, every| saves(steps, every).collect::<Vec<_>>();
     assert_eq!(kept(10, None), [10]);

@@ -3,6 +3,7 @@
 pub mod aligned;
 pub mod batch;
 pub mod chosen;
+pub mod compiled;
 pub mod crew;
 pub mod group;
 pub mod paced;

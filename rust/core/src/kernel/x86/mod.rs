@@ -81,6 +81,7 @@ pub struct Written {
     shape: Shape,
     constants: Vec<f64>,
     uniforms: usize,
+    spills: usize,
 }
 
 /// Writes a kernel. None if this machine cannot run it, registers do not suffice, or the system does not let code be written.
@@ -98,7 +99,7 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     };
     let pages = Pages::new(&code, frame)?;
     let constants = plan.constants.iter().map(|bits| f64::from_bits(*bits)).collect();
-    Some(Written { pages, shape, constants, uniforms: body.uniforms })
+    Some(Written { pages, shape, constants, uniforms: body.uniforms, spills: slots })
 }
 
 impl Written {
@@ -130,5 +131,13 @@ impl Kernel for Written {
 
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
         self.pages.run(tile, scratch);
+    }
+
+    fn bytes(&self) -> usize {
+        self.code().len()
+    }
+
+    fn spills(&self) -> usize {
+        self.spills
     }
 }
