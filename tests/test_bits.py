@@ -9,22 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS, Case, assert_same, cases
+from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 ALL = list(cases())
 DIRECT = [c for c in ALL if c.form == "direct"]
 
+#: By default every system and every method so many times in each form, each test with cases of its own; all in the long run.
+SOME = {"direct": 2, "matrix": 1, "power": 1}
 
-@pytest.mark.parametrize("case", ALL, ids=str)
+
+@pytest.mark.parametrize("case", thinned(ALL, SOME, "equals the reference"))
 def test_equals_the_reference(case: Case) -> None:
     # A lone member, a lane group with one idle lane, a full one, one member too many, and several groups.
     for b in (1, 31, 32, 33, 257):
         assert_same(case.run(b), case.run(b, backend="numpy"))
 
 
-@pytest.mark.parametrize("case", ALL, ids=str)
+@pytest.mark.parametrize("case", thinned(ALL, SOME, "does not depend on the cpu level"))
 def test_does_not_depend_on_the_cpu_level(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     best = case.run(161)
     for level in sw.isa_levels():
@@ -34,14 +37,14 @@ def test_does_not_depend_on_the_cpu_level(case: Case, monkeypatch: pytest.Monkey
         assert_same(case.run(3), case.run(3, backend="numpy"))
 
 
-@pytest.mark.parametrize("case", ALL, ids=str)
+@pytest.mark.parametrize("case", thinned(ALL, SOME, "does not depend on threads"))
 def test_does_not_depend_on_threads(case: Case) -> None:
     one = case.run(700, threads=1)
     for threads in (2, 7):
         assert_same(case.run(700, threads=threads), one)
 
 
-@pytest.mark.parametrize("case", ALL, ids=str)
+@pytest.mark.parametrize("case", thinned(ALL, SOME, "does not depend on company"))
 def test_does_not_depend_on_company(case: Case) -> None:
     together = case.run(90)
     system, arguments = case.make(90)
@@ -57,7 +60,7 @@ def test_does_not_depend_on_company(case: Case) -> None:
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
-@pytest.mark.parametrize("case", ALL, ids=str)
+@pytest.mark.parametrize("case", thinned(ALL, SOME, "whole equals pieces"))
 def test_whole_equals_pieces(case: Case, backend: str) -> None:
     whole = case.run(40, steps=60, every=1, t0=0.3, backend=backend)
     system, arguments = case.make(40)
@@ -87,7 +90,7 @@ def test_equals_the_reference_anywhere(case: Case, seed: int, b: int, dt: float,
     assert_same(case.run(b, seed, **options), case.run(b, seed, **options, backend="numpy"))
 
 
-@pytest.mark.parametrize("case", DIRECT, ids=str)
+@pytest.mark.parametrize("case", thinned(DIRECT, SOME, "diverging members too"))
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
 def test_diverging_members_too(case: Case) -> None:
     # Steps far past every limit: the same overflow in the same step.

@@ -598,7 +598,9 @@ def test_limits_of_chains_with_soft_and_stiff_springs(method: str) -> None:
         assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "verlet", "pefrl", "rk4"])
+@pytest.mark.parametrize(
+    "method", ["false_euler", *(pytest.param(m, marks=pytest.mark.long) for m in ("verlet", "pefrl", "rk4"))]
+)
 def test_limits_of_a_long_chain(method: str) -> None:
     n = 40
     fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))

@@ -32,6 +32,7 @@ const S: [f64; 8] = [
 ];
 
 /// sin x
+#[inline(always)]
 pub fn sin<N: Number>(x: N) -> N {
     let s = |i: usize| N::of(S[i]);
     let y = x * N::of(PER_HALF_TURN) + N::of(MAGIC);
@@ -66,6 +67,7 @@ const MANTISSA: u64 = 0x000F_FFFF_FFFF_FFFF;
 const TWO_52: u64 = 0x4330_0000_0000_0000;
 
 /// ln x
+#[inline(always)]
 pub fn log<N: Number>(x: N) -> N {
     let l = |i: usize| N::of(L[i]);
     let u = x.add_bits(TO_ONE);

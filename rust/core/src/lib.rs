@@ -5,6 +5,7 @@ pub mod error;
 pub mod functions;
 pub mod isa;
 pub mod kernel;
+pub mod large;
 pub mod method;
 pub mod number;
 pub mod pace;

@@ -80,39 +80,51 @@ pub trait Number:
 impl Number for f64 {
     type Truth = bool;
 
+    #[inline(always)]
     fn of(x: f64) -> f64 {
         x
     }
+    #[inline(always)]
     fn sqrt(self) -> f64 {
         f64::sqrt(self)
     }
+    #[inline(always)]
     fn floor(self) -> f64 {
         f64::floor(self)
     }
+    #[inline(always)]
     fn below(self, y: f64) -> bool {
         self < y
     }
+    #[inline(always)]
     fn at_most(self, y: f64) -> bool {
         self <= y
     }
+    #[inline(always)]
     fn choose(truth: bool, yes: f64, no: f64) -> f64 {
         if truth { yes } else { no }
     }
+    #[inline(always)]
     fn and_bits(self, bits: u64) -> f64 {
         f64::from_bits(self.to_bits() & bits)
     }
+    #[inline(always)]
     fn or_bits(self, bits: u64) -> f64 {
         f64::from_bits(self.to_bits() | bits)
     }
+    #[inline(always)]
     fn xor_bits(self, other: f64) -> f64 {
         f64::from_bits(self.to_bits() ^ other.to_bits())
     }
+    #[inline(always)]
     fn add_bits(self, whole: u64) -> f64 {
         f64::from_bits(self.to_bits().wrapping_add(whole))
     }
+    #[inline(always)]
     fn shift_up(self, places: u32) -> f64 {
         f64::from_bits(self.to_bits() << places)
     }
+    #[inline(always)]
     fn shift_down(self, places: u32) -> f64 {
         f64::from_bits(self.to_bits() >> places)
     }

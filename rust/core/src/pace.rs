@@ -113,11 +113,22 @@ pub fn attempt<N: Number>(
     let (step, last, runs) = pace.step_and_whether(budget);
     let made = program.run(&Stretched { s, h: step }, pace.t, step, v, y);
     let lengths: Vec<N> = made.iter().map(length2).collect();
-    let error = Error { new: [lengths[0], lengths[1]], old: [length2(v), length2(y)], estimates: &lengths[2..] };
-    let r2 = error.over_tolerance(&pace);
-    let (next, took) = pace.decided(order > LOW, r2, (step, last, runs));
+    let (next, took) = judge(&pace, order, [length2(v), length2(y)], &lengths, (step, last, runs));
     let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
     (next, goes_on(&made[0], v), goes_on(&made[1], y))
+}
+
+/// What comes after an attempt, and whether the state goes on. Of both blocks: squares of the lengths of the old state and of what was made,
+/// the new state and one or two estimates of its error.
+pub fn judge<N: Number>(
+    pace: &Pace<N>,
+    order: u32,
+    old: [N; 2],
+    made: &[N],
+    outlook: (N, N::Truth, N::Truth),
+) -> (Pace<N>, N::Truth) {
+    let error = Error { new: [made[0], made[1]], old, estimates: &made[2..] };
+    pace.decided(order > LOW, error.over_tolerance(pace), outlook)
 }
 
 /// Squares of lengths of both blocks: of the state after the step and before it, and of one or two estimates of the error.
@@ -191,6 +202,6 @@ impl<N: Number> Pace<N> {
 }
 
 /// The square of a block's length, number after number.
-fn length2<N: Number>(block: &Block<N>) -> N {
-    block.iter().fold(N::of(0.0), |total, number| total + *number * *number)
+pub fn length2<'a, N: Number>(block: impl IntoIterator<Item = &'a N>) -> N {
+    block.into_iter().fold(N::of(0.0), |total, number| total + *number * *number)
 }

@@ -41,6 +41,9 @@ impl Add<Length> for Time {
 }
 
 impl Time {
+    /// The start of the step.
+    pub const START: Time = Time(0.0);
+
     /// Its distance from the start of the step, as a share of the step.
     pub fn node(self) -> f64 {
         self.0
@@ -227,6 +230,9 @@ impl Program {
 }
 
 impl Block {
+    /// The coordinates at the start of the step, in every program.
+    pub const Y: Block = Block(1);
+
     /// The number of the entry that makes it.
     pub fn index(self) -> usize {
         self.0 as usize

@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use crate::{
     controls,
     error::Error,
+    large::Long,
     method::{Needs, Record},
     number::{Number, Symbol},
     spec::{Given, Parameters},
@@ -101,6 +102,8 @@ pub struct Kind {
     pub quantities: fn(&Given) -> Vec<(&'static str, usize)>,
     /// About how many operations an evaluation of both rates takes: of many, a step becomes no tape.
     pub operations: fn(&Given) -> usize,
+    /// The rates of one large member, where they are written by hand.
+    pub long: Option<Long>,
     /// The system over numbers, for tests.
     pub numbers: Make<f64>,
     /// The system over symbols.

@@ -2,12 +2,14 @@
 
 use std::{
     collections::HashMap,
+    hash::Hash,
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use crate::{
     controls,
     error::Error,
+    large::{Facts, STRAIGHT, group::Courses, tapes::Rated},
     method::Record,
     number::{Number, Symbol, record},
     pace::{Pace, attempt},
@@ -52,11 +54,7 @@ pub struct Scene {
 }
 
 /// The tapes of a scene.
-pub struct Traced {
-    /// How large the blocks are.
-    pub shape: Shape,
-    /// Whether the system adds something up, in a number of the state behind v and y.
-    pub tally: bool,
+pub struct Tapes {
     /// One step, or one attempt, of the whole state.
     pub step: Stage,
     /// Turns velocities into what the method carries.
@@ -65,10 +63,26 @@ pub struct Traced {
     pub finish: Option<Stage>,
     /// The recorded numbers, behind v and y.
     pub record: Option<Stage>,
-    /// How many numbers are recorded.
-    pub recorded: usize,
     /// Operations of a step as the document writes them.
     pub written: Counts,
+}
+
+/// What is known of a scene. What takes long to find is found when it is asked for first.
+pub struct Traced {
+    scene: Scene,
+    /// How large the blocks are.
+    pub shape: Shape,
+    /// Whether the system adds something up, in a number of the state behind v and y.
+    pub tally: bool,
+    /// How many numbers are recorded.
+    pub recorded: usize,
+    /// Whether the method carries something else than v between steps.
+    pub carries: bool,
+    /// About how many operations the rates take, and a step.
+    pub operations: (usize, usize),
+    tapes: OnceLock<Arc<Tapes>>,
+    /// By what is known of rates.
+    courses: Mutex<Vec<(Facts, Arc<Courses>)>>,
 }
 
 /// A traced step, before it is cut: for tests, listings and comparisons.
@@ -85,12 +99,13 @@ pub struct Steps {
 }
 
 /// The leaves of a tape: parameters, sampled inputs, the step.
-fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
+pub(crate) fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
     let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
     Parameters { given, h, numbers, sample: |table, t| Symbol::new(Op::Sample(table, t.0)) }
 }
 
-fn block(first: usize, count: usize) -> Block<Symbol> {
+/// Numbers of the state.
+pub(crate) fn block(first: usize, count: usize) -> Block<Symbol> {
     Block::from_fn(count, |i, _| Symbol::new(Op::State((first + i) as u32)))
 }
 
@@ -100,13 +115,13 @@ fn system(kind: &Kind, p: &Parameters<Symbol>, tally: Symbol) -> Box<dyn System<
 }
 
 /// The kind of system that is given.
-fn kind(given: &Given) -> Result<&'static Kind, Error> {
+pub(crate) fn kind(given: &Given) -> Result<&'static Kind, Error> {
     let known = || crate::systems::KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>().join(", ");
     crate::system::kind(&given.system).ok_or_else(|| Error::UnknownSystem { name: given.system.clone(), known: known() })
 }
 
 /// The record of a method.
-fn method(name: &str) -> Result<&'static Record, Error> {
+pub(crate) fn method(name: &str) -> Result<&'static Record, Error> {
     let known = || crate::steppers::RECORDS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
     crate::method::record(name).ok_or_else(|| Error::UnknownMethod { name: name.to_owned(), known: known() })
 }
@@ -161,7 +176,8 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
     }
 }
 
-fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Vec<Id> {
+/// The values of blocks.
+pub(crate) fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Vec<Id> {
     blocks.into_iter().flat_map(|block| block.iter().map(|symbol| symbol.0)).collect()
 }
 
@@ -181,8 +197,7 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
 fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let s = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
-    let numbers: [Symbol; Pace::<f64>::NUMBERS] =
-        std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
+    let numbers: [Symbol; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
     let budget = Symbol::new(Op::Param(BUDGET));
     let (pace, v, y) = attempt(program, s.as_ref(), order, Pace::of(numbers), budget, &v, &y);
     let mut next = ids([&v, &y]);
@@ -252,9 +267,7 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let choice = which.parse().unwrap_or(0);
     match what {
         "step" => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
-        "attempt" => {
-            trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next))
-        }
+        "attempt" => trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next)),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
@@ -262,13 +275,98 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     }
 }
 
-fn cut(given: &Given, tape: &Tape, next: &[Id]) -> Stage {
+/// Cuts a tape.
+pub(crate) fn cut(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
+}
+
+/// About how many operations the rates of a scene take, and a step.
+fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), Error> {
+    Ok(match how {
+        How::Matrix { nodes } => {
+            let n = shape.v + shape.y;
+            let products = n * (n + given.whole("inputs") * nodes.len());
+            (2 * products, 2 * products)
+        }
+        How::Method { name, .. } | How::Attempts { name } => {
+            let rates = (kind(given)?.operations)(given);
+            // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
+            let controls = if controls::is_given(given) { 2 } else { 1 };
+            (controls * rates, controls * rates * method(name)?.program().evaluations())
+        }
+    })
+}
+
+impl Scene {
+    /// What is known of it, or was found before.
+    pub fn traced(&self) -> Result<Arc<Traced>, Error> {
+        static CACHE: OnceLock<Mutex<Cache<Scene, Traced>>> = OnceLock::new();
+        Cache::find(CACHE.get_or_init(Mutex::default), self, || {
+            let shape = shape(&self.given, &self.how)?;
+            let operations = operations(&self.given, &self.how, shape)?;
+            let (mut tally, mut carries) = (false, false);
+            if let How::Method { name, .. } = &self.how {
+                (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
+            }
+            if let How::Attempts { name } = &self.how {
+                method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
+            }
+            let traced = Traced {
+                shape,
+                tally,
+                carries,
+                recorded: recorded(&self.given, &self.record)?,
+                operations,
+                tapes: OnceLock::new(),
+                courses: Mutex::default(),
+                scene: self.clone(),
+            };
+            Ok((traced, operations.1.min(4 * STRAIGHT)))
+        })
+    }
+}
+
+impl Traced {
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The tapes of all that a run needs.
+    pub fn tapes(&self) -> Result<Arc<Tapes>, Error> {
+        if let Some(tapes) = self.tapes.get() {
+            return Ok(Arc::clone(tapes));
+        }
+        let tapes = Arc::new(self.scene.trace()?);
+        Ok(Arc::clone(self.tapes.get_or_init(|| tapes)))
+    }
+
+    /// The rates as tapes of their own.
+    pub fn rated(&self) -> Result<Arc<Rated>, Error> {
+        static CACHE: OnceLock<Mutex<Cache<(Given, Vec<String>), Rated>>> = OnceLock::new();
+        let Scene { given, record, .. } = &self.scene;
+        Cache::find(CACHE.get_or_init(Mutex::default), &(given.clone(), record.clone()), || {
+            let rated = Rated::new(given, record)?;
+            let size = rated.size();
+            Ok((rated, size))
+        })
+    }
+
+    /// How the method uses rates of which these facts are known.
+    pub fn courses(&self, facts: Facts) -> Result<Arc<Courses>, Error> {
+        let mut known = self.courses.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, courses)) = known.iter().find(|(of, _)| *of == facts) {
+            return Ok(Arc::clone(courses));
+        }
+        let courses = Arc::new(Courses::new(&self.scene.how, facts, self.shape)?);
+        known.push((facts, Arc::clone(&courses)));
+        Ok(courses)
+    }
 }
 
 impl Scene {
     /// Traces all that a run needs.
-    fn trace(&self) -> Result<Traced, Error> {
+    fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
         let mut start = None;
         let mut finish = None;
@@ -277,63 +375,50 @@ impl Scene {
             for (stage, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
                     let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
-                    *stage = Some(cut(&self.given, &tape, &next));
+                    *stage = Some(cut(&self.given, &(tape, next)));
                 }
             }
         }
         let mut quantities = None;
         if !self.record.is_empty() {
-            let (tape, next) = trace_record(Tape::default(), &self.given, &self.record)?;
-            quantities = Some(cut(&self.given, &tape, &next));
+            quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
         }
-        Ok(Traced {
-            shape: steps.shape,
-            tally: steps.tally,
-            step: cut(&self.given, &steps.tape, &steps.next),
-            start,
-            finish,
-            record: quantities,
-            recorded: recorded(&self.given, &self.record)?,
-            written: steps.tape.written(),
-        })
+        let written = steps.tape.written();
+        Ok(Tapes { step: cut(&self.given, &(steps.tape, steps.next)), start, finish, record: quantities, written })
     }
+}
 
-    /// Traces all that a run needs, or finds it from before.
-    pub fn traced(&self) -> Result<Arc<Traced>, Error> {
-        let cache = CACHE.get_or_init(Mutex::default);
+/// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each vector
+/// that goes abreast, as machine code. When something new would pass it, what was there is forgotten.
+const MOST_OPERATIONS: usize = 200_000;
+
+struct Cache<K, V> {
+    known: HashMap<K, Arc<V>>,
+    operations: usize,
+}
+
+impl<K, V> Default for Cache<K, V> {
+    fn default() -> Self {
+        Cache { known: HashMap::new(), operations: 0 }
+    }
+}
+
+impl<K: Clone + Eq + Hash, V> Cache<K, V> {
+    /// What belongs to a key; it is made, with its number of operations, if it is not there.
+    fn find(cache: &Mutex<Self>, key: &K, make: impl FnOnce() -> Result<(V, usize), Error>) -> Result<Arc<V>, Error> {
         // A thread that panicked while it held the lock has left a map that is whole: entries are made outside.
         let lock = || cache.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = lock().known.get(self) {
+        if let Some(known) = lock().known.get(key) {
             return Ok(Arc::clone(known));
         }
-        let traced = Arc::new(self.trace()?);
-        let size = traced.size();
+        let (made, size) = make()?;
+        let made = Arc::new(made);
         let mut cache = lock();
         if cache.operations + size > MOST_OPERATIONS {
             *cache = Cache::default();
         }
         cache.operations += size;
-        cache.known.insert(self.clone(), Arc::clone(&traced));
-        Ok(traced)
+        cache.known.insert(key.clone(), Arc::clone(&made));
+        Ok(made)
     }
 }
-
-impl Traced {
-    /// Operations of all its bodies.
-    fn size(&self) -> usize {
-        let stages = [Some(&self.step), self.start.as_ref(), self.finish.as_ref(), self.record.as_ref()];
-        stages.into_iter().flatten().map(Stage::size).sum()
-    }
-}
-
-/// Operations of all that is kept in the cache, at most: about 50 bytes each on the tape, and at most as much again, for each vector
-/// that goes abreast, as machine code. When a scene would pass it, the others are forgotten.
-const MOST_OPERATIONS: usize = 200_000;
-
-#[derive(Default)]
-struct Cache {
-    known: HashMap<Scene, Arc<Traced>>,
-    operations: usize,
-}
-
-static CACHE: OnceLock<Mutex<Cache>> = OnceLock::new();

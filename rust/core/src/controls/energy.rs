@@ -22,6 +22,18 @@ pub struct Controlled<N: Number> {
     work: Cell<N>,
 }
 
+/// g, the share of the velocity that is taken away, and what that alone takes of the energy, (1 − (1 − g)²)·K; of h times what the energy is
+/// off and h times the kinetic energy.
+pub fn push<N: Number>(limited: bool, gain: N, off: N, kinetic: N) -> (N, N) {
+    let g = if limited {
+        let (one, twice) = (N::of(1.0), N::of(2.0) * gain);
+        one - factor(one - (twice * off) / (one + twice * kinetic))
+    } else {
+        gain * off
+    };
+    (g, (g * (N::of(2.0) - g)) * kinetic)
+}
+
 impl<N: Number> Controlled<N> {
     /// A system under the control that is given.
     pub fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
@@ -29,24 +41,13 @@ impl<N: Number> Controlled<N> {
         let (gain, target) = (p.number("control.gain"), p.h * p.number("control.target"));
         Controlled { system, limited, gain, target, work: Cell::new(tally) }
     }
-
-    /// g, the share of the velocity that is taken away.
-    fn push(&self, energies: &Energies<N>) -> N {
-        let off = energies.whole - self.target;
-        if !self.limited {
-            return self.gain * off;
-        }
-        let (one, twice) = (N::of(1.0), N::of(2.0) * self.gain);
-        one - factor(one - (twice * off) / (one + twice * energies.kinetic))
-    }
 }
 
 impl<N: Number> System<N> for Controlled<N> {
     fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
         let Some(energies) = self.system.energies(v, y) else { return self.system.dv(t, v, y) };
-        let g = self.push(&energies);
-        // What the push alone would change of the energy: ((1 − g)² − 1)·K.
-        self.work.set(self.work.get() - (g * (N::of(2.0) - g)) * energies.kinetic);
+        let (g, taken) = push(self.limited, self.gain, energies.whole - self.target, energies.kinetic);
+        self.work.set(self.work.get() - taken);
         energies.dv.zip_map(v, |dv, v| dv - g * v)
     }
 

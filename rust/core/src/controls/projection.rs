@@ -20,6 +20,17 @@ pub struct Projected<N: Number> {
     work: Cell<N>,
 }
 
+/// The factor of all velocities, and what it brings of the energy; of h times what the energy is off and h times the kinetic energy.
+pub fn scaling<N: Number>(off: N, kinetic: N) -> (N, N) {
+    let factor = factor(N::of(1.0) - off / kinetic);
+    (factor, (factor * factor - N::of(1.0)) * kinetic)
+}
+
+/// How far to go back along the gradient of the energy, whose square is this.
+pub fn nacozy<N: Number>(off: N, h: N, square: N) -> N {
+    (off / h) / square
+}
+
 impl<N: Number> Projected<N> {
     /// A system under the projection that is given.
     pub fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
@@ -33,12 +44,12 @@ impl<N: Number> Projected<N> {
         let off = energies.whole - self.target;
         if self.nacozy {
             let along = self.system.gradient(v, &energies)?;
-            let step = (off / self.h) / along.square;
+            let step = nacozy(off, self.h, along.square);
             self.work.set(self.work.get() - off);
             return Some((v.zip_map(&along.v, |v, along| v - step * along), y.zip_map(&along.y, |y, along| y - step * along)));
         }
-        let factor = factor(N::of(1.0) - off / energies.kinetic);
-        self.work.set(self.work.get() + (factor * factor - N::of(1.0)) * energies.kinetic);
+        let (factor, gained) = scaling(off, energies.kinetic);
+        self.work.set(self.work.get() + gained);
         Some((v * factor, y.clone()))
     }
 }

@@ -88,16 +88,20 @@ impl Runner {
     /// What makes so many more steps, and whether that is machine code.
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
         let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
-        if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED && self.written.get().is_none() {
-            return (&self.interpreter, false);
+        let pays = self.shape.is_some()
+            && (self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETED || self.written.get().is_some());
+        match pays.then(|| self.write()).flatten() {
+            Some(written) => (written, true),
+            None => (&self.interpreter, false),
         }
+    }
+
+    /// The machine code, written now if it was not before; none where none can be.
+    pub fn write(&self) -> Option<&dyn Kernel> {
         let write = || {
             let written = writer::write(&self.body, self.shape?)?;
             Some(Box::new(written) as Box<dyn Kernel>)
         };
-        match self.written.get_or_init(write) {
-            Some(written) => (written.as_ref(), true),
-            None => (&self.interpreter, false),
-        }
+        self.written.get_or_init(write).as_deref()
     }
 }

@@ -123,7 +123,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let (lanes, _) = plan.model.lanes(&traced, plan.machine, plan.model.width(&traced, plan.machine, b));
+    let (lanes, _) = plan.model.lanes(&traced, plan.machine, plan.model.width(&traced, plan.machine, b)?)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
@@ -190,10 +190,14 @@ impl<'a> Worker<'a> {
         let mut from = 0;
         while from < members {
             let Worker { plan, traced, machine, groups, good } = self;
-            let width = plan.model.width(traced, *machine, members - from);
-            let group = groups[width as usize].get_or_insert_with(|| plan.model.group(traced, *machine, width, &plan.clock));
+            let width = plan.model.width(traced, *machine, members - from)?;
+            let slot = &mut groups[width as usize];
+            let group = match slot {
+                Some(group) => group,
+                None => slot.insert(plan.model.group(traced, *machine, width, &plan.clock)?),
+            };
             let count = (members - from).min(group.lanes());
-            let carries = traced.finish.is_some();
+            let carries = traced.carries;
             let mut job = Job { plan, carries, group: group.as_mut(), part: &mut part, from, count, good };
             if !job.run(go_on) {
                 return Err(Error::Interrupted);

@@ -97,7 +97,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let mine = Worker::new(plan, &traced);
+    let mine = Worker::new(plan, &traced)?;
     let lanes = mine.group.lanes();
     let threads = match plan.machine.threads {
         0 if lanes > 1 && b < WORTH_A_THREAD => 1,
@@ -118,7 +118,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         first += count;
     }
     let total = b as f64;
-    crew::share(parts, threads, total, monitor, mine, || Ok(Worker::new(plan, &traced)), Worker::part)
+    crew::share(parts, threads, total, monitor, mine, || Worker::new(plan, &traced), Worker::part)
 }
 
 /// Who is in a lane: a member of the part, and which of the asked times is next.
@@ -134,11 +134,11 @@ struct Worker<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>) -> Self {
+    fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>) -> Result<Self, Error> {
         let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
         let machine = Machine { threads, ..plan.machine };
         let width = if plan.members > 1 { Width::Wide } else { Width::One };
-        Worker { plan, group: plan.model.paced(traced, machine, width, plan.budget as f64) }
+        Ok(Worker { plan, group: plan.model.paced(traced, machine, width, plan.budget as f64)? })
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {

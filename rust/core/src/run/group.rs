@@ -6,7 +6,14 @@ use super::{
     aligned::Aligned,
     stage::{Clock, Loaded, Stage},
 };
-use crate::{isa::Level, kernel::runner::Width, spec::Spec, trace::Traced};
+use crate::{
+    error::Error,
+    isa::Level,
+    kernel::runner::Width,
+    spec::Spec,
+    system::Shape,
+    trace::{Tapes, Traced},
+};
 
 /// A handful of members stepped together.
 ///
@@ -18,6 +25,9 @@ pub trait Group: Send + Sync {
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Makes now what would be made when it pays: for a loop that cannot wait.
+    fn settle(&mut self) {}
 
     /// Both slots.
     fn slots(&self) -> (&[f64], &[f64]);
@@ -71,7 +81,9 @@ impl Aside {
 
 /// Members of a system whose whole step is one tape.
 pub struct Lanes {
-    traced: Arc<Traced>,
+    tapes: Arc<Tapes>,
+    shape: Shape,
+    recorded: usize,
     clock: Clock,
     step: Loaded,
     start: Option<Aside>,
@@ -82,33 +94,36 @@ pub struct Lanes {
 
 impl Lanes {
     /// For tiles of so many lanes as the width says.
-    pub fn new(traced: Arc<Traced>, spec: &Spec, level: Level, width: Width, clock: &Clock) -> Lanes {
-        let step = Loaded::new(&traced.step, spec, level, width, clock, f64::INFINITY);
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, width: Width, clock: &Clock) -> Result<Lanes, Error> {
+        let tapes = traced.tapes()?;
+        let step = Loaded::new(&tapes.step, spec, level, width, clock, f64::INFINITY);
         let lanes = step.lanes();
         let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
         let aside = |stage: &Option<Stage>| stage.as_ref().map(|stage| Aside::new(stage, spec, level, lanes, clock));
-        Lanes {
+        Ok(Lanes {
             state: Aligned::new(numbers * lanes),
             clock: *clock,
-            start: aside(&traced.start),
-            finish: aside(&traced.finish),
-            record: aside(&traced.record),
+            start: aside(&tapes.start),
+            finish: aside(&tapes.finish),
+            record: aside(&tapes.record),
             step,
-            traced,
-        }
+            tapes,
+            shape: traced.shape,
+            recorded: traced.recorded,
+        })
     }
 
     /// The stages that are run once in a while.
     fn asides(&mut self) -> impl Iterator<Item = (&mut Aside, &Stage)> {
-        let Lanes { traced, start, finish, record, .. } = self;
-        let all = [(start, &traced.start), (finish, &traced.finish), (record, &traced.record)];
+        let Lanes { tapes, start, finish, record, .. } = self;
+        let all = [(start, &tapes.start), (finish, &tapes.finish), (record, &tapes.record)];
         all.into_iter().filter_map(|(aside, stage)| Some((aside.as_mut()?, stage.as_ref()?)))
     }
 
     /// Numbers of both slots.
     fn sizes(&self) -> (usize, usize) {
         let lanes = self.step.lanes();
-        (self.traced.shape.v * lanes, self.traced.shape.y * lanes)
+        (self.shape.v * lanes, self.shape.y * lanes)
     }
 }
 
@@ -118,11 +133,16 @@ impl Group for Lanes {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        self.step.prepare(&self.traced.step, spec, first, count);
+        self.step.prepare(&self.tapes.step, spec, first, count);
         for (aside, stage) in self.asides() {
             aside.loaded.prepare(stage, spec, first, count);
         }
         self.tally_mut().fill(0.0);
+    }
+
+    fn settle(&mut self) {
+        self.step.settle();
+        self.asides().for_each(|(aside, _)| aside.loaded.settle());
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -137,31 +157,31 @@ impl Group for Lanes {
 
     fn start(&mut self, k: i64) {
         let v = self.sizes().0;
-        if let (Some(aside), Some(stage)) = (&mut self.start, &self.traced.start) {
+        if let (Some(aside), Some(stage)) = (&mut self.start, &self.tapes.start) {
             let made = aside.run(stage, &self.clock, k, &self.state);
             self.state[..v].copy_from_slice(&made[..v]);
         }
     }
 
     fn advance(&mut self, k: i64, n: i64) {
-        self.step.advance(&self.traced.step, &self.clock, k, n as usize, &mut self.state);
+        self.step.advance(&self.tapes.step, &self.clock, k, n as usize, &mut self.state);
     }
 
     fn finish(&mut self, k: i64) {
         let v = self.sizes().0;
-        if let (Some(aside), Some(stage)) = (&mut self.finish, &self.traced.finish) {
+        if let (Some(aside), Some(stage)) = (&mut self.finish, &self.tapes.finish) {
             let made = aside.run(stage, &self.clock, k, &self.state);
             self.state[..v].copy_from_slice(&made[..v]);
         }
     }
 
     fn recorded(&self) -> usize {
-        self.traced.recorded
+        self.recorded
     }
 
     fn record(&mut self, rows: &mut [f64]) {
         let (v, y) = self.sizes();
-        if let (Some(aside), Some(stage)) = (&mut self.record, &self.traced.record) {
+        if let (Some(aside), Some(stage)) = (&mut self.record, &self.tapes.record) {
             let made = aside.run(stage, &self.clock, 0, &self.state[..v + y]);
             rows.copy_from_slice(&made[v + y..]);
         }

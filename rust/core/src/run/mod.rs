@@ -13,15 +13,23 @@ use std::sync::Arc;
 
 use self::{
     group::{Group, Lanes},
-    paced::{Paced, PacedLanes},
+    paced::{NO_CLOCK, Paced, PacedLanes},
     stage::Clock,
 };
 use crate::{
     error::Error,
     isa::Level,
     kernel::runner::Width,
+    large::{
+        self, Asked, Long, Rates, STRAIGHT, STRAIGHT_RATES,
+        group::LargeGroup,
+        matrix::Matrix,
+        paced::LargePaced,
+        tapes::{self, TapeRates},
+    },
     spec::Spec,
-    trace::{Scene, Traced},
+    system,
+    trace::{How, Scene, Traced},
 };
 
 /// What to step, and how.
@@ -48,29 +56,98 @@ impl Model<'_> {
         self.scene.traced()
     }
 
+    /// By what a group of that width is stepped.
+    fn way(&self, traced: &Traced, machine: Machine, width: Width) -> Way {
+        let (rates, step) = traced.operations;
+        let lone = width == Width::One;
+        if let How::Matrix { .. } = &self.scene.how {
+            return if rates > if lone { LONE_MAP } else { STRAIGHT_RATES } { Way::Map } else { Way::Tape };
+        }
+        let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
+        let large = step > STRAIGHT;
+        match long {
+            Some(long) if lone && rates >= long.from || large && rates > STRAIGHT_RATES => Way::Long(long),
+            _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
+            _ => Way::Tape,
+        }
+    }
+
     /// How many members a group of that width steps together, and about what a step costs beside one of few.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> (usize, usize) {
-        let runner = &traced.step.kit(machine.level, width).runner;
-        (runner.lanes(), runner.cost())
+    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> Result<(usize, usize), Error> {
+        Ok(match self.way(traced, machine, width) {
+            Way::Tape => {
+                let tapes = traced.tapes()?;
+                let runner = &tapes.step.kit(machine.level, width).runner;
+                (runner.lanes(), runner.cost())
+            }
+            Way::Rates(lanes) => (lanes, 1),
+            Way::Long(_) | Way::Map => (1, 1),
+        })
+    }
+
+    fn asked(&self, traced: &Traced, machine: Machine, h: f64) -> Asked<'_> {
+        Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h }
     }
 
     /// A group that steps it.
-    pub fn group(&self, traced: &Arc<Traced>, machine: Machine, width: Width, clock: &Clock) -> Box<dyn Group> {
-        Box::new(Lanes::new(Arc::clone(traced), &self.spec, machine.level, width, clock))
+    pub fn group(&self, traced: &Traced, machine: Machine, width: Width, clock: &Clock) -> Result<Box<dyn Group>, Error> {
+        let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
+        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
+            Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, width, clock)?)),
+            Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
+            Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
+            Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
+        };
+        let courses = traced.courses(rates.facts())?;
+        Ok(Box::new(LargeGroup::new(courses, rates, shape, traced.recorded, level, clock)))
     }
 
     /// A group whose members go at a pace of their own each.
-    pub fn paced(&self, traced: &Arc<Traced>, machine: Machine, width: Width, budget: f64) -> Box<dyn Paced> {
-        Box::new(PacedLanes::new(Arc::clone(traced), &self.spec, machine.level, width, budget))
+    pub fn paced(&self, traced: &Traced, machine: Machine, width: Width, budget: f64) -> Result<Box<dyn Paced>, Error> {
+        let (spec, level) = (&self.spec, machine.level);
+        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
+            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
+            // Rates are asked for at one time, so a large member goes alone.
+            way => match (way, self.way(traced, machine, Width::One)) {
+                (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
+                _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
+            },
+        };
+        let courses = traced.courses(rates.facts())?;
+        Ok(Box::new(LargePaced::new(courses, rates, traced, level, budget)?))
     }
 
     /// Which width serves so many members best.
-    pub fn width(&self, traced: &Traced, machine: Machine, members: usize) -> Width {
+    pub fn width(&self, traced: &Traced, machine: Machine, members: usize) -> Result<Width, Error> {
         if members == 1 {
-            return Width::One;
+            return Ok(Width::One);
         }
-        let (lanes, cost) = self.lanes(traced, machine, Width::Wide);
-        let (few, each) = self.lanes(traced, machine, Width::Few);
-        if members < lanes && members.div_ceil(few) * each < cost { Width::Few } else { Width::Wide }
+        if let Way::Tape = self.way(traced, machine, Width::Wide) {
+            let (lanes, cost) = self.lanes(traced, machine, Width::Wide)?;
+            let (few, each) = self.lanes(traced, machine, Width::Few)?;
+            let narrow = members < lanes && members.div_ceil(few) * each < cost;
+            return Ok(if narrow { Width::Few } else { Width::Wide });
+        }
+        // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
+        let alone = members <= ALONE && matches!(self.way(traced, machine, Width::One), Way::Long(_) | Way::Map);
+        Ok(if alone { Width::One } else { Width::Wide })
     }
 }
+
+/// By what a group is stepped.
+#[derive(Clone, Copy)]
+enum Way {
+    /// One tape for the whole step.
+    Tape,
+    /// Tapes for the rates, with so many lanes.
+    Rates(usize),
+    /// A kernel that is written by hand, for a lone member.
+    Long(Long),
+    /// A large matrix.
+    Map,
+}
+
+/// Operations of the matrix form from which on a kernel that is written by hand is quicker than machine code for one number at a time.
+const LONE_MAP: usize = 2 * 8 * 8;
+/// So many members of a large system are as quick one by one as side by side.
+const ALONE: usize = 4;

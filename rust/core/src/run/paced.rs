@@ -6,7 +6,14 @@ use super::{
     aligned::Aligned,
     stage::{Clock, Loaded},
 };
-use crate::{isa::Level, kernel::runner::Width, pace::Pace, spec::Spec, trace::Traced};
+use crate::{
+    error::Error,
+    isa::Level,
+    kernel::runner::Width,
+    pace::Pace,
+    spec::Spec,
+    trace::{Tapes, Traced},
+};
 
 /// A handful of members, each with a time and a step of its own, scaled to a step of 1.
 pub trait Paced: Send {
@@ -34,25 +41,25 @@ pub trait Paced: Send {
 
 /// Members of a system whose whole attempt is one tape.
 pub struct PacedLanes {
-    traced: Arc<Traced>,
+    tapes: Arc<Tapes>,
+    /// Numbers of v and y.
+    numbers: usize,
     step: Loaded,
     /// Rows of v, of y and of the paces.
     state: Aligned,
 }
 
 /// Every lane has its own time, so no step has one.
-const NO_CLOCK: Clock = Clock { t0: 0.0, h: 1.0 };
+pub(crate) const NO_CLOCK: Clock = Clock { t0: 0.0, h: 1.0 };
 
 impl PacedLanes {
     /// For tiles of so many lanes as the width says.
-    pub fn new(traced: Arc<Traced>, spec: &Spec, level: Level, width: Width, budget: f64) -> PacedLanes {
-        let step = Loaded::new(&traced.step, spec, level, width, &NO_CLOCK, budget);
-        let numbers = traced.shape.v + traced.shape.y + Pace::<f64>::NUMBERS;
-        PacedLanes { state: Aligned::new(numbers * step.lanes()), step, traced }
-    }
-
-    fn numbers(&self) -> usize {
-        self.traced.shape.v + self.traced.shape.y
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, width: Width, budget: f64) -> Result<PacedLanes, Error> {
+        let tapes = traced.tapes()?;
+        let step = Loaded::new(&tapes.step, spec, level, width, &NO_CLOCK, budget);
+        let numbers = traced.shape.v + traced.shape.y;
+        let state = Aligned::new((numbers + Pace::<f64>::NUMBERS) * step.lanes());
+        Ok(PacedLanes { state, step, numbers, tapes })
     }
 }
 
@@ -62,7 +69,7 @@ impl Paced for PacedLanes {
     }
 
     fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
-        self.step.prepare_lane(&self.traced.step, spec, lane, member);
+        self.step.prepare_lane(&self.tapes.step, spec, lane, member);
     }
 
     fn sit(&mut self, lane: usize, state: &[f64]) {
@@ -74,22 +81,22 @@ impl Paced for PacedLanes {
 
     fn state(&self, lane: usize) -> Vec<f64> {
         let lanes = self.step.lanes();
-        self.state.chunks_exact(lanes).take(self.numbers()).map(|row| row[lane]).collect()
+        self.state.chunks_exact(lanes).take(self.numbers).map(|row| row[lane]).collect()
     }
 
     fn pace(&self, lane: usize) -> Pace<f64> {
-        let (lanes, before) = (self.step.lanes(), self.numbers());
+        let (lanes, before) = (self.step.lanes(), self.numbers);
         Pace::of(std::array::from_fn(|i| self.state[(before + i) * lanes + lane]))
     }
 
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {
-        let (lanes, before) = (self.step.lanes(), self.numbers());
+        let (lanes, before) = (self.step.lanes(), self.numbers);
         for (i, number) in pace.numbers().into_iter().enumerate() {
             self.state[(before + i) * lanes + lane] = number;
         }
     }
 
     fn attempt(&mut self, attempts: usize) {
-        self.step.advance(&self.traced.step, &NO_CLOCK, 0, attempts, &mut self.state);
+        self.step.advance(&self.tapes.step, &NO_CLOCK, 0, attempts, &mut self.state);
     }
 }

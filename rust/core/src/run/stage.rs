@@ -36,6 +36,8 @@ pub struct Kit {
     lone: Interpreter,
     /// Once for each step.
     step: Interpreter,
+    /// Once for each time that comes alone.
+    moment: Interpreter,
 }
 
 impl Kit {
@@ -45,6 +47,7 @@ impl Kit {
             member: Interpreter::new(&split.member, runner.lanes(), level),
             lone: Interpreter::new(&split.member, 1, Level::Baseline),
             step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
+            moment: Interpreter::new(&split.step, 1, Level::Baseline),
             runner,
         })
     }
@@ -118,6 +121,14 @@ pub struct Loaded {
     common: Vec<Vec<f64>>,
     /// Tables of steps, by their first step.
     tables: Vec<(i64, Vec<u64>)>,
+    /// How many of them are kept at most, and which makes place next.
+    most_tables: usize,
+    oldest: usize,
+    /// The times of the steps of a table.
+    times: Vec<f64>,
+    /// The entries of one time, and the values that entries are made of.
+    moment: Vec<u64>,
+    values: Vec<f64>,
     raw: Vec<f64>,
     scratch: Vec<f64>,
 }
@@ -159,6 +170,11 @@ impl Loaded {
             inputs: Vec::new(),
             common,
             tables: Vec::new(),
+            most_tables: (MOST_ENTRIES / (STEPS_AT_ONCE as usize * split.entries.len()).max(1)).max(1),
+            oldest: 0,
+            times: Vec::new(),
+            moment: Vec::new(),
+            values: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
             scratch,
             kit,
@@ -199,8 +215,8 @@ impl Loaded {
     /// Fills the rows of samples of inputs of which members have their own.
     fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
         let lanes = self.lanes();
-        let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)))
-            || stage.split.given.contains(&Given::Lanes);
+        let of_members =
+            stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_))) || stage.split.given.contains(&Given::Lanes);
         if !of_members {
             return;
         }
@@ -218,29 +234,49 @@ impl Loaded {
         }
     }
 
+    /// Writes now what would be written when it pays, and keeps no more than a loop needs that goes on and on.
+    pub fn settle(&mut self) {
+        self.kit.runner.write();
+        self.most_tables = 1;
+    }
+
     /// So many steps of a state from step `k`.
     pub fn advance(&mut self, stage: &Stage, clock: &Clock, k: i64, n: usize, state: &mut [f64]) {
         if stage.split.entries.is_empty() {
-            self.steps(n, None, state);
+            self.steps(n, &[], state);
             return;
         }
         let (mut k, until) = (k, k + n as i64);
         while k < until {
             let first = k.div_euclid(STEPS_AT_ONCE) * STEPS_AT_ONCE;
             let n = (until - k).min(first + STEPS_AT_ONCE - k);
-            let table = self.table(stage, clock, first);
-            self.steps(n as usize, Some((table, (k - first) as usize * stage.split.entries.len())), state);
+            let at = self.table(stage, clock, first);
+            let table = std::mem::take(&mut self.tables[at].1);
+            self.steps(n as usize, &table[(k - first) as usize * stage.split.entries.len()..], state);
+            self.tables[at].1 = table;
             k += n;
         }
     }
 
-    fn steps(&mut self, steps: usize, table: Option<(usize, usize)>, state: &mut [f64]) {
+    /// One step of a state at a time.
+    pub fn advance_at(&mut self, stage: &Stage, t: f64, state: &mut [f64]) {
+        if stage.split.entries.is_empty() {
+            self.steps(1, &[], state);
+            return;
+        }
+        let mut table = std::mem::take(&mut self.moment);
+        let kit = Arc::clone(&self.kit);
+        self.fill(stage, &kit.moment, &[t], &mut table);
+        self.steps(1, &table, state);
+        self.moment = table;
+    }
+
+    fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [f64]) {
         let (kernel, written) = self.kit.runner.kernel(steps);
         if self.pool_for != Some(written) {
             self.pool = Aligned::from(&kernel.pool(&self.uniforms));
             self.pool_for = Some(written);
         }
-        let per_step = table.map_or(&[][..], |(at, from)| &self.tables[at].1[from..]);
         let tile = &mut Tile { state, rows: &self.rows, pool: &self.pool, steps, per_step, held: &self.held };
         kernel.run(tile, &mut self.scratch);
     }
@@ -250,19 +286,36 @@ impl Loaded {
         if let Some(at) = self.tables.iter().position(|(from, _)| *from == first) {
             return at;
         }
-        let (entries, steps) = (&stage.split.entries, STEPS_AT_ONCE as usize);
-        if self.tables.iter().map(|(_, table)| table.len()).sum::<usize>() + steps * entries.len() > MOST_ENTRIES {
-            self.tables.clear();
-        }
-        let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
-        let mut values = vec![0.0; entries.len() * steps];
-        let tile = &mut Tile { state: &mut values, rows: &times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        self.kit.step.run(tile, &mut self.scratch);
-        let lanes = self.lanes();
-        let mut table = vec![0; steps * entries.len()];
+        let at = if self.tables.len() < self.most_tables {
+            self.tables.push((first, Vec::new()));
+            self.tables.len() - 1
+        } else {
+            self.oldest = (self.oldest + 1) % self.most_tables;
+            self.tables[self.oldest].0 = first;
+            self.oldest
+        };
+        // What is there already is filled anew: a step of a world allocates nothing.
+        let (mut times, mut table) = (std::mem::take(&mut self.times), std::mem::take(&mut self.tables[at].1));
+        times.clear();
+        times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        let kit = Arc::clone(&self.kit);
+        self.fill(stage, &kit.step, &times, &mut table);
+        (self.times, self.tables[at].1) = (times, table);
+        at
+    }
+
+    /// The entries of steps at these times, as many as the interpreter has lanes.
+    fn fill(&mut self, stage: &Stage, step: &Interpreter, times: &[f64], table: &mut Vec<u64>) {
+        let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
+        self.values.clear();
+        self.values.resize(entries.len() * steps, 0.0);
+        let tile = &mut Tile { state: &mut self.values, rows: times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
+        step.run(tile, &mut self.scratch);
+        table.clear();
+        table.resize(steps * entries.len(), 0);
         for (e, entry) in entries.iter().enumerate() {
             for step in 0..steps {
-                let value = values[e * steps + step];
+                let value = self.values[e * steps + step];
                 table[step * entries.len() + e] = match *entry {
                     Entry::Value => value.to_bits(),
                     Entry::Sample(input) => self.common[input as usize][value as usize].to_bits(),
@@ -270,8 +323,6 @@ impl Loaded {
                 };
             }
         }
-        self.tables.push((first, table));
-        self.tables.len() - 1
     }
 }
 

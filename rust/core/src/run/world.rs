@@ -48,15 +48,16 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let width = model.width(&traced, machine, members - first);
-            let mut group = model.group(&traced, machine, width, &clock);
+            let width = model.width(&traced, machine, members - first)?;
+            let mut group = model.group(&traced, machine, width, &clock)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
+            group.settle();
             shares.push(Share { group, first, count });
             first += count;
         }
         let sizes = (traced.shape.v * members, traced.shape.y * members);
-        Ok(World { clock, shares, members, sizes, carries: traced.finish.is_some(), written: None, step })
+        Ok(World { clock, shares, members, sizes, carries: traced.carries, written: None, step })
     }
 
     /// How many numbers each array holds.

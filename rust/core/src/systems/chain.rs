@@ -5,6 +5,7 @@
 
 use crate::{
     error::Error,
+    large::{Long, chain},
     number::Number,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
@@ -12,7 +13,8 @@ use crate::{
 
 /// What the core knows of it. Given: `stiffness` of the n + 1 springs, `mass` of the n masses.
 pub const KIND: Kind =
-    Kind { name: "chain", shape, velocity_term: |_| None, quantities: |_| Vec::new(), operations: |given| 6 * given.count("mass"), numbers: make, symbols: make };
+    Kind { name: "chain", shape, velocity_term: |_| None, quantities: |_| Vec::new(), operations: |given| 6 * given.count("mass"), long: Some(Long { from: 6 * 16, make: chain::make }),
+    numbers: make, symbols: make };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
     let n = given.count("mass").max(1);

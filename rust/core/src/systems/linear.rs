@@ -4,6 +4,7 @@
 
 use crate::{
     error::Error,
+    large::{Long, linear},
     number::Number,
     signal::Signal,
     spec::{Given, Parameters},
@@ -18,6 +19,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |given| (given.word("kind") != "acceleration").then_some("rates of another kind"),
     quantities: |_| Vec::new(),
     operations: |given| 2 * given.count("rows"),
+    long: Some(Long { from: 2 * 8 * 8, make: linear::make }),
     numbers: make,
     symbols: make,
 };

@@ -13,6 +13,7 @@
 use crate::{
     error::Error,
     functions::log,
+    large::{Long, bodies},
     number::Number,
     spec::{Given, Parameters},
     system::{Block, Energies, Gradient, Kind, Shape, System},
@@ -20,7 +21,8 @@ use crate::{
 
 /// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
 /// `softening`, ε.
-pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, operations: |given| 11 * given.count("masses").pow(2), numbers: make::<f64>, symbols: make };
+pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, operations: |given| 11 * given.count("masses").pow(2), long: Some(Long { from: 11 * 8 * 8, make: bodies::make }),
+    numbers: make::<f64>, symbols: make };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
     let dim = given.whole("dim");
@@ -45,13 +47,13 @@ fn quantities(given: &Given) -> Vec<(&'static str, usize)> {
 
 /// A force and its potential.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Law {
+pub(crate) enum Law {
     Logarithmic,
     Newton,
     Printed,
 }
 
-fn law(given: &Given) -> Option<Law> {
+pub(crate) fn law(given: &Given) -> Option<Law> {
     match given.word("force") {
         "logarithmic" => Some(Law::Logarithmic),
         "newton" => Some(Law::Newton),
@@ -62,13 +64,15 @@ fn law(given: &Given) -> Option<Law> {
 
 impl Law {
     /// f(r²)
-    fn pull<N: Number>(self, r2: N) -> N {
+    #[inline(always)]
+    pub(crate) fn pull<N: Number>(self, r2: N) -> N {
         let r2 = if self == Law::Newton { r2 * r2.sqrt() } else { r2 };
         N::of(1.0) / r2
     }
 
     /// The potential, per mass, that a partner makes.
-    fn potential<N: Number>(self, r2: N, pull: N, strength: N) -> N {
+    #[inline(always)]
+    pub(crate) fn potential<N: Number>(self, r2: N, pull: N, strength: N) -> N {
         match self {
             Law::Logarithmic => (N::of(0.5) * log(r2)) * strength,
             Law::Newton => -(r2 * (pull * strength)), // the product is at hand

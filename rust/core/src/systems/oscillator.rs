@@ -20,6 +20,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |given| given.has("damping").then_some("damping"),
     quantities: |_| Vec::new(),
     operations: |_| 40,
+    long: None,
     numbers: make,
     symbols: make,
 };

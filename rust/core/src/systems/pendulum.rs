@@ -16,6 +16,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |given| given.has("damping").then_some("damping"),
     quantities: |_| Vec::new(),
     operations: |_| 60,
+    long: None,
     numbers: make,
     symbols: make,
 };

@@ -17,6 +17,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |_| Some("the Coriolis force"),
     quantities: |_| Vec::new(),
     operations: |_| 40,
+    long: None,
     numbers: make,
     symbols: make,
 };

@@ -1,0 +1,282 @@
+//! The forces: several bodies side by side.
+
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+use super::{Distances, SIDE, law};
+use crate::{isa::Task, systems::nbody::meeting};
+
+type Chunk = [f64; SIDE];
+
+#[inline(always)]
+fn load(from: &[f64], at: usize) -> Chunk {
+    let mut chunk = [0.0; SIDE];
+    chunk.copy_from_slice(&from[at..at + SIDE]);
+    chunk
+}
+
+#[inline(always)]
+fn store(to: &mut [f64], at: usize, chunk: &Chunk) {
+    to[at..at + SIDE].copy_from_slice(chunk);
+}
+
+/// Where bodies are and what they weigh, along the bodies, for two rounds and more.
+pub(super) struct Round {
+    /// Places, one row for each direction.
+    pub(super) places: Vec<Vec<f64>>,
+    /// h·G·m of partners.
+    pub(super) partners: Vec<f64>,
+    /// h·G·m of bodies; zero for what fills the last chunk.
+    pub(super) bodies: Vec<f64>,
+    pub(super) soft: f64,
+}
+
+impl Round {
+    /// For so many bodies: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
+    pub(super) fn new(n: usize, dim: usize) -> Self {
+        let rounds = 2 * n + 4 * SIDE;
+        Round {
+            places: vec![vec![0.0; rounds]; dim],
+            partners: vec![0.0; rounds],
+            bodies: vec![0.0; n.next_multiple_of(SIDE)],
+            soft: 0.0,
+        }
+    }
+
+    /// Takes h·G·m of each body, and ε².
+    pub(super) fn take(&mut self, n: usize, strength: impl Fn(usize) -> f64, soft: f64) {
+        for i in 0..n {
+            self.bodies[i] = strength(i);
+        }
+        for (i, partner) in self.partners.iter_mut().enumerate() {
+            *partner = self.bodies[i % n];
+        }
+        self.soft = soft;
+    }
+
+    /// Takes the places of one round and repeats them.
+    pub(super) fn fill<const D: usize>(&mut self, y: &[f64]) {
+        let (bodies, _) = y.as_chunks::<D>();
+        let n = bodies.len();
+        for (c, row) in self.places.iter_mut().enumerate() {
+            let (low, high) = row.split_at_mut(n);
+            for (place, body) in low.iter_mut().zip(bodies) {
+                *place = body[c];
+            }
+            for part in high.chunks_mut(n) {
+                part.copy_from_slice(&low[..part.len()]);
+            }
+        }
+    }
+}
+
+/// What bodies collect from the partners after them and before them, the latter over two rounds, and their potential.
+pub(super) struct Sums {
+    after: Vec<f64>,
+    before: Vec<f64>,
+    potential: Vec<f64>,
+}
+
+impl Sums {
+    pub(super) fn new(round: &Round) -> Self {
+        let (width, stride, dim) = (round.bodies.len(), round.partners.len(), round.places.len());
+        Sums { after: vec![0.0; dim * width], before: vec![0.0; dim * stride], potential: vec![0.0; width] }
+    }
+}
+
+/// The bodies meet at the distances of one slab.
+pub(super) struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
+    pub(super) n: usize,
+    pub(super) groups: &'a [Distances],
+    pub(super) round: &'a Round,
+    pub(super) sums: &'a mut Sums,
+    /// Whether to add to what is there.
+    pub(super) more: bool,
+    pub(super) potential: &'a mut [f64],
+    pub(super) out: &'a mut [f64],
+}
+
+/// A chunk of bodies, with what they collect.
+#[derive(Clone, Copy)]
+struct Bodies<const D: usize> {
+    place: [Chunk; D],
+    strength: Chunk,
+    pull: [Chunk; D],
+    well: Chunk,
+}
+
+/// A chunk of partners, with what they collect.
+struct Partners<const D: usize> {
+    place: [Chunk; D],
+    strength: Chunk,
+    pull: [Chunk; D],
+}
+
+impl<const D: usize> Bodies<D> {
+    /// Meets a chunk of partners; `met` has no bits where nobody meets.
+    #[inline(always)]
+    fn meet<const LAW: u8, const ENERGY: bool>(&mut self, p: &mut Partners<D>, soft: f64, met: Option<&[u64; SIDE]>) {
+        let mut d = [[0.0; SIDE]; D];
+        let mut r2 = [0.0; SIDE];
+        for c in 0..D {
+            for l in 0..SIDE {
+                d[c][l] = p.place[c][l] - self.place[c][l];
+                r2[l] = if c == 0 { d[c][l] * d[c][l] } else { r2[l] + d[c][l] * d[c][l] };
+            }
+        }
+        let (mut to_i, mut to_j, mut more) = ([0.0; SIDE], [0.0; SIDE], [0.0; SIDE]);
+        for l in 0..SIDE {
+            let r2 = r2[l] + soft;
+            let pull = const { law(LAW) }.pull(r2);
+            to_i[l] = pull * p.strength[l];
+            to_j[l] = pull * self.strength[l];
+            if ENERGY {
+                more[l] = const { law(LAW) }.potential(r2, pull, p.strength[l]);
+            }
+        }
+        if let Some(met) = met {
+            // Adding nothing changes no sum. Bits, not a choice, which would become eight branches.
+            for l in 0..SIDE {
+                to_i[l] = f64::from_bits(to_i[l].to_bits() & met[l]);
+                to_j[l] = f64::from_bits(to_j[l].to_bits() & met[l]);
+                more[l] = f64::from_bits(more[l].to_bits() & met[l]);
+            }
+        }
+        for c in 0..D {
+            for l in 0..SIDE {
+                self.pull[c][l] += d[c][l] * to_i[l];
+                p.pull[c][l] -= d[c][l] * to_j[l];
+            }
+        }
+        if ENERGY {
+            for l in 0..SIDE {
+                self.well[l] += more[l];
+            }
+        }
+    }
+}
+
+impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY> {
+    /// The chunks of bodies from `A` to `B`, of those that are held, meet the chunk of partners at `at`.
+    #[inline(always)]
+    fn partner<const A: usize, const B: usize, const U: usize>(
+        &mut self,
+        held: &mut [Bodies<D>; U],
+        at: usize,
+        met: Option<&[u64; SIDE]>,
+    ) {
+        let stride = self.round.partners.len();
+        let strength = load(&self.round.partners, at);
+        let mut p = Partners { place: [[0.0; SIDE]; D], strength, pull: [[0.0; SIDE]; D] };
+        for c in 0..D {
+            p.place[c] = load(&self.round.places[c], at);
+            p.pull[c] = load(&self.sums.before, c * stride + at);
+        }
+        for t in A..B {
+            held[t].meet::<LAW, ENERGY>(&mut p, self.round.soft, if t == U - 1 { met } else { None });
+        }
+        for c in 0..D {
+            store(&mut self.sums.before, c * stride + at, &p.pull[c]);
+        }
+    }
+
+    /// One or two chunks of bodies, held in registers, meet their partners at `many` distances from `first`, `SIDE` apart. What
+    /// the first of two meets at one distance the second meets at the distance before.
+    #[inline(always)]
+    fn hold<const U: usize>(&mut self, start: usize, first: usize, many: usize, met: Option<&[u64; SIDE]>) {
+        let width = self.round.bodies.len();
+        let mut held = [Bodies { place: [[0.0; SIDE]; D], strength: [0.0; SIDE], pull: [[0.0; SIDE]; D], well: [0.0; SIDE] }; U];
+        for t in 0..U {
+            let at = start + SIDE * t;
+            for c in 0..D {
+                held[t].place[c] = load(&self.round.places[c], at);
+                held[t].pull[c] = load(&self.sums.after, c * width + at);
+            }
+            held[t].strength = load(&self.round.bodies, at);
+            if ENERGY {
+                held[t].well = load(&self.sums.potential, at);
+            }
+        }
+        let from = start + first;
+        if U == 2 {
+            self.partner::<0, 1, U>(&mut held, from, met);
+        }
+        for q in U - 1..many {
+            self.partner::<0, U, U>(&mut held, from + SIDE * q, met);
+        }
+        if U == 2 {
+            self.partner::<1, U, U>(&mut held, from + SIDE * many, met);
+        }
+        for t in 0..U {
+            let at = start + SIDE * t;
+            for c in 0..D {
+                store(&mut self.sums.after, c * width + at, &held[t].pull[c]);
+            }
+            if ENERGY {
+                store(&mut self.sums.potential, at, &held[t].well);
+            }
+        }
+    }
+
+    /// The bodies from `start` to `end` meet their partners.
+    #[inline(always)]
+    fn sweep(&mut self, mut start: usize, end: usize, first: usize, many: usize) {
+        while start + 2 * SIDE <= end {
+            self.hold::<2>(start, first, many, None);
+            start += 2 * SIDE;
+        }
+        if start < end {
+            let mut met = [0; SIDE];
+            let two = start + SIDE < end;
+            let left = end - start - if two { SIDE } else { 0 };
+            met[..left].fill(u64::MAX);
+            if two {
+                self.hold::<2>(start, first, many, Some(&met));
+            } else {
+                self.hold::<1>(start, first, many, Some(&met));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn meet(&mut self) {
+        let (n, width, stride) = (self.n, self.round.bodies.len(), self.round.partners.len());
+        self.sums.after.fill(0.0);
+        self.sums.before.fill(0.0);
+        if ENERGY {
+            self.sums.potential.fill(0.0);
+        }
+        let groups = self.groups;
+        for &(first, last) in groups {
+            let many = (last - first) / SIDE + 1;
+            let count = meeting(n, last);
+            self.sweep(0, count, first, many);
+            if count < n && many > 1 {
+                // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks.
+                self.sweep(count, n, first, many - 1);
+            }
+        }
+        let (out, _) = self.out.as_chunks_mut::<D>();
+        for c in 0..D {
+            let (after, before) = (&self.sums.after[c * width..][..n], &self.sums.before[c * stride..][..2 * n]);
+            let (low, high) = before.split_at(n);
+            let sums = after.iter().zip(low).zip(high).map(|((after, low), high)| after + (low + high));
+            if self.more {
+                out.iter_mut().zip(sums).for_each(|(out, sum)| out[c] += sum);
+            } else {
+                out.iter_mut().zip(sums).for_each(|(out, sum)| out[c] = sum);
+            }
+        }
+        if ENERGY {
+            for (out, well) in self.potential.iter_mut().zip(&self.sums.potential) {
+                *out = if self.more { *out + well } else { *well };
+            }
+        }
+    }
+}
+
+impl<const D: usize, const LAW: u8, const ENERGY: bool> Task for Along<'_, D, LAW, ENERGY> {
+    #[inline(always)]
+    fn run(mut self) {
+        self.meet();
+    }
+}

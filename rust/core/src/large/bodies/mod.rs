@@ -1,0 +1,234 @@
+//! Many bodies ([`crate::systems::nbody`]), eight of them side by side, the forces on as many threads as there are.
+
+mod along;
+mod quantities;
+mod share;
+
+use std::thread;
+
+use self::{
+    along::{Along, Round, Sums},
+    quantities::{Quantity, Record, kinetic, total},
+    share::{Share, add, share},
+};
+use super::{Asked, Facts, Rates};
+use crate::{
+    isa::{Level, with_isa},
+    spec::Spec,
+    systems::nbody::{self, Law},
+};
+
+/// Bodies that are taken side by side, and parts in which sums over bodies are kept.
+const SIDE: usize = nbody::LANES;
+/// Distances k from one to another, `SIDE` apart. Each chunk of bodies meets all of a group before the next does.
+type Distances = (usize, usize);
+/// Bodies from which on threads pay, which are started anew for each force: that takes some hundredths of a millisecond.
+const THREADED: usize = 1024;
+
+/// The law of that number: kernels are made for numbers.
+const fn law(number: u8) -> Law {
+    match number {
+        LOGARITHMIC => Law::Logarithmic,
+        NEWTON => Law::Newton,
+        _ => Law::Printed,
+    }
+}
+const LOGARITHMIC: u8 = 0;
+const NEWTON: u8 = 1;
+const PRINTED: u8 = 2;
+
+/// Which kernel meets the bodies: chosen once, called for each force.
+#[derive(Clone, Copy)]
+struct Kernel {
+    law: u8,
+    dim: usize,
+    level: Level,
+}
+
+/// Runs a kernel for the law, the dimensions and the CPU level at hand.
+macro_rules! meet {
+    ($kernel:expr, $energy:expr, $fields:tt) => {
+        match ($kernel.dim, $kernel.law, $energy) {
+            (2, NEWTON, false) => meet!(@ $kernel, 2, NEWTON, false, $fields),
+            (2, _, false) => meet!(@ $kernel, 2, LOGARITHMIC, false, $fields),
+            (_, NEWTON, false) => meet!(@ $kernel, 3, NEWTON, false, $fields),
+            (_, _, false) => meet!(@ $kernel, 3, LOGARITHMIC, false, $fields),
+            (2, LOGARITHMIC, true) => meet!(@ $kernel, 2, LOGARITHMIC, true, $fields),
+            (2, NEWTON, true) => meet!(@ $kernel, 2, NEWTON, true, $fields),
+            (2, _, true) => meet!(@ $kernel, 2, PRINTED, true, $fields),
+            (_, LOGARITHMIC, true) => meet!(@ $kernel, 3, LOGARITHMIC, true, $fields),
+            (_, NEWTON, true) => meet!(@ $kernel, 3, NEWTON, true, $fields),
+            (_, _, true) => meet!(@ $kernel, 3, PRINTED, true, $fields),
+        }
+    };
+    (@ $kernel:expr, $dim:literal, $law:ident, $energy:literal, { $($field:tt)* }) => {
+        with_isa!($kernel.level, |isa| isa.run(Along::<$dim, { $law }, $energy> { $($field)* }))
+    };
+}
+
+/// The bodies of one member, scaled to the step.
+struct Bodies {
+    n: usize,
+    kernel: Kernel,
+    h: f64,
+    slabs: Vec<Vec<Distances>>,
+    mass: Vec<f64>,
+    /// ½·h·m of each body.
+    half: Vec<f64>,
+    /// h times the potential of each body, if the forces were found with it.
+    potential: Vec<f64>,
+    /// The bodies along the lanes.
+    round: Round,
+    /// What they collect, once for each thread.
+    sums: Vec<Sums>,
+    /// One for each slab, if there are several threads.
+    shares: Vec<Share>,
+    record: Vec<Quantity>,
+    /// Places whose forces and potentials are at hand, until others are asked for: those of a state that is projected or
+    /// recorded, at which the next step begins.
+    at_hand: bool,
+    y: Vec<f64>,
+    dv: Vec<f64>,
+}
+
+/// The rates of many bodies.
+pub fn make(asked: &Asked) -> Box<dyn Rates> {
+    let (n, dim, machine) = (asked.given.count("masses"), asked.given.whole("dim"), asked.machine);
+    let law = match nbody::law(asked.given) {
+        Some(Law::Newton) => NEWTON,
+        Some(Law::Printed) => PRINTED,
+        _ => LOGARITHMIC,
+    };
+    let ends = |group: Vec<usize>| Some((*group.first()?, *group.last()?));
+    let slabs: Vec<Vec<Distances>> =
+        nbody::partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
+    let round = Round::new(n, dim);
+    let threads = match machine.threads {
+        _ if n < THREADED => 1,
+        0 => thread::available_parallelism().map_or(1, usize::from),
+        given => given,
+    };
+    let threads = threads.min(slabs.len());
+    let shares = if threads > 1 { slabs.iter().map(|_| Share::new(n, dim)).collect() } else { Vec::new() };
+    Box::new(Bodies {
+        n,
+        kernel: Kernel { law, dim, level: machine.level },
+        h: asked.h,
+        mass: vec![0.0; n],
+        half: vec![0.0; n],
+        potential: vec![0.0; n],
+        sums: (0..threads).map(|_| Sums::new(&round)).collect(),
+        round,
+        shares,
+        slabs,
+        record: asked.record.iter().filter_map(|name| Quantity::named(name)).collect(),
+        at_hand: false,
+        y: Vec::new(),
+        dv: Vec::new(),
+    })
+}
+
+impl Bodies {
+    fn meet(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
+        match self.kernel.dim {
+            2 => self.round.fill::<2>(y),
+            _ => self.round.fill::<3>(y),
+        }
+        let (n, kernel, round, potential) = (self.n, self.kernel, &self.round, &mut self.potential[..]);
+        if let [sums] = &mut self.sums[..] {
+            for (i, groups) in self.slabs.iter().enumerate() {
+                meet!(kernel, energy, { n, groups, round, sums, more: i > 0, potential, out });
+            }
+            return;
+        }
+        share(&self.slabs, &mut self.shares, &mut self.sums, |groups, share, sums| {
+            let (potential, out) = (&mut share.potential[..], &mut share.force[..]);
+            meet!(kernel, energy, { n, groups, round, sums, more: false, potential, out });
+        });
+        // Slab after slab, whichever was ready first.
+        for (i, share) in self.shares.iter().enumerate() {
+            add(out, &share.force, i > 0);
+            if energy {
+                add(potential, &share.potential, i > 0);
+            }
+        }
+    }
+
+    /// Whether the forces and potentials of these places are at hand.
+    fn has(&self, y: &[f64]) -> bool {
+        self.at_hand && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
+    }
+
+    /// Finds the forces, if they are not at hand.
+    fn find(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
+        if self.has(y) {
+            out.copy_from_slice(&self.dv);
+        } else {
+            self.at_hand = false;
+            self.meet(energy, y, out);
+        }
+    }
+
+    fn gradient_in<const D: usize>(&self, v: &[f64], dv: &[f64], along_v: &mut [f64], along_y: &mut [f64]) -> f64 {
+        for (r, (v, dv)) in v.iter().zip(dv).enumerate() {
+            let mass = self.mass[r / D];
+            along_v[r] = mass * v;
+            along_y[r] = -(mass * (dv / self.h));
+        }
+        let ((v, _), (y, _)) = (along_v.as_chunks::<D>(), along_y.as_chunks::<D>());
+        total(v, y, |_, v, y| quantities::square(v) + quantities::square(y))
+    }
+}
+
+impl Rates for Bodies {
+    fn facts(&self) -> Facts {
+        Facts { second_order: true, reads_v: false }
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
+        let row = |name: &str, i: usize| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place + i].at(first));
+        let softening = row("softening", 0);
+        self.round.take(self.n, |i| self.h * row("strength", i), softening * softening);
+        for i in 0..self.n {
+            self.mass[i] = row("masses", i);
+            self.half[i] = (0.5 * self.h) * self.mass[i];
+        }
+        self.at_hand = false;
+    }
+
+    fn dv(&mut self, _t: f64, _v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.find(false, y, out);
+    }
+
+    fn foresee(&mut self, y: &[f64]) {
+        if !self.has(y) {
+            let mut dv = std::mem::take(&mut self.dv);
+            dv.resize(y.len(), 0.0);
+            self.meet(true, y, &mut dv);
+            (self.dv, self.at_hand) = (dv, true);
+            self.y.clear();
+            self.y.extend_from_slice(y);
+        }
+    }
+
+    fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
+        self.find(true, y, dv);
+        let kinetic = kinetic(self.kernel.dim, &self.half, v);
+        Some([kinetic, kinetic + total(&self.mass, &self.potential, |_, mass, potential| mass * potential)])
+    }
+
+    fn gradient(&mut self, v: &[f64], dv: &[f64], (along_v, along_y): (&mut [f64], &mut [f64])) -> Option<f64> {
+        Some(match self.kernel.dim {
+            2 => self.gradient_in::<2>(v, dv, along_v, along_y),
+            _ => self.gradient_in::<3>(v, dv, along_v, along_y),
+        })
+    }
+
+    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        let (h, what, mass, half, potential) = (self.h, &self.record[..], &self.mass[..], &self.half[..], &self.potential[..]);
+        match self.kernel.dim {
+            2 => with_isa!(self.kernel.level, |isa| isa.run(Record::<2> { h, what, mass, half, potential, v, y, rows })),
+            _ => with_isa!(self.kernel.level, |isa| isa.run(Record::<3> { h, what, mass, half, potential, v, y, rows })),
+        }
+    }
+}

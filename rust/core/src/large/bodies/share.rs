@@ -1,0 +1,58 @@
+//! One force of one large system on several threads: they take slabs of distances, whose sums are added in their own order.
+
+use std::{sync::Mutex, thread};
+
+use super::{Distances, along::Sums};
+
+/// What a slab brings.
+pub(super) struct Share {
+    pub(super) force: Vec<f64>,
+    pub(super) potential: Vec<f64>,
+    done: bool,
+}
+
+impl Share {
+    pub(super) fn new(n: usize, dim: usize) -> Self {
+        Share { force: vec![0.0; n * dim], potential: vec![0.0; n], done: false }
+    }
+}
+
+/// Adds to what is there, or replaces it.
+pub(super) fn add(to: &mut [f64], from: &[f64], more: bool) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = if more { *to + from } else { *from };
+    }
+}
+
+/// Every slab into its share, on as many threads as there are sums.
+pub(super) fn share(
+    slabs: &[Vec<Distances>],
+    shares: &mut [Share],
+    sums: &mut [Sums],
+    meet: impl Fn(&[Distances], &mut Share, &mut Sums) + Sync,
+) {
+    let Some((mine, others)) = sums.split_first_mut() else { return };
+    let queue = Mutex::new(slabs.iter().zip(&mut *shares));
+    let take = || queue.lock().map_or(None, |mut queue| queue.next());
+    let work = |sums: &mut Sums| {
+        while let Some((groups, share)) = take() {
+            meet(groups, share, sums);
+            share.done = true;
+        }
+    };
+    let work = &work;
+    thread::scope(|scope| {
+        // A thread that cannot be had leaves its slabs to the others.
+        let start = |sums| thread::Builder::new().spawn_scoped(scope, move || work(sums)).ok();
+        let helpers: Vec<_> = others.iter_mut().filter_map(start).collect();
+        work(mine);
+        // One that panicked must not take the caller with it: its slab is made below.
+        helpers.into_iter().for_each(|helper| drop(helper.join()));
+    });
+    for (groups, share) in slabs.iter().zip(shares) {
+        if !share.done {
+            meet(groups, share, mine);
+        }
+        share.done = false;
+    }
+}

@@ -1,0 +1,62 @@
+//! Carries out a course: rates and passes over an arena.
+
+use super::{
+    Rates,
+    course::{Act, Course, Rate},
+};
+use crate::{
+    isa::Level,
+    run::stage::{Clock, Loaded},
+    spec::Spec,
+};
+
+/// The passes of a course, ready for an arena.
+pub struct Executor {
+    /// Of each act its kernel, if it is a pass.
+    passes: Vec<Option<Loaded>>,
+    stride: usize,
+}
+
+/// How long rows are, with what fills the last vector.
+pub fn stride(numbers: usize) -> usize {
+    // Four vectors go abreast if they can, for which there must be a multiple of four; short rows would be half air.
+    const VECTOR: usize = 8;
+    numbers.next_multiple_of(if numbers > 8 * VECTOR { 4 * VECTOR } else { VECTOR }).max(VECTOR)
+}
+
+impl Executor {
+    /// For rows of so many numbers.
+    pub fn new(course: &Course, level: Level, stride: usize, clock: &Clock) -> Executor {
+        let nobody = Spec::default();
+        let pass = |act: &Act| match act {
+            Act::Pass(stage) => Some(Loaded::with(stage, stage.kit_of(level, stride), &nobody, clock, f64::INFINITY)),
+            Act::Ask { .. } => None,
+        };
+        Executor { passes: course.acts.iter().map(pass).collect(), stride }
+    }
+
+    /// Carries it out at time t, with the step h. Attempts are that long, too.
+    pub fn run(&mut self, course: &Course, rates: &mut dyn Rates, sizes: [usize; 2], t: f64, h: f64, arena: &mut [f64]) {
+        let stride = self.stride;
+        for (act, pass) in course.acts.iter().zip(&mut self.passes) {
+            match (act, pass) {
+                (Act::Pass(stage), Some(pass)) => pass.advance_at(stage, h, arena),
+                (Act::Ask { rate, at, v, y, out }, _) => {
+                    let (before, rest) = arena.split_at_mut(out * stride);
+                    let (out_row, after) = rest.split_at_mut(stride);
+                    let row = |row: usize, numbers: usize| {
+                        let from = if row < *out { &before[row * stride..] } else { &after[(row - out - 1) * stride..] };
+                        &from[..numbers]
+                    };
+                    let t = at.at(t, h);
+                    match rate {
+                        Rate::Dv => rates.dv(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[0]]),
+                        Rate::Dy => rates.dy(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[1]]),
+                        Rate::Velocity => rates.velocity(row(*y, sizes[1]), &mut out_row[..sizes[0]]),
+                    }
+                }
+                (Act::Pass(_), None) => {} // there is a kernel for each pass
+            }
+        }
+    }
+}

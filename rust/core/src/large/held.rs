@@ -1,0 +1,115 @@
+//! A control or a projection around the rates of one member: the same as [`crate::controls`], over rows.
+
+use super::{Asked, Facts, Rates};
+use crate::{
+    controls::{self, energy, projection},
+    spec::Spec,
+};
+
+/// Rates under the control that is given, or the rates themselves.
+pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
+    if !controls::is_given(asked.given) {
+        return rates;
+    }
+    let keeps = match asked.given.word("control") {
+        "energy" => Keeps::Push { limited: asked.given.word("control.form") == "limited" },
+        _ => Keeps::Back { nacozy: asked.given.word("control.way") == "nacozy" },
+    };
+    let (v, y) = (vec![0.0; asked.shape.v], vec![0.0; asked.shape.y]);
+    Box::new(Held { rates, keeps, h: asked.h, gain: 0.0, target: 0.0, work: [0.0], dv: v.clone(), along: (v, y) })
+}
+
+/// What keeps the energy.
+#[derive(Clone, Copy)]
+enum Keeps {
+    Push { limited: bool },
+    Back { nacozy: bool },
+}
+
+struct Held {
+    rates: Box<dyn Rates>,
+    keeps: Keeps,
+    h: f64,
+    gain: f64,
+    /// h times the energy to keep.
+    target: f64,
+    /// h times what it changed of the energy.
+    work: [f64; 1],
+    dv: Vec<f64>,
+    along: (Vec<f64>, Vec<f64>),
+}
+
+impl Rates for Held {
+    fn facts(&self) -> Facts {
+        let pushes = matches!(self.keeps, Keeps::Push { .. });
+        Facts { reads_v: pushes || self.rates.facts().reads_v, ..self.rates.facts() }
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
+        let number = |name: &str| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place].at(first));
+        (self.gain, self.target) = (number("control.gain"), self.h * number("control.target"));
+        self.rates.prepare(spec, first, count);
+    }
+
+    fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        let Keeps::Push { limited } = self.keeps else { return self.rates.dv(t, v, y, out) };
+        let Some([kinetic, whole]) = self.rates.energies(v, y, out) else { return self.rates.dv(t, v, y, out) };
+        let (g, taken) = energy::push(limited, self.gain, whole - self.target, kinetic);
+        self.work[0] -= taken;
+        for (out, v) in out.iter_mut().zip(v) {
+            *out -= g * v;
+        }
+    }
+
+    fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.rates.dy(t, v, y, out);
+    }
+
+    fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
+        self.rates.velocity(d, out);
+    }
+
+    fn settle(&mut self, v: &mut [f64], y: &mut [f64]) {
+        let Keeps::Back { nacozy } = self.keeps else { return };
+        self.rates.foresee(y);
+        let Some([kinetic, whole]) = self.rates.energies(v, y, &mut self.dv) else { return };
+        let off = whole - self.target;
+        if !nacozy {
+            let (factor, gained) = projection::scaling(off, kinetic);
+            self.work[0] += gained;
+            v.iter_mut().for_each(|v| *v *= factor);
+            return;
+        }
+        let (along_v, along_y) = (&mut self.along.0[..], &mut self.along.1[..]);
+        let Some(square) = self.rates.gradient(v, &self.dv, (along_v, along_y)) else { return };
+        let step = projection::nacozy(off, self.h, square);
+        self.work[0] -= off;
+        for (block, along) in [(v, &self.along.0), (y, &self.along.1)] {
+            block.iter_mut().zip(along).for_each(|(number, along)| *number -= step * along);
+        }
+    }
+
+    fn foresee(&mut self, y: &[f64]) {
+        self.rates.foresee(y);
+    }
+
+    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        self.rates.record(v, y, rows);
+    }
+
+    fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
+        self.rates.energies(v, y, dv)
+    }
+
+    fn gradient(&mut self, v: &[f64], dv: &[f64], along: (&mut [f64], &mut [f64])) -> Option<f64> {
+        self.rates.gradient(v, dv, along)
+    }
+
+    fn tally(&self) -> &[f64] {
+        &self.work
+    }
+
+    fn tally_mut(&mut self) -> &mut [f64] {
+        &mut self.work
+    }
+}

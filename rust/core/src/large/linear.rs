@@ -1,0 +1,74 @@
+//! The rates of a large linear system ([`crate::systems::linear`]).
+
+use super::{Asked, Facts, Rates, inputs::Inputs, panels::Panels};
+use crate::{isa::Level, spec::Spec, system::Shape};
+
+struct Linear {
+    shape: Shape,
+    level: Level,
+    h: f64,
+    of_v: Panels,
+    of_y: Panels,
+    inputs: Inputs,
+    x: Vec<f64>,
+    /// The time for which `x` holds: both blocks ask at the same times, and a sine is dear.
+    time: f64,
+    /// h·ẏ of v = 1, in a second-order system.
+    speed: f64,
+}
+
+/// The rates of a linear system.
+pub fn make(asked: &Asked) -> Box<dyn Rates> {
+    let nothing = || Panels::new(0, 0, |_, _| 0.0);
+    Box::new(Linear {
+        shape: asked.shape,
+        level: asked.machine.level,
+        h: asked.h,
+        of_v: nothing(),
+        of_y: nothing(),
+        inputs: Inputs::default(),
+        x: vec![0.0; asked.given.whole("inputs")],
+        time: f64::NAN,
+        speed: 0.0,
+    })
+}
+
+impl Linear {
+    fn look(&mut self, t: f64) {
+        if self.time != t {
+            self.inputs.fill(t, &mut self.x);
+            self.time = t;
+        }
+    }
+}
+
+impl Rates for Linear {
+    fn facts(&self) -> Facts {
+        Facts { second_order: false, reads_v: true }
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
+        let (h, place) = (self.h, spec.given.place("rows").unwrap_or(0));
+        let columns = self.shape.v + self.shape.y + self.x.len();
+        let entry = |i: usize, j: usize| h * spec.rows[place + i * columns + j].at(first);
+        self.of_v = Panels::new(self.shape.v, columns, entry);
+        self.of_y = Panels::new(self.shape.y, columns, |i, j| entry(self.shape.v + i, j));
+        self.speed = if self.shape.y > 0 { entry(self.shape.v, 0) } else { f64::NAN };
+        self.inputs = Inputs::new(spec, first);
+        self.time = f64::NAN;
+    }
+
+    fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.look(t);
+        self.of_v.times(self.level, [v, y, &self.x], out);
+    }
+
+    fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.look(t);
+        self.of_y.times(self.level, [v, y, &self.x], out);
+    }
+
+    fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
+        out.iter_mut().zip(d).for_each(|(out, d)| *out = d / self.speed);
+    }
+}

@@ -1,0 +1,102 @@
+//! The transition-matrix form (Appendix B) of a large system: s ← P·s + Σ Q·u, one member at a time.
+
+use super::{inputs::Inputs, panels::Panels};
+use crate::{
+    isa::Level,
+    run::{group::Group, stage::Clock},
+    spec::Spec,
+    system::Shape,
+    trace::How,
+};
+
+/// A member of a linear map.
+pub struct Matrix {
+    shape: Shape,
+    level: Level,
+    clock: Clock,
+    /// Times of the inputs, as fractions of a step.
+    nodes: Vec<f64>,
+    pq: Panels,
+    inputs: Inputs,
+    /// How many inputs there are.
+    count: usize,
+    u: Vec<f64>,
+    state: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl Matrix {
+    /// With inputs at the times of the form.
+    pub fn new(spec: &Spec, shape: Shape, how: &How, level: Level, clock: &Clock) -> Matrix {
+        let nodes: Vec<f64> = match how {
+            How::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
+            How::Method { .. } | How::Attempts { .. } => Vec::new(), // no matrix form, and nobody asks
+        };
+        let (n, count) = (shape.v + shape.y, spec.given.whole("inputs"));
+        Matrix {
+            shape,
+            level,
+            clock: *clock,
+            pq: Panels::new(0, 0, |_, _| 0.0),
+            inputs: Inputs::default(),
+            count,
+            u: vec![0.0; nodes.len() * count],
+            nodes,
+            state: vec![0.0; n],
+            next: vec![0.0; n],
+        }
+    }
+}
+
+impl Group for Matrix {
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
+        let n = self.state.len();
+        let (p, q) = (spec.given.place("p").unwrap_or(0), spec.given.place("q").unwrap_or(0));
+        // P by rows; Q by columns, nodes and inputs, each with a number for every row.
+        let place = |i: usize, j: usize| if j < n { p + i * n + j } else { q + (j - n) * n + i };
+        self.pq = Panels::new(n, n + self.u.len(), |i, j| spec.rows[place(i, j)].at(first));
+        self.inputs = Inputs::new(spec, first);
+    }
+
+    fn slots(&self) -> (&[f64], &[f64]) {
+        self.state.split_at(self.shape.v)
+    }
+
+    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        self.state.split_at_mut(self.shape.v)
+    }
+
+    // What a method carries is its own affair: the caller starts and finishes.
+    fn start(&mut self, _k: i64) {}
+
+    fn advance(&mut self, k: i64, n: i64) {
+        for k in k..k + n {
+            let t = self.clock.at(k);
+            for (node, u) in self.nodes.iter().zip(self.u.chunks_exact_mut(self.count.max(1))) {
+                self.inputs.fill(t + node * self.clock.h, u);
+            }
+            self.pq.times(self.level, [&self.state, &self.u, &[]], &mut self.next);
+            std::mem::swap(&mut self.state, &mut self.next);
+        }
+    }
+
+    fn finish(&mut self, _k: i64) {}
+
+    fn recorded(&self) -> usize {
+        0
+    }
+
+    fn record(&mut self, _rows: &mut [f64]) {}
+
+    fn tally(&self) -> &[f64] {
+        &[]
+    }
+
+    fn tally_mut(&mut self) -> &mut [f64] {
+        &mut []
+    }
+}

@@ -1,0 +1,128 @@
+//! Systems that are no straight line: many bodies, long chains, large matrices.
+//!
+//! A step of them would be a tape of hundreds of thousands of operations. So the program of the method ([`crate::program`]) is carried
+//! out over blocks that are long rows ([`course`], [`executor`]), and only the rates of the system are asked for as they come
+//! ([`Rates`]). There are two kinds of these:
+//!
+//! - [`tapes`]: the rates are tapes of their own, over rows of lanes, a lane for each of several members.
+//! - kernels written by hand, for one member at a time, whose numbers lie side by side: [`bodies`], [`chain`], [`linear`]. A system names
+//!   its own in its `KIND`.
+//!
+//! Neither knows of the methods, and no method knows of them.
+
+pub mod bodies;
+pub mod chain;
+pub mod course;
+pub mod executor;
+pub mod group;
+pub mod held;
+mod inputs;
+pub mod linear;
+pub mod matrix;
+pub mod paced;
+mod panels;
+pub mod tapes;
+
+use crate::{
+    run::Machine,
+    spec::{Given, Spec},
+    system::Shape,
+};
+
+/// Operations of a step from which on it is no tape. Writing the code of one takes about a microsecond, and more would not stay in the cache
+/// of instructions.
+pub const STRAIGHT: usize = 4000;
+/// Operations of the rates from which on they are no tapes either, if there is a kernel.
+pub const STRAIGHT_RATES: usize = 20_000;
+
+/// What a course may take for granted of rates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facts {
+    /// ẏ is v, so that h·ẏ is h·v and no rate of y is asked for.
+    pub second_order: bool,
+    /// v̇ depends on v.
+    pub reads_v: bool,
+}
+
+/// The rates of some members, times the step for which they were made.
+///
+/// A block is a row for each of its numbers, each of a number for each lane.
+pub trait Rates: Send + Sync {
+    /// How many members there are.
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    /// What is known of the rates.
+    fn facts(&self) -> Facts;
+
+    /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// h·v̇
+    fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]);
+
+    /// h·ẏ; not asked for in a second-order system.
+    fn dy(&mut self, _t: f64, _v: &[f64], _y: &[f64], _out: &mut [f64]) {}
+
+    /// The velocity whose increment of y this is; not asked for in a second-order system.
+    fn velocity(&mut self, _d: &[f64], _out: &mut [f64]) {}
+
+    /// Corrects the state after a step.
+    fn settle(&mut self, _v: &mut [f64], _y: &mut [f64]) {}
+
+    /// Gets ready to be asked for the energy, for quantities and for the rate of v of these coordinates, if that can be done at once.
+    fn foresee(&mut self, _y: &[f64]) {}
+
+    /// Fills rows with the recorded quantities of a state.
+    fn record(&mut self, _v: &[f64], _y: &[f64], _rows: &mut [f64]) {}
+
+    /// h·v̇ into `dv`, and h times the kinetic and h times the whole energy, of one member, if they are known.
+    fn energies(&mut self, _v: &[f64], _y: &[f64], _dv: &mut [f64]) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// The gradient of the energy in both blocks and the square of its length, from h·v̇, if it is known.
+    fn gradient(&mut self, _v: &[f64], _dv: &[f64], _along: (&mut [f64], &mut [f64])) -> Option<f64> {
+        None
+    }
+
+    /// What was added up, a row of lanes or nothing.
+    fn tally(&self) -> &[f64] {
+        &[]
+    }
+
+    /// What was added up, to write.
+    fn tally_mut(&mut self) -> &mut [f64] {
+        &mut []
+    }
+}
+
+/// What rates are made for.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'a> {
+    /// The system.
+    pub given: &'a Given,
+    /// How large its blocks are.
+    pub shape: Shape,
+    /// Quantities to record.
+    pub record: &'a [String],
+    /// What hot loops may use.
+    pub machine: Machine,
+    /// The step to which rates are scaled.
+    pub h: f64,
+}
+
+/// Rates of one member by a kernel that is written by hand.
+#[derive(Clone, Copy)]
+pub struct Long {
+    /// Operations of the rates from which on it is quicker than machine code for one number at a time.
+    pub from: usize,
+    /// Makes them, without control.
+    pub make: fn(&Asked) -> Box<dyn Rates>,
+}
+
+/// Rates of one member by the kernel of the system, under the control that is given.
+pub fn lone(long: Long, asked: &Asked) -> Box<dyn Rates> {
+    held::wrap((long.make)(asked), asked)
+}

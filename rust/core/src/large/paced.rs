@@ -1,0 +1,96 @@
+//! A large member that goes at its own pace.
+
+use std::sync::Arc;
+
+use super::{
+    Rates,
+    course::{V, Y},
+    executor::Executor,
+    group::{Blocks, Courses},
+};
+use crate::{
+    error::Error,
+    isa::Level,
+    pace::{Pace, judge, length2},
+    run::paced::{NO_CLOCK, Paced},
+    spec::Spec,
+    trace::{How, Traced, method},
+};
+
+/// One member, whose rates are scaled to a step of 1.
+pub struct LargePaced {
+    blocks: Blocks,
+    executor: Executor,
+    /// The order of the estimate.
+    order: u32,
+    budget: f64,
+    pace: Pace<f64>,
+}
+
+impl LargePaced {
+    /// Of rates by a method that estimates its error. `budget` is the most attempts of the member.
+    pub fn new(
+        courses: Arc<Courses>,
+        rates: Box<dyn Rates>,
+        traced: &Traced,
+        level: Level,
+        budget: f64,
+    ) -> Result<LargePaced, Error> {
+        let How::Attempts { name } = &traced.scene().how else { return Err(Error::NoEstimate) };
+        let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
+        let blocks = Blocks::new(courses, rates, traced.shape);
+        let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);
+        Ok(LargePaced { blocks, executor, order, budget, pace: Pace::new(0.0, 0.0, 0.0, 0.0) })
+    }
+}
+
+impl Paced for LargePaced {
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    fn prepare_lane(&mut self, spec: &Spec, _lane: usize, member: usize) {
+        self.blocks.rates.prepare(spec, member, 1);
+    }
+
+    fn sit(&mut self, _lane: usize, state: &[f64]) {
+        let (v, y) = self.blocks.slots_mut();
+        let (from_v, from_y) = state.split_at(v.len());
+        v.copy_from_slice(from_v);
+        y.copy_from_slice(from_y);
+    }
+
+    fn state(&self, _lane: usize) -> Vec<f64> {
+        let (v, y) = self.blocks.slots();
+        [v, y].concat()
+    }
+
+    fn pace(&self, _lane: usize) -> Pace<f64> {
+        self.pace
+    }
+
+    fn set_pace(&mut self, _lane: usize, pace: Pace<f64>) {
+        self.pace = pace;
+    }
+
+    fn attempt(&mut self, attempts: usize) {
+        let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
+        for _ in 0..attempts {
+            let outlook @ (step, _, runs) = self.pace.outlook(self.budget);
+            if !runs {
+                break;
+            }
+            self.executor.run(&courses.step, rates.as_mut(), *sizes, self.pace.t, step, arena);
+            // Results come in pairs: of velocities, of coordinates.
+            let length = |i: usize, row: usize| length2(&arena[row * *stride..][..sizes[i % 2]]);
+            let made: Vec<f64> = courses.step.results.iter().enumerate().map(|(i, row)| length(i, *row)).collect();
+            let (next, took) = judge(&self.pace, self.order, [length(0, V), length(1, Y)], &made, outlook);
+            self.pace = next;
+            if took {
+                for ((home, made), numbers) in [V, Y].into_iter().zip(&courses.step.results).zip(*sizes) {
+                    arena.copy_within(made * *stride..made * *stride + numbers, home * *stride);
+                }
+            }
+        }
+    }
+}
