@@ -41,12 +41,6 @@ impl Shape {
         self.width * self.abreast * self.blocks
     }
 
-    /// What a step of the tile costs, in steps of a vector of lanes: vectors abreast wait for each other's operations anyway.
-    pub fn cost(&self) -> usize {
-        let side_by_side = if self.resident { self.abreast.min(2) } else { self.abreast };
-        side_by_side * self.blocks
-    }
-
     /// How often a number of the pool stands there: AVX-512 can take one for all lanes.
     fn pool_copies(&self) -> usize {
         match (self.level, self.width) {
