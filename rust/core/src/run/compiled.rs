@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use super::{Machine, Model, Way};
 use crate::{
     error::Error,
-    kernel::runner::Runner,
     tape::{Counts, split::Body},
 };
 
@@ -26,7 +25,7 @@ pub struct Compiled {
     pub spills: usize,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
-    /// How long writing the code took, with choosing its shape.
+    /// How long writing the code took, with choosing its shape, and preparing what is interpreted before it.
     pub compile: Duration,
 }
 
@@ -40,8 +39,7 @@ impl Model<'_> {
     /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
-        let width = self.width(&traced, machine, members)?;
-        if !matches!(self.way(&traced, machine, width), Way::Tape) {
+        if !matches!(self.way(&traced, machine, members), Way::Tape) {
             return Ok(None);
         }
         let began = Instant::now();
@@ -49,7 +47,8 @@ impl Model<'_> {
         let trace = began.elapsed();
         let split = &tapes.step.split;
         let began = Instant::now();
-        let runner = Runner::new(&split.body, machine.level, width);
+        let kit = tapes.step.kit(machine.level, members);
+        let runner = &kit.runner;
         let (bytes, spills) = runner.write().map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
         let compile = began.elapsed();
         Ok(Some(Compiled {
