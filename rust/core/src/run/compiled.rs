@@ -40,8 +40,7 @@ impl Model<'_> {
     /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
-        let width = self.width(&traced, machine, members)?;
-        if !matches!(self.way(&traced, machine, width), Way::Tape) {
+        if !matches!(self.way(&traced, machine, members), Way::Tape) {
             return Ok(None);
         }
         let began = Instant::now();
@@ -49,7 +48,7 @@ impl Model<'_> {
         let trace = began.elapsed();
         let split = &tapes.step.split;
         let began = Instant::now();
-        let runner = Runner::new(&split.body, machine.level, width);
+        let runner = Runner::new(&split.body, machine.level, members);
         let (bytes, spills) = runner.write().map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
         let compile = began.elapsed();
         Ok(Some(Compiled {
