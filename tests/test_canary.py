@@ -1,8 +1,8 @@
 """A kernel that falls off its cliff must not go unseen.
 
-What makes kernels slow shows in their instructions: ``rust/core/tests/cliffs.rs`` counts those. Here is only that the quick kernels are
-the ones that run: a batch as machine code against the same batch interpreted, in the same moment. Nothing depends on how fast the
-machine is.
+What makes kernels slow shows in their instructions: ``rust/core/tests/cliffs.rs`` counts those. Here is only that the quick
+kernels are the ones that run: a batch as machine code against the same batch interpreted, in the same moment. Nothing depends
+on how fast the machine is.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ MEMBERS = 4096
 now = time.thread_time if time.get_clock_info("thread_time").resolution < 1e-5 else time.perf_counter
 SINE, HELD = sw.Sinusoid(0.5, 1.1, 0.3), sw.Sampled(np.linspace(-1.0, 1.0, 16), 0.02)
 OWN = np.linspace(0.5, 1.5, MEMBERS)
+LINEAR = sw.LinearSystem(-np.eye(3) + 0.1, velocities=1)
 CLOVER = np.array([[-0.5, -(0.75**0.5)], [0.75**0.5, -0.5], [0.0, 1.0]])
 TURNING = np.array([[-1.0, 0.5], [-0.5, -0.9], [1.0, 0.0]])
 
-#: System, method, form, v and y of a member, and how many times faster machine code is at AVX2 and AVX-512, at the least: about a third of
-#: what was measured (in brackets) on a quiet AMD CPU of 2024 with full-width AVX-512.
+#: System, method, form, v and y of a member, and how many times faster machine code is at AVX2 and AVX-512, at the least: about
+#: a third of what was measured (in brackets) on an AMD CPU of 2024 with full-width AVX-512.
 CASES: dict[str, tuple[sw.System, str, str, Any, Any, tuple[float, float]]] = {
     "oscillators by false Euler": (sw.Oscillator(OWN), "false_euler", "direct", 0.0, 1.0, (1.3, 1.8)),  # [3.8, 5.3]
     "oscillators by RK4": (sw.Oscillator(OWN), "rk4", "direct", 0.0, 1.0, (2.9, 3.4)),  # [8.6, 10.1]
@@ -35,14 +36,7 @@ CASES: dict[str, tuple[sw.System, str, str, Any, Any, tuple[float, float]]] = {
     "three bodies by leapfrog": (sw.NBody(), "leapfrog", "direct", TURNING, CLOVER, (2.3, 2.8)),  # [6.9, 8.4]
     "three bodies by PEFRL": (sw.NBody(force="newton"), "pefrl", "direct", TURNING, CLOVER, (2.3, 2.5)),  # [7.0, 7.4]
     "chain of 4": (sw.Chain(4), "rk4", "direct", np.zeros(4), np.ones(4), (3.9, 4.5)),  # [11.7, 13.5]
-    "linear of 3": (
-        sw.LinearSystem(-np.eye(3) + 0.1, velocities=1),
-        "fehlberg",
-        "direct",
-        np.ones(1),
-        np.ones(2),
-        (3.4, 4.3),
-    ),  # [10.1, 12.9]
+    "linear of 3": (LINEAR, "fehlberg", "direct", np.ones(1), np.ones(2), (3.4, 4.3)),  # [10.1, 12.9]
 }
 
 
