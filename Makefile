@@ -4,7 +4,7 @@
 PYTHON ?= python3
 OUT    ?= out
 BIN    := .venv/bin
-SOURCES := $(shell find rust python benches/kernels -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
+SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
 
 # Files that build.rs finds, so that cargo does not tell rustfmt of them.

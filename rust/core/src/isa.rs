@@ -3,6 +3,8 @@
 //! A wheel is built for the oldest CPU of its platform. Each hot loop is therefore compiled once per CPU level, and the best
 //! level that the machine has is chosen when a run begins. No level contracts to FMA or reorders, so all give the same bits.
 
+use std::ffi::OsString;
+
 use crate::error::Error;
 
 /// What the hot loop may use, in ascending order.
@@ -26,7 +28,7 @@ impl Level {
     /// Every level, ascending.
     pub const ALL: [Level; 3] = [Level::Baseline, Level::Avx2, Level::Avx512];
 
-    /// The name that `STEPWELL_ISA` takes.
+    /// Its name, which `STEPWELL_ISA` takes.
     pub fn name(self) -> &'static str {
         match self {
             Level::Baseline => "baseline",
@@ -61,18 +63,34 @@ impl Level {
         Level::ALL.into_iter().filter(|l| l.here()).collect()
     }
 
-    /// The level that `STEPWELL_ISA` forces, or else the best that this machine has.
+    /// What `STEPWELL_KERNELS` calls its kernels.
+    pub fn kernels(self) -> &'static str {
+        match self {
+            Level::Baseline => "interpret",
+            written => written.name(),
+        }
+    }
+
+    /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this machine.
     pub fn choose() -> Result<Level, Error> {
+        Level::asked(std::env::var_os("STEPWELL_KERNELS"), std::env::var_os("STEPWELL_ISA"))
+    }
+
+    /// As `choose`, with what the two variables hold; an empty one counts as none.
+    pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, Error> {
         let available = Level::available();
-        let best = available.last().copied().unwrap_or(Level::Baseline);
-        let Some(given) = std::env::var_os("STEPWELL_ISA").filter(|v| !v.is_empty()) else {
-            return Ok(best);
+        let find = |given: &OsString, name: fn(Level) -> &'static str| {
+            let found = available.iter().copied().find(|level| *given == name(*level));
+            let known = || available.iter().map(|level| name(*level)).collect::<Vec<_>>().join(", ");
+            found.ok_or_else(|| (given.to_string_lossy().into_owned(), known()))
         };
-        let wanted = available.iter().copied().find(|l| given == l.name());
-        wanted.ok_or_else(|| Error::Isa {
-            given: given.to_string_lossy().into_owned(),
-            known: available.iter().map(|l| l.name()).collect::<Vec<_>>().join(", "),
-        })
+        if let Some(given) = kernels.filter(|given| !given.is_empty()) {
+            return find(&given, Level::kernels).map_err(|(given, known)| Error::Kernels { given, known });
+        }
+        if let Some(given) = isa.filter(|given| !given.is_empty()) {
+            return find(&given, Level::name).map_err(|(given, known)| Error::Isa { given, known });
+        }
+        Ok(available.last().copied().unwrap_or(Level::Baseline))
     }
 }
 

@@ -343,7 +343,8 @@ impl Traced {
 
     /// The rates as tapes of their own.
     pub fn rated(&self) -> Result<Arc<Rated>, Error> {
-        static CACHE: OnceLock<Mutex<Cache<(Given, Vec<String>), Rated>>> = OnceLock::new();
+        type RatesOf = Cache<(Given, Vec<String>), Rated>;
+        static CACHE: OnceLock<Mutex<RatesOf>> = OnceLock::new();
         let Scene { given, record, .. } = &self.scene;
         Cache::find(CACHE.get_or_init(Mutex::default), &(given.clone(), record.clone()), || {
             let rated = Rated::new(given, record)?;
@@ -365,8 +366,8 @@ impl Traced {
 }
 
 impl Scene {
-    /// Traces all that a run needs.
-    fn trace(&self) -> Result<Tapes, Error> {
+    /// Traces all that a run needs, anew.
+    pub fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
         let mut start = None;
         let mut finish = None;

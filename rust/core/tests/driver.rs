@@ -9,7 +9,6 @@ use proptest::prelude::*;
 use stepwell_core::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     run::{
         Machine, Model,
         batch::{Arrays, Plan, run, saves},
@@ -88,8 +87,8 @@ fn a_batch_of_any_size_is_its_members() {
     };
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
     let whole = pendulums(385);
-    let tile = |width: Width| whole.lanes(&whole.traced().unwrap(), machine(1), width).0;
-    let edges = [tile(Width::Wide), tile(Width::Few)].into_iter().flat_map(|tile| [tile - 1, tile, tile + 1, 2 * tile + 1]);
+    let tile = |members: usize| whole.lanes(&whole.traced().unwrap(), machine(1), members).unwrap();
+    let edges = [tile(385), tile(8)].into_iter().flat_map(|tile| [tile - 1, tile, tile + 1, 2 * tile + 1]);
     let sizes = [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384];
     for members in sizes.into_iter().chain(edges).filter(|members| (1..=385).contains(members)) {
         let (some_v, some_y, _) = last(&plan(pendulums(members), 0.1, 50, members, 1)).unwrap();
@@ -160,6 +159,26 @@ fn a_world_in_pieces_is_a_run() {
 }
 
 #[test]
+fn kernels_are_chosen_by_name() {
+    let asked = |kernels: &str, isa: &str| Level::asked(Some(kernels.into()), Some(isa.into()));
+    let best = Level::available().last().copied().unwrap();
+    assert_eq!(Level::asked(None, None), Ok(best));
+    assert_eq!(asked("", ""), Ok(best));
+    for level in Level::available() {
+        assert_eq!(asked(level.kernels(), ""), Ok(level));
+        assert_eq!(asked("", level.name()), Ok(level));
+        assert_eq!(asked("interpret", level.name()), Ok(Level::Baseline), "the newer name counts");
+    }
+    let known = |name: fn(Level) -> &'static str| Level::available().into_iter().map(name).collect::<Vec<_>>().join(", ");
+    for given in ["baseline", "avx1024", "Interpret"] {
+        assert_eq!(asked(given, "baseline"), Err(Error::Kernels { given: given.to_owned(), known: known(Level::kernels) }));
+    }
+    for given in ["interpret", "avx1024"] {
+        assert_eq!(asked("", given), Err(Error::Isa { given: given.to_owned(), known: known(Level::name) }));
+    }
+}
+
+#[test]
 fn kept_steps() {
     let kept = |steps, every| saves(steps, every).collect::<Vec<_>>();
     assert_eq!(kept(10, None), [10]);
@@ -187,7 +206,7 @@ fn found(rows: &[Vec<f64>], h: f64, own: bool, t0: f64, steps: std::ops::RangeIn
     let table = Table { samples: rows.iter().map(|row| Row(row)).collect(), start: 0.0, interval: h };
     let spec = Spec { tables: vec![table], ..Spec::default() };
     let (stage, clock) = (sampled(rows[0].len() == 1, own), Clock { t0, h });
-    let mut loaded = Loaded::new(&stage, &spec, Level::Baseline, Width::Few, &clock, 0.0);
+    let mut loaded = Loaded::new(&stage, &spec, Level::Baseline, 8, &clock, 0.0);
     assert_eq!(loaded.lanes(), LANES);
     loaded.prepare(&stage, &spec, 0, LANES);
     let step = |k: i64| {

@@ -18,6 +18,7 @@ use stepwell_core::{
     },
     spec::Row,
     steppers, systems as kinds,
+    tape::Counts,
 };
 
 use model::{ModelSpec, by_row, core_error};
@@ -194,6 +195,49 @@ fn detached(
     }
 }
 
+/// A number of operations of each kind.
+fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, PyDict>> {
+    let d = PyDict::new(py);
+    d.set_item("additions", counts.additions)?;
+    d.set_item("multiplications", counts.multiplications)?;
+    d.set_item("divisions", counts.divisions)?;
+    d.set_item("square_roots", counts.square_roots)?;
+    d.set_item("choices", counts.choices)?;
+    d.set_item("bits", counts.bits)?;
+    Ok(d)
+}
+
+/// What a step becomes, traced and compiled anew for so many members: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, members, *, choice=0, attempts=false))]
+fn compiled<'py>(
+    py: Python<'py>,
+    model: &ModelSpec,
+    members: usize,
+    choice: usize,
+    attempts: bool,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let level = Level::choose().map_err(core_error)?;
+    let how = if attempts { model.attempts() } else { model.started(choice) };
+    let made = model.model(how, &rows, &tables)?.compiled(Machine { level, threads: 1 }, members).map_err(core_error)?;
+    let Some(made) = made else { return Ok(None) };
+    let d = PyDict::new(py);
+    d.set_item("level", level.name())?;
+    d.set_item("written", kinds_of(py, &made.written)?)?;
+    d.set_item("computed", kinds_of(py, &made.computed)?)?;
+    let [run, member, step] = made.before;
+    d.set_item("per_run", run)?;
+    d.set_item("per_member", member)?;
+    d.set_item("per_step", step)?;
+    d.set_item("lanes", made.lanes)?;
+    d.set_item("bytes", made.bytes)?;
+    d.set_item("spills", made.spills)?;
+    d.set_item("trace", made.trace.as_secs_f64())?;
+    d.set_item("compile", made.compile.as_secs_f64())?;
+    Ok(Some(d))
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -203,6 +247,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
+    m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;

@@ -53,6 +53,16 @@ pub trait Kernel: Send + Sync {
     ///
     /// If the tile's slices are shorter than its body says.
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>);
+
+    /// How long its machine code is, in bytes; zero if it is interpreted.
+    fn bytes(&self) -> usize {
+        0
+    }
+
+    /// How many values are kept beside at most, because registers do not suffice.
+    fn spills(&self) -> usize {
+        0
+    }
 }
 
 /// Panics unless a tile holds what a body asks for. What is written as machine code relies on it.

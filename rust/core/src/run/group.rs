@@ -9,7 +9,6 @@ use super::{
 use crate::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     spec::Spec,
     system::Shape,
     trace::{Tapes, Traced},
@@ -93,10 +92,10 @@ pub struct Lanes {
 }
 
 impl Lanes {
-    /// For tiles of so many lanes as the width says.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, width: Width, clock: &Clock) -> Result<Lanes, Error> {
+    /// For a run of so many members.
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes, Error> {
         let tapes = traced.tapes()?;
-        let step = Loaded::new(&tapes.step, spec, level, width, clock, f64::INFINITY);
+        let step = Loaded::new(&tapes.step, spec, level, members, clock, f64::INFINITY);
         let lanes = step.lanes();
         let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
         let aside = |stage: &Option<Stage>| stage.as_ref().map(|stage| Aside::new(stage, spec, level, lanes, clock));

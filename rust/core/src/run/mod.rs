@@ -3,6 +3,7 @@
 pub mod aligned;
 pub mod batch;
 pub mod chosen;
+pub mod compiled;
 pub mod crew;
 pub mod group;
 pub mod paced;
@@ -19,7 +20,6 @@ use self::{
 use crate::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     large::{
         self, Asked, Long, Rates, STRAIGHT, STRAIGHT_RATES,
         group::LargeGroup,
@@ -56,32 +56,31 @@ impl Model<'_> {
         self.scene.traced()
     }
 
-    /// By what a group of that width is stepped.
-    fn way(&self, traced: &Traced, machine: Machine, width: Width) -> Way {
+    /// By what so many members are stepped.
+    fn way(&self, traced: &Traced, machine: Machine, members: usize) -> Way {
         let (rates, step) = traced.operations;
-        let lone = width == Width::One;
+        let lone = members == 1;
         if let How::Matrix { .. } = &self.scene.how {
-            return if rates > if lone { LONE_MAP } else { STRAIGHT_RATES } { Way::Map } else { Way::Tape };
+            // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
+            let most = if members <= ALONE { LONE_MAP } else { STRAIGHT_RATES };
+            return if rates > most { Way::Map } else { Way::Tape };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
         match long {
-            Some(long) if lone && rates >= long.from || large && rates > STRAIGHT_RATES => Way::Long(long),
+            Some(long) if lone && rates >= long.from => Way::Long(long),
+            Some(long) if large && (rates > STRAIGHT_RATES || members <= ALONE && rates >= long.from) => Way::Long(long),
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
     }
 
-    /// How many members a group of that width steps together, and about what a step costs beside one of few.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> Result<(usize, usize), Error> {
-        Ok(match self.way(traced, machine, width) {
-            Way::Tape => {
-                let tapes = traced.tapes()?;
-                let runner = &tapes.step.kit(machine.level, width).runner;
-                (runner.lanes(), runner.cost())
-            }
-            Way::Rates(lanes) => (lanes, 1),
-            Way::Long(_) | Way::Map => (1, 1),
+    /// How many members a group steps together in a run of so many.
+    pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize) -> Result<usize, Error> {
+        Ok(match self.way(traced, machine, members) {
+            Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
+            Way::Rates(lanes) => lanes,
+            Way::Long(_) | Way::Map => 1,
         })
     }
 
@@ -89,11 +88,11 @@ impl Model<'_> {
         Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h }
     }
 
-    /// A group that steps it.
-    pub fn group(&self, traced: &Traced, machine: Machine, width: Width, clock: &Clock) -> Result<Box<dyn Group>, Error> {
+    /// A group that steps it, in a run of so many members.
+    pub fn group(&self, traced: &Traced, machine: Machine, members: usize, clock: &Clock) -> Result<Box<dyn Group>, Error> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
-            Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, width, clock)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
+            Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -103,34 +102,18 @@ impl Model<'_> {
     }
 
     /// A group whose members go at a pace of their own each.
-    pub fn paced(&self, traced: &Traced, machine: Machine, width: Width, budget: f64) -> Result<Box<dyn Paced>, Error> {
+    pub fn paced(&self, traced: &Traced, machine: Machine, members: usize, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
-            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
+            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
-            way => match (way, self.way(traced, machine, Width::One)) {
+            way => match (way, self.way(traced, machine, 1)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
                 _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
             },
         };
         let courses = traced.courses(rates.facts())?;
         Ok(Box::new(LargePaced::new(courses, rates, traced, level, budget)?))
-    }
-
-    /// Which width serves so many members best.
-    pub fn width(&self, traced: &Traced, machine: Machine, members: usize) -> Result<Width, Error> {
-        if members == 1 {
-            return Ok(Width::One);
-        }
-        if let Way::Tape = self.way(traced, machine, Width::Wide) {
-            let (lanes, cost) = self.lanes(traced, machine, Width::Wide)?;
-            let (few, each) = self.lanes(traced, machine, Width::Few)?;
-            let narrow = members < lanes && members.div_ceil(few) * each < cost;
-            return Ok(if narrow { Width::Few } else { Width::Wide });
-        }
-        // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-        let alone = members <= ALONE && matches!(self.way(traced, machine, Width::One), Way::Long(_) | Way::Map);
-        Ok(if alone { Width::One } else { Width::Wide })
     }
 }
 

@@ -1,17 +1,13 @@
 //! A cut tape, ready to be run over tiles: the hot loop, and what is computed before it.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::aligned::Aligned;
 use crate::{
     isa::Level,
-    kernel::{
-        Kernel, Tile,
-        interpret::Interpreter,
-        runner::{Runner, Width},
-    },
+    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner},
     spec::Spec,
-    tape::split::{Entry, Given, Split},
+    tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
 };
 
@@ -19,7 +15,8 @@ use crate::{
 pub struct Stage {
     /// The tape.
     pub split: Split,
-    kits: [[OnceLock<Arc<Kit>>; Width::ALL.len()]; Level::ALL.len()],
+    /// By the number of members that they are for.
+    kits: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
     /// Those for rows of a length that something else has set.
     long: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
 }
@@ -56,7 +53,7 @@ impl Kit {
 impl Stage {
     /// Of a tape that was cut.
     pub fn new(split: Split) -> Stage {
-        Stage { split, kits: Default::default(), long: Mutex::default() }
+        Stage { split, kits: Mutex::default(), long: Mutex::default() }
     }
 
     /// Operations of all its bodies.
@@ -65,23 +62,44 @@ impl Stage {
         [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum()
     }
 
-    /// What makes its steps at a width.
-    pub fn kit(&self, level: Level, width: Width) -> &Arc<Kit> {
-        let make = || Kit::new(&self.split, level, Runner::new(&self.split.body, level, width));
-        self.kits[level as usize][width as usize].get_or_init(make)
+    /// What makes its steps in a run of so many members.
+    pub fn kit(&self, level: Level, members: usize) -> Arc<Kit> {
+        // Some more or fewer of many members are no reason for another tile.
+        let members = if members > MANY { usize::MAX } else { members };
+        self.kept(&self.kits, level, members, |body| Runner::new(body, level, members))
     }
 
     /// What makes its steps over rows of so many lanes.
     pub fn kit_of(&self, level: Level, lanes: usize) -> Arc<Kit> {
-        let mut long = self.long.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, known)) = long.iter().find(|(at, wide, _)| (*at, *wide) == (level, lanes)) {
+        self.kept(&self.long, level, lanes, |body| Runner::long(body, level, lanes))
+    }
+
+    /// What was made before for such a number, or what is made now.
+    fn kept(
+        &self,
+        kits: &Mutex<Vec<(Level, usize, Arc<Kit>)>>,
+        level: Level,
+        number: usize,
+        make: impl Fn(&Body) -> Runner,
+    ) -> Arc<Kit> {
+        // A thread that panicked while it held the lock has left a list that is whole: entries are made before they are put in.
+        let mut kits = kits.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, known)) = kits.iter().find(|(at, known, _)| (*at, *known) == (level, number)) {
             return Arc::clone(known);
         }
-        let made = Kit::new(&self.split, level, Runner::long(&self.split.body, level, lanes));
-        long.push((level, lanes, Arc::clone(&made)));
+        let made = Kit::new(&self.split, level, make(&self.split.body));
+        if kits.len() == MOST_KITS {
+            kits.remove(0);
+        }
+        kits.push((level, number, Arc::clone(&made)));
         made
     }
 }
+
+/// Members above which their number says nothing about the best tile: it holds some hundreds.
+const MANY: usize = 1024;
+/// Kernels of different lengths that are kept for a stage.
+const MOST_KITS: usize = 16;
 
 /// Time and step: t = `t0` + k·`h` at step k, never accumulated.
 #[derive(Clone, Copy, Debug)]
@@ -134,9 +152,9 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// For tiles of so many lanes as the width says. `budget` is the most attempts of a member, for those.
-    pub fn new(stage: &Stage, spec: &Spec, level: Level, width: Width, clock: &Clock, budget: f64) -> Loaded {
-        Loaded::with(stage, Arc::clone(stage.kit(level, width)), spec, clock, budget)
+    /// For a run of so many members. `budget` is the most attempts of a member, for those.
+    pub fn new(stage: &Stage, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> Loaded {
+        Loaded::with(stage, stage.kit(level, members), spec, clock, budget)
     }
 
     /// With a kernel that was chosen already.

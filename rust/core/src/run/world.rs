@@ -48,8 +48,8 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let width = model.width(&traced, machine, members - first)?;
-            let mut group = model.group(&traced, machine, width, &clock)?;
+            let whole = members - first >= model.lanes(&traced, machine, members)?;
+            let mut group = model.group(&traced, machine, if whole { members } else { members - first }, &clock)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
             group.settle();

@@ -2,7 +2,6 @@
 
 use stepwell_core::{
     isa::Level,
-    kernel::runner::Width,
     run::stage::{Clock, Loaded, Stage},
     spec::{Row, Spec, Table},
     tape::{Id, Op, Tape, eval, split::HOLD_SLACK, split::split},
@@ -180,7 +179,7 @@ const MEMBERS: usize = 3;
 
 /// The state of each member after some steps of a tape that was cut.
 fn stepped(stage: &Stage, spec: &Spec, clock: &Clock, first: i64, steps: usize, state: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut loaded = Loaded::new(stage, spec, Level::Baseline, Width::Few, clock, f64::INFINITY);
+    let mut loaded = Loaded::new(stage, spec, Level::Baseline, 8, clock, f64::INFINITY);
     loaded.prepare(stage, spec, 0, MEMBERS);
     let lanes = loaded.lanes();
     let mut rows = vec![0.0; STATES as usize * lanes];
