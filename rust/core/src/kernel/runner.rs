@@ -87,8 +87,12 @@ impl Runner {
 
     /// What makes so many more steps, and whether that is machine code.
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
+        // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
+        if let Some(Some(written)) = self.written.get() {
+            return (written.as_ref(), true);
+        }
         let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
-        if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED && self.written.get().is_none() {
+        if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED {
             return (&self.interpreter, false);
         }
         let write = || {
