@@ -127,6 +127,13 @@ pub struct Spec<'a> {
     pub tables: Vec<Table<'a>>,
 }
 
+impl Spec<'_> {
+    /// Whether all members have everything in common.
+    pub fn is_common(&self) -> bool {
+        self.rows.iter().chain(self.tables.iter().flat_map(|table| &table.samples)).all(Row::is_common)
+    }
+}
+
 /// The numbers of one member, by name: what a system is made of.
 pub struct Parameters<'a, N: Number> {
     /// Names and counts.

@@ -65,9 +65,12 @@ impl Runner {
 
     /// What makes so many more steps, and whether that is machine code.
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
+        // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
+        if let Some(Some(written)) = self.written.get() {
+            return (written.as_ref(), true);
+        }
         let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
-        let pays = self.shape.is_some()
-            && (self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETED || self.written.get().is_some());
+        let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETED;
         match pays.then(|| self.write()).flatten() {
             Some(written) => (written, true),
             None => (&self.interpreter, false),

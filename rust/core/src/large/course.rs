@@ -49,6 +49,15 @@ pub enum Act {
         /// Row of what comes of it.
         out: usize,
     },
+    /// Both rates of one state.
+    Both {
+        /// When in the step.
+        at: Time,
+        /// Rows of the state.
+        state: [usize; 2],
+        /// Rows of what comes of it.
+        out: [usize; 2],
+    },
     /// One pass over the rows.
     Pass(Box<Stage>),
 }
@@ -294,7 +303,17 @@ impl Plan {
             }
             for (i, node) in self.nodes.iter().enumerate().filter(|(i, _)| self.turn[*i] == Some(pass)) {
                 if let Node::Ask(rate, at, v, y) = *node {
-                    acts.push(Act::Ask { rate, at, v: row(v), y: row(y), out: row(i) });
+                    let (v, y, out) = (row(v), row(y), row(i));
+                    let ask = match acts.last() {
+                        Some(&Act::Ask { rate: Rate::Dv, at: before, v: of_v, y: of_y, out: dv })
+                            if rate == Rate::Dy && (before, of_v, of_y) == (at, v, y) =>
+                        {
+                            acts.pop();
+                            Act::Both { at, state: [v, y], out: [dv, out] }
+                        }
+                        _ => Act::Ask { rate, at, v, y, out },
+                    };
+                    acts.push(ask);
                 }
             }
         }

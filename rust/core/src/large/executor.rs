@@ -17,11 +17,21 @@ pub struct Executor {
     stride: usize,
 }
 
-/// How long rows are, with what fills the last vector.
+/// How long rows are, with what fills the last vectors.
 pub fn stride(numbers: usize) -> usize {
-    // Four vectors go abreast if they can, for which there must be a multiple of four; short rows would be half air.
     const VECTOR: usize = 8;
-    numbers.next_multiple_of(if numbers > 8 * VECTOR { 4 * VECTOR } else { VECTOR }).max(VECTOR)
+    // Four vectors go abreast if they can, for which there must be a multiple of four. Short rows would be half air.
+    const TEAM: usize = 4 * VECTOR;
+    if numbers <= 2 * TEAM {
+        return numbers.next_multiple_of(VECTOR).max(VECTOR);
+    }
+    let mut stride = numbers.next_multiple_of(TEAM);
+    // A read of what is 4096 bytes from where was just written waits for it: rows must not begin at the same place of a page.
+    const PAGE: usize = 512;
+    while numbers >= PAGE && ((stride / TEAM).is_multiple_of(2) || stride % PAGE < 2 * TEAM || stride % PAGE > PAGE - 2 * TEAM) {
+        stride += TEAM;
+    }
+    stride
 }
 
 impl Executor {
@@ -30,7 +40,7 @@ impl Executor {
         let nobody = Spec::default();
         let pass = |act: &Act| match act {
             Act::Pass(stage) => Some(Loaded::with(stage, stage.kit_of(level, stride), &nobody, clock, f64::INFINITY)),
-            Act::Ask { .. } => None,
+            Act::Ask { .. } | Act::Both { .. } => None,
         };
         Executor { passes: course.acts.iter().map(pass).collect(), stride }
     }
@@ -53,6 +63,14 @@ impl Executor {
                         Rate::Dv => rates.dv(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[0]]),
                         Rate::Dy => rates.dy(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[1]]),
                         Rate::Velocity => rates.velocity(row(*y, sizes[1]), &mut out_row[..sizes[0]]),
+                    }
+                }
+                (Act::Both { at, state: [v, y], out: [dv, dy] }, _) => {
+                    let row = |row: &usize, numbers: usize| row * stride..row * stride + numbers;
+                    let rows = [row(v, sizes[0]), row(y, sizes[1]), row(dv, sizes[0]), row(dy, sizes[1])];
+                    // No two of them are the same row.
+                    if let Ok([v, y, dv, dy]) = arena.get_disjoint_mut(rows) {
+                        rates.both(at.at(t, h), v, y, [dv, dy]);
                     }
                 }
                 (Act::Pass(_), None) => {} // there is a kernel for each pass

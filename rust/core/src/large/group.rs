@@ -102,6 +102,8 @@ pub struct LargeGroup {
     start: Option<Executor>,
     finish: Option<Executor>,
     recorded: usize,
+    /// Whether what was taken from the first member serves all.
+    prepared: bool,
 }
 
 impl LargeGroup {
@@ -122,6 +124,7 @@ impl LargeGroup {
             start: blocks.courses.start.as_ref().map(executor),
             finish: blocks.courses.finish.as_ref().map(executor),
             recorded,
+            prepared: false,
             blocks,
         }
     }
@@ -133,7 +136,10 @@ impl Group for LargeGroup {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        self.blocks.rates.prepare(spec, first, count);
+        // What all members have in common is taken once: a large matrix takes longer to take than a step.
+        if !std::mem::replace(&mut self.prepared, spec.is_common()) {
+            self.blocks.rates.prepare(spec, first, count);
+        }
         self.blocks.rates.tally_mut().fill(0.0);
     }
 

@@ -10,8 +10,9 @@ struct Linear {
     of_v: Panels,
     of_y: Panels,
     inputs: Inputs,
-    x: Vec<f64>,
-    /// The time for which `x` holds: both blocks ask at the same times, and a sine is dear.
+    /// v, y and the inputs.
+    column: Vec<f64>,
+    /// The time for which the inputs hold: both blocks ask at the same times, and a sine is dear.
     time: f64,
     /// h·ẏ of v = 1, in a second-order system.
     speed: f64,
@@ -27,16 +28,20 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         of_v: nothing(),
         of_y: nothing(),
         inputs: Inputs::default(),
-        x: vec![0.0; asked.given.whole("inputs")],
+        column: vec![0.0; asked.shape.v + asked.shape.y + asked.given.whole("inputs")],
         time: f64::NAN,
         speed: 0.0,
     })
 }
 
 impl Linear {
-    fn look(&mut self, t: f64) {
+    fn look(&mut self, t: f64, v: &[f64], y: &[f64]) {
+        let (of_v, rest) = self.column.split_at_mut(v.len());
+        let (of_y, x) = rest.split_at_mut(y.len());
+        of_v.copy_from_slice(v);
+        of_y.copy_from_slice(y);
         if self.time != t {
-            self.inputs.fill(t, &mut self.x);
+            self.inputs.fill(t, x);
             self.time = t;
         }
     }
@@ -49,7 +54,7 @@ impl Rates for Linear {
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
         let (h, place) = (self.h, spec.given.place("rows").unwrap_or(0));
-        let columns = self.shape.v + self.shape.y + self.x.len();
+        let columns = self.column.len();
         let entry = |i: usize, j: usize| h * spec.rows[place + i * columns + j].at(first);
         self.of_v = Panels::new(self.shape.v, columns, entry);
         self.of_y = Panels::new(self.shape.y, columns, |i, j| entry(self.shape.v + i, j));
@@ -59,13 +64,19 @@ impl Rates for Linear {
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t);
-        self.of_v.times(self.level, [v, y, &self.x], out);
+        self.look(t, v, y);
+        out.copy_from_slice(self.of_v.times(self.level, &self.column));
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t);
-        self.of_y.times(self.level, [v, y, &self.x], out);
+        self.look(t, v, y);
+        out.copy_from_slice(self.of_y.times(self.level, &self.column));
+    }
+
+    fn both(&mut self, t: f64, v: &[f64], y: &[f64], out: [&mut [f64]; 2]) {
+        self.look(t, v, y);
+        let made = Panels::both_times([&mut self.of_v, &mut self.of_y], self.level, &self.column);
+        out.into_iter().zip(made).for_each(|(out, made)| out.copy_from_slice(made));
     }
 
     fn velocity(&mut self, d: &[f64], out: &mut [f64]) {

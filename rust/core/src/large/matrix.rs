@@ -20,9 +20,10 @@ pub struct Matrix {
     inputs: Inputs,
     /// How many inputs there are.
     count: usize,
-    u: Vec<f64>,
-    state: Vec<f64>,
-    next: Vec<f64>,
+    /// The state and the inputs at all nodes.
+    column: Vec<f64>,
+    /// Whether what was taken from the first member serves all.
+    prepared: bool,
 }
 
 impl Matrix {
@@ -40,10 +41,9 @@ impl Matrix {
             pq: Panels::new(0, 0, |_, _| 0.0),
             inputs: Inputs::default(),
             count,
-            u: vec![0.0; nodes.len() * count],
+            column: vec![0.0; n + nodes.len() * count],
             nodes,
-            state: vec![0.0; n],
-            next: vec![0.0; n],
+            prepared: false,
         }
     }
 }
@@ -54,33 +54,37 @@ impl Group for Matrix {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
-        let n = self.state.len();
+        if std::mem::replace(&mut self.prepared, spec.is_common()) {
+            return;
+        }
+        let n = self.shape.v + self.shape.y;
         let (p, q) = (spec.given.place("p").unwrap_or(0), spec.given.place("q").unwrap_or(0));
         // P by rows; Q by columns, nodes and inputs, each with a number for every row.
         let place = |i: usize, j: usize| if j < n { p + i * n + j } else { q + (j - n) * n + i };
-        self.pq = Panels::new(n, n + self.u.len(), |i, j| spec.rows[place(i, j)].at(first));
+        self.pq = Panels::new(n, self.column.len(), |i, j| spec.rows[place(i, j)].at(first));
         self.inputs = Inputs::new(spec, first);
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
-        self.state.split_at(self.shape.v)
+        self.column[..self.shape.v + self.shape.y].split_at(self.shape.v)
     }
 
     fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
-        self.state.split_at_mut(self.shape.v)
+        self.column[..self.shape.v + self.shape.y].split_at_mut(self.shape.v)
     }
 
     // What a method carries is its own affair: the caller starts and finishes.
     fn start(&mut self, _k: i64) {}
 
     fn advance(&mut self, k: i64, n: i64) {
+        let numbers = self.shape.v + self.shape.y;
         for k in k..k + n {
             let t = self.clock.at(k);
-            for (node, u) in self.nodes.iter().zip(self.u.chunks_exact_mut(self.count.max(1))) {
+            for (node, u) in self.nodes.iter().zip(self.column[numbers..].chunks_exact_mut(self.count.max(1))) {
                 self.inputs.fill(t + node * self.clock.h, u);
             }
-            self.pq.times(self.level, [&self.state, &self.u, &[]], &mut self.next);
-            std::mem::swap(&mut self.state, &mut self.next);
+            let made = self.pq.times(self.level, &self.column);
+            self.column[..numbers].copy_from_slice(made);
         }
     }
 

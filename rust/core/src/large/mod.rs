@@ -65,6 +65,12 @@ pub trait Rates: Send + Sync {
     /// h·ẏ; not asked for in a second-order system.
     fn dy(&mut self, _t: f64, _v: &[f64], _y: &[f64], _out: &mut [f64]) {}
 
+    /// Both of one state.
+    fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
+        self.dv(t, v, y, dv);
+        self.dy(t, v, y, dy);
+    }
+
     /// The velocity whose increment of y this is; not asked for in a second-order system.
     fn velocity(&mut self, _d: &[f64], _out: &mut [f64]) {}
 

@@ -1,8 +1,8 @@
 //! Products of a matrix with columns of numbers, summed in the order of the columns.
 //!
-//! A sum in a fixed order is a chain of additions that wait for each other. So a few rows are summed at once: their chains
-//! run side by side, and a number of the state is read once for all of them. The entries are stored in panels of so many
-//! rows, in the order in which they are used; rows that fill no panel come last, one by one. No sum changes by that.
+//! A sum in a fixed order is a chain of additions that wait for each other. So some rows are summed at once: their chains run side by
+//! side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the order in
+//! which they are used; rows of zeros fill the last. No sum changes by that.
 
 use crate::{
     isa::{Level, Task, with_isa},
@@ -12,58 +12,53 @@ use crate::{
 /// A matrix, by panels.
 pub struct Panels {
     entries: Aligned,
+    /// What comes of the last product, with the rows that fill the last panel.
+    made: Aligned,
     rows: usize,
-    columns: usize,
 }
 
-/// Rows of the panels, as many of the first kind as there are, then of the next.
-const HEIGHTS: [usize; 3] = [8, 4, 1];
+/// Rows of the panels, as many of the first kind as there are, then of the next. An addition takes four cycles: four vectors of eight rows
+/// hide that.
+const HEIGHTS: [usize; 3] = [32, 16, 8];
 
-struct Times<'a> {
-    entries: &'a [f64],
-    columns: usize,
-    parts: [&'a [f64]; 3],
-    out: &'a mut [f64],
+/// Several products with the same column, one after the other.
+struct Times<'a, const N: usize> {
+    column: &'a [f64],
+    products: [(&'a [f64], &'a mut [f64]); N],
 }
 
-impl Task for Times<'_> {
+impl<const N: usize> Task for Times<'_, N> {
     #[inline(always)]
     fn run(self) {
-        let Times { entries, columns, parts, out } = self;
-        let rest = panels::<{ HEIGHTS[0] }>(entries, out, columns, parts);
-        let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, columns, parts);
-        panels::<{ HEIGHTS[2] }>(rest.0, rest.1, columns, parts);
+        for (entries, out) in self.products {
+            let rest = panels::<{ HEIGHTS[0] }>(entries, out, self.column);
+            let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, self.column);
+            panels::<{ HEIGHTS[2] }>(rest.0, rest.1, self.column);
+        }
     }
 }
 
 /// The sums of all rows that fill panels of `R`; what is left of entries and rows.
 #[inline(always)]
-fn panels<'a, const R: usize>(
-    entries: &'a [f64],
-    out: &'a mut [f64],
-    columns: usize,
-    parts: [&[f64]; 3],
-) -> (&'a [f64], &'a mut [f64]) {
-    let (out, rest) = out.as_chunks_mut::<R>();
-    let (entries, left) = entries.split_at(out.len() * R * columns);
-    for (out, entries) in out.iter_mut().zip(entries.chunks_exact((R * columns).max(1))) {
-        *out = panel(entries.as_chunks().0, parts);
+fn panels<'a, const R: usize>(mut entries: &'a [f64], mut out: &'a mut [f64], column: &[f64]) -> (&'a [f64], &'a mut [f64]) {
+    while out.len() >= R {
+        let (now, later) = out.split_at_mut(R);
+        let (panel, rest) = entries.split_at(R * column.len());
+        now.copy_from_slice(&sums::<R>(panel.as_chunks().0, column));
+        (entries, out) = (rest, later);
     }
-    (left, rest)
+    (entries, out)
 }
 
 /// The sums of `R` rows. The first product starts a sum: −0 is the number that changes nothing when added, not even a −0.
 #[inline(always)]
-fn panel<const R: usize>(mut entries: &[[f64; R]], parts: [&[f64]; 3]) -> [f64; R] {
+#[allow(clippy::needless_range_loop, reason = "a loop over lanes is written as the instructions that it becomes")]
+fn sums<const R: usize>(entries: &[[f64; R]], column: &[f64]) -> [f64; R] {
     let mut sum = [-0.0; R];
-    for part in parts {
-        let (now, later) = entries.split_at(part.len());
-        for (m, s) in now.iter().zip(part) {
-            for r in 0..R {
-                sum[r] += m[r] * s;
-            }
+    for (m, s) in entries.iter().zip(column) {
+        for r in 0..R {
+            sum[r] += m[r] * s;
         }
-        entries = later;
     }
     sum
 }
@@ -71,24 +66,38 @@ fn panel<const R: usize>(mut entries: &[[f64; R]], parts: [&[f64]; 3]) -> [f64; 
 impl Panels {
     /// The matrix with these entries by row and column.
     pub fn new(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
-        let mut entries = Aligned::new(rows * columns);
+        let filled = rows.next_multiple_of(HEIGHTS[2]);
+        let mut entries = Aligned::new(filled * columns);
         let mut places = entries.iter_mut();
         let mut first = 0;
         for height in HEIGHTS {
-            while rows - first >= height {
+            while filled - first >= height {
                 let panel = (0..columns).flat_map(|j| (first..first + height).map(move |i| (i, j)));
                 for ((i, j), place) in panel.zip(&mut places) {
-                    *place = entry(i, j);
+                    *place = if i < rows { entry(i, j) } else { 0.0 };
                 }
                 first += height;
             }
         }
-        Panels { entries, rows, columns }
+        Panels { entries, made: Aligned::new(filled), rows }
     }
 
-    /// `out` = the matrix times the numbers of all parts, one part after the other.
-    pub fn times(&self, level: Level, parts: [&[f64]; 3], out: &mut [f64]) {
-        let task = Times { entries: &self.entries, columns: self.columns, parts, out: &mut out[..self.rows] };
+    fn product(&mut self) -> (&[f64], &mut [f64]) {
+        (&self.entries, &mut self.made)
+    }
+
+    /// The matrix times a column.
+    pub fn times(&mut self, level: Level, column: &[f64]) -> &[f64] {
+        let task = Times { column, products: [self.product()] };
         with_isa!(level, |isa| isa.run(task));
+        &self.made[..self.rows]
+    }
+
+    /// Both matrices times a column.
+    pub fn both_times<'a>(both: [&'a mut Panels; 2], level: Level, column: &[f64]) -> [&'a [f64]; 2] {
+        let [one, other] = both;
+        let task = Times { column, products: [one.product(), other.product()] };
+        with_isa!(level, |isa| isa.run(task));
+        [&one.made[..one.rows], &other.made[..other.rows]]
     }
 }
