@@ -64,9 +64,6 @@ class World:
     @property
     def step_number(self) -> int: ...
 
-#: A symbol, or a number that becomes one.
-_Value = Symbol | float
-
 @final
 class Symbol:
     """A value on a tape. It has no truth and is no number: ``==``, ``bool`` and ``float`` of it are errors."""
@@ -106,6 +103,9 @@ class Symbol:
     def add_bits(self, bits: int) -> Symbol: ...
     def shift_up(self, places: int) -> Symbol: ...
     def shift_down(self, places: int) -> Symbol: ...
+
+#: A symbol, or a number that becomes one.
+_Value = Symbol | float
 
 @final
 class Tape:

@@ -1,7 +1,8 @@
-//! Run-time CPU dispatch, and the only `unsafe` of the project.
+//! Run-time CPU dispatch. The project's `unsafe` stands here and in `kernel/pages.rs`.
 //!
-//! A wheel is built for the oldest CPU of its platform. Each hot loop is therefore compiled once per CPU level, and the best
-//! level that the machine has is chosen when a run begins. No level contracts to FMA or reorders, so all give the same bits.
+//! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
+//! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA or reorders, so all give
+//! the same bits.
 
 use std::ffi::OsString;
 

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use super::{Machine, Model, Way};
 use crate::{
     error::Error,
-    kernel::runner::Runner,
     tape::{Counts, split::Body},
 };
 
@@ -26,7 +25,7 @@ pub struct Compiled {
     pub spills: usize,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
-    /// How long writing the code took, with choosing its shape.
+    /// How long writing the code took, with choosing its shape, and preparing what is interpreted before it.
     pub compile: Duration,
 }
 
@@ -48,7 +47,8 @@ impl Model<'_> {
         let trace = began.elapsed();
         let split = &tapes.step.split;
         let began = Instant::now();
-        let runner = Runner::new(&split.body, machine.level, members);
+        let kit = tapes.step.kit(machine.level, members);
+        let runner = &kit.runner;
         let (bytes, spills) = runner.write().map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
         let compile = began.elapsed();
         Ok(Some(Compiled {
