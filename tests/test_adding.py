@@ -126,7 +126,9 @@ def test_it_is_the_system_of_that_name(tree: Path) -> None:
 
 
 def test_what_is_added_is_formatted(tree: Path) -> None:
-    run(tree, "-m", "ruff", "format", "--check", "--quiet", "python", "tests/cases.py")
-    run(tree, "-m", "ruff", "check", "--quiet", "python", "tests/cases.py")
-    added = [str(tree / name) for name, _ in FILES.findall((ROOT / "docs" / "adding.md").read_text()) if name.endswith(".rs")]
-    subprocess.run(["rustfmt", "--edition", "2024", "--check", *added], cwd=tree, check=True)
+    page = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
+    files = {name for name, _ in [*FILES.findall(page), *CHANGES.findall(page)]}
+    python, rust = ([name for name in files if name.endswith(end)] for end in (".py", ".rs"))
+    run(tree, "-m", "ruff", "format", "--check", "--quiet", *python)
+    run(tree, "-m", "ruff", "check", "--quiet", *python)
+    subprocess.run(["rustfmt", "--edition", "2024", "--check", *rust], cwd=tree, check=True)

@@ -120,7 +120,7 @@ def test_the_sine_is_the_same(phases: list[float]) -> None:
 
 
 def test_nothing_in_the_core_breaks_the_promise() -> None:
-    """The grep gate: no contraction, no library power or trigonometry, no reordered sum, no unsafe outside isa.rs."""
+    """The grep gate: no contraction, no library power or trigonometry, no reordered sum, unsafe in two files only."""
     forbidden = (
         "mul_add",
         "powi(",
@@ -141,7 +141,7 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
         code = path.read_text().split("#[cfg(test)]")[0]
         lines = [line.split("//")[0] for line in code.splitlines()]
         found = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in forbidden if word in line]
-        if path.name != "isa.rs":
+        if path.name not in ("isa.rs", "pages.rs"):
             found += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
         assert not found
 

@@ -112,7 +112,7 @@ impl Rated {
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
         let stages = [&self.dv, &self.dy, &self.velocity, &self.settle, &self.record];
-        stages.into_iter().flatten().map(Stage::size).sum()
+        stages.into_iter().flatten().map(Stage::size).sum::<usize>()
     }
 }
 

@@ -59,7 +59,7 @@ impl Stage {
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
         let split = &self.split;
-        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum()
+        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
     }
 
     /// What makes its steps in a run of so many members.
