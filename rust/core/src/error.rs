@@ -50,22 +50,9 @@ pub enum Error {
         /// How many it has.
         got: usize,
     },
-    /// Kernels that this machine cannot run or nobody knows.
-    #[error("STEPWELL_KERNELS={given:?} names no kernels of this machine; it has {known}")]
-    Kernels {
-        /// What was given.
-        given: String,
-        /// What the machine has.
-        known: String,
-    },
     /// A CPU level that this machine does not have or nobody knows.
-    #[error("STEPWELL_ISA={given:?} is not a CPU level of this machine; it has {known}")]
-    Isa {
-        /// What was given.
-        given: String,
-        /// What the machine has.
-        known: String,
-    },
+    #[error(transparent)]
+    Level(#[from] stepwell_base::isa::UnknownLevel),
     /// The caller's monitor said stop.
     #[error("interrupted")]
     Interrupted,

@@ -1,9 +1,9 @@
 //! # stepwell-core
 
+pub use stepwell_base::{functions, isa};
+
 pub mod controls;
 pub mod error;
-pub mod functions;
-pub mod isa;
 pub mod kernel;
 pub mod large;
 pub mod method;

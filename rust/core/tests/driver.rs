@@ -8,7 +8,7 @@ use common::{Of, model, oscillators, spec};
 use proptest::prelude::*;
 use stepwell_core::{
     error::Error,
-    isa::Level,
+    isa::{Level, UnknownLevel},
     run::{
         Machine, Model,
         batch::{Arrays, Plan, run, saves},
@@ -171,10 +171,16 @@ fn kernels_are_chosen_by_name() {
     }
     let known = |name: fn(Level) -> &'static str| Level::available().into_iter().map(name).collect::<Vec<_>>().join(", ");
     for given in ["baseline", "avx1024", "Interpret"] {
-        assert_eq!(asked(given, "baseline"), Err(Error::Kernels { given: given.to_owned(), known: known(Level::kernels) }));
+        assert_eq!(
+            asked(given, "baseline"),
+            Err(UnknownLevel { variable: "STEPWELL_KERNELS", given: given.to_owned(), known: known(Level::kernels) })
+        );
     }
     for given in ["interpret", "avx1024"] {
-        assert_eq!(asked("", given), Err(Error::Isa { given: given.to_owned(), known: known(Level::name) }));
+        assert_eq!(
+            asked("", given),
+            Err(UnknownLevel { variable: "STEPWELL_ISA", given: given.to_owned(), known: known(Level::name) })
+        );
     }
 }
 

@@ -55,7 +55,7 @@ fn systems() -> Vec<&'static str> {
 /// The CPU level in use.
 #[pyfunction]
 fn isa() -> PyResult<&'static str> {
-    Level::choose().map(Level::name).map_err(core_error)
+    Level::choose().map(Level::name).map_err(|unknown| core_error(unknown.into()))
 }
 
 /// The CPU levels that this machine has, ascending.
@@ -99,7 +99,7 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
     let plan_of_core = Plan {
         model: model.model(model.started(plan.choice), &rows, &tables)?,
         clock: Clock { t0: plan.t0, h: plan.dt },
-        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         first: plan.first,
         steps: plan.steps,
         every: plan.every,
@@ -147,7 +147,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf<'_>, 
     let tables = model.tables(py)?;
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
-        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         t0: plan.t0,
         at: &pacing.at,
         first: Row(pacing.first.as_slice()?),
@@ -218,7 +218,7 @@ fn compiled<'py>(
     attempts: bool,
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
-    let level = Level::choose().map_err(core_error)?;
+    let level = Level::choose().map_err(|unknown| core_error(unknown.into()))?;
     let how = if attempts { model.attempts() } else { model.started(choice) };
     let made = model.model(how, &rows, &tables)?.compiled(Machine { level, threads: 1 }, members).map_err(core_error)?;
     let Some(made) = made else { return Ok(None) };

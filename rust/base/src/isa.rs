@@ -1,12 +1,36 @@
-//! Run-time CPU dispatch. The project's `unsafe` stands here and in `kernel/pages.rs`.
+//! Run-time CPU dispatch. The project's `unsafe` stands here and in the core's `kernel/pages.rs`.
 //!
 //! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
 //! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA or reorders, so all give
 //! the same bits.
 
-use std::ffi::OsString;
+use std::{ffi::OsString, fmt};
 
-use crate::error::Error;
+/// What an environment variable asks for and this machine does not have, or nobody knows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownLevel {
+    /// Which variable.
+    pub variable: &'static str,
+    /// What was given.
+    pub given: String,
+    /// What the machine has.
+    pub known: String,
+}
+
+impl fmt::Display for UnknownLevel {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let UnknownLevel { variable, given, known } = self;
+        let wrong = if *variable == KERNELS { "names no kernels" } else { "is not a CPU level" };
+        write!(f, "{variable}={given:?} {wrong} of this machine; it has {known}")
+    }
+}
+
+impl std::error::Error for UnknownLevel {}
+
+/// Forces the kernels: `interpret`, or a level whose machine code is written.
+const KERNELS: &str = "STEPWELL_KERNELS";
+/// The older name for that, which takes the names of levels.
+const ISA: &str = "STEPWELL_ISA";
 
 /// What the hot loop may use, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,12 +97,12 @@ impl Level {
     }
 
     /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this machine.
-    pub fn choose() -> Result<Level, Error> {
-        Level::asked(std::env::var_os("STEPWELL_KERNELS"), std::env::var_os("STEPWELL_ISA"))
+    pub fn choose() -> Result<Level, UnknownLevel> {
+        Level::asked(std::env::var_os(KERNELS), std::env::var_os(ISA))
     }
 
     /// As `choose`, with what the two variables hold; an empty one counts as none.
-    pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, Error> {
+    pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, UnknownLevel> {
         let available = Level::available();
         let find = |given: &OsString, name: fn(Level) -> &'static str| {
             let found = available.iter().copied().find(|level| *given == name(*level));
@@ -86,10 +110,10 @@ impl Level {
             found.ok_or_else(|| (given.to_string_lossy().into_owned(), known()))
         };
         if let Some(given) = kernels.filter(|given| !given.is_empty()) {
-            return find(&given, Level::kernels).map_err(|(given, known)| Error::Kernels { given, known });
+            return find(&given, Level::kernels).map_err(|(given, known)| UnknownLevel { variable: KERNELS, given, known });
         }
         if let Some(given) = isa.filter(|given| !given.is_empty()) {
-            return find(&given, Level::name).map_err(|(given, known)| Error::Isa { given, known });
+            return find(&given, Level::name).map_err(|(given, known)| UnknownLevel { variable: ISA, given, known });
         }
         Ok(available.last().copied().unwrap_or(Level::Baseline))
     }
@@ -180,9 +204,10 @@ pub use x86::{Avx2, Avx512};
 pub use {Baseline as Avx2, Baseline as Avx512};
 
 /// Makes something with the proof of a level: one expression for AVX-512 and one below it, or one for all.
+#[macro_export]
 macro_rules! with_isa {
     ($level:expr, |$isa:ident| $make:expr) => {
-        $crate::isa::with_isa!($level, |$isa| $make, $make)
+        $crate::with_isa!($level, |$isa| $make, $make)
     };
     ($level:expr, |$isa:ident| $wide:expr, $below:expr) => {{
         use $crate::isa::{Avx2, Avx512, Baseline, Isa, Level};
@@ -200,4 +225,4 @@ macro_rules! with_isa {
         }
     }};
 }
-pub(crate) use with_isa;
+pub use with_isa;
