@@ -17,6 +17,7 @@ use crate::{
     run::stage::Stage,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
+    systems::linear::products,
     tape::{Counts, Id, Op, Tape, split::split},
 };
 
@@ -219,11 +220,8 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
     // P by rows; Q by columns, nodes and inputs, each with a number for every row.
     let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
-    let row = |i: usize| {
-        let products = columns.iter().enumerate().map(|(j, column)| entry(i, j) * *column);
-        products.reduce(|sum, product| sum + product).map_or(0, |sum| sum.0)
-    };
-    (0..n).map(row).collect()
+    let made = products(n, columns.len(), |i, j| entry(i, j) * columns[j]);
+    made.into_iter().map(|symbol| symbol.0).collect()
 }
 
 /// Traces a program that changes the block v alone.

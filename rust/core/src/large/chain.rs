@@ -11,38 +11,39 @@ struct Chain {
     h: f64,
     stiffness: Vec<f64>,
     by_mass: Vec<f64>,
-    force: Vec<f64>,
 }
 
 /// The rates of a chain.
 pub fn make(asked: &Asked) -> Box<dyn Rates> {
     let n = asked.shape.y;
-    let (stiffness, by_mass, force) = (vec![0.0; n + 1], vec![0.0; n], vec![0.0; n + 1]);
-    Box::new(Chain { level: asked.machine.level, h: asked.h, stiffness, by_mass, force })
+    let (stiffness, by_mass) = (vec![0.0; n + 1], vec![0.0; n]);
+    Box::new(Chain { level: asked.machine.level, h: asked.h, stiffness, by_mass })
 }
 
 struct Pull<'a> {
     stiffness: &'a [f64],
     by_mass: &'a [f64],
-    force: &'a mut [f64],
     y: &'a [f64],
     out: &'a mut [f64],
 }
 
 impl Task for Pull<'_> {
+    /// Each mass asks both of its springs: that is quicker than to keep what a spring pulls.
     #[inline(always)]
     fn run(self) {
-        let Pull { stiffness: k, by_mass, force: f, y, out } = self;
+        let Pull { stiffness: k, by_mass, y, out } = self;
         let n = y.len();
-        let (Some(first), Some(last)) = (y.first(), y.last()) else { return };
-        f[0] = k[0] * first;
-        for ((f, k), pair) in f[1..n].iter_mut().zip(&k[1..n]).zip(y.windows(2)) {
-            *f = k * (pair[1] - pair[0]);
+        let (k, by_mass, out) = (&k[..n + 1], &by_mass[..n], &mut out[..n]);
+        let at = |i: usize, before: f64, here: f64, after: f64| (k[i + 1] * (after - here) - k[i] * (here - before)) * by_mass[i];
+        if let [only] = y {
+            out[0] = at(0, 0.0, *only, 0.0);
+            return;
         }
-        f[n] = k[n] * (0.0 - last);
-        for ((out, pair), by_mass) in out.iter_mut().zip(f.windows(2)).zip(by_mass) {
-            *out = (pair[1] - pair[0]) * by_mass;
+        out[0] = at(0, 0.0, y[0], y[1]);
+        for i in 1..n - 1 {
+            out[i] = at(i, y[i - 1], y[i], y[i + 1]);
         }
+        out[n - 1] = at(n - 1, y[n - 2], y[n - 1], 0.0);
     }
 }
 
@@ -58,7 +59,7 @@ impl Rates for Chain {
     }
 
     fn dv(&mut self, _t: f64, _v: &[f64], y: &[f64], out: &mut [f64]) {
-        let Chain { level, stiffness, by_mass, force, .. } = self;
-        with_isa!(*level, |isa| isa.run(Pull { stiffness, by_mass, force, y, out }));
+        let Chain { level, stiffness, by_mass, .. } = self;
+        with_isa!(*level, |isa| isa.run(Pull { stiffness, by_mass, y, out }));
     }
 }

@@ -17,13 +17,14 @@ pub struct Executor {
     stride: usize,
 }
 
+const VECTOR: usize = 8;
+
 /// How long rows are, with what fills the last vectors.
 pub fn stride(numbers: usize) -> usize {
-    const VECTOR: usize = 8;
     // Four vectors go abreast if they can, for which there must be a multiple of four. Short rows would be half air.
     const TEAM: usize = 4 * VECTOR;
-    if numbers <= 2 * TEAM {
-        return numbers.next_multiple_of(VECTOR).max(VECTOR);
+    if numbers <= 8 * TEAM {
+        return numbers.next_multiple_of(if numbers <= TEAM { VECTOR } else { 2 * VECTOR }).max(VECTOR);
     }
     let mut stride = numbers.next_multiple_of(TEAM);
     // A read of what is 4096 bytes from where was just written waits for it: rows must not begin at the same place of a page.
@@ -60,14 +61,19 @@ impl Executor {
                     };
                     let t = at.at(t, h);
                     match rate {
-                        Rate::Dv => rates.dv(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[0]]),
-                        Rate::Dy => rates.dy(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[1]]),
+                        Rate::Dv => {
+                            rates.dv(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[0].next_multiple_of(VECTOR)])
+                        }
+                        Rate::Dy => {
+                            rates.dy(t, row(*v, sizes[0]), row(*y, sizes[1]), &mut out_row[..sizes[1].next_multiple_of(VECTOR)])
+                        }
                         Rate::Velocity => rates.velocity(row(*y, sizes[1]), &mut out_row[..sizes[0]]),
                     }
                 }
                 (Act::Both { at, state: [v, y], out: [dv, dy] }, _) => {
                     let row = |row: &usize, numbers: usize| row * stride..row * stride + numbers;
-                    let rows = [row(v, sizes[0]), row(y, sizes[1]), row(dv, sizes[0]), row(dy, sizes[1])];
+                    let [of_v, of_y] = sizes.map(|numbers| numbers.next_multiple_of(VECTOR));
+                    let rows = [row(v, sizes[0]), row(y, sizes[1]), row(dv, of_v), row(dy, of_y)];
                     // No two of them are the same row.
                     if let Ok([v, y, dv, dy]) = arena.get_disjoint_mut(rows) {
                         rates.both(at.at(t, h), v, y, [dv, dy]);

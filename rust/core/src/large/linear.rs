@@ -1,7 +1,11 @@
 //! The rates of a large linear system ([`crate::systems::linear`]).
 
 use super::{Asked, Facts, Rates, inputs::Inputs, panels::Panels};
-use crate::{isa::Level, spec::Spec, system::Shape};
+use crate::{
+    isa::{Level, Task, with_isa},
+    spec::Spec,
+    system::Shape,
+};
 
 struct Linear {
     shape: Shape,
@@ -10,8 +14,8 @@ struct Linear {
     of_v: Panels,
     of_y: Panels,
     inputs: Inputs,
-    /// v, y and the inputs.
-    column: Vec<f64>,
+    /// The inputs.
+    x: Vec<f64>,
     /// The time for which the inputs hold: both blocks ask at the same times, and a sine is dear.
     time: f64,
     /// h·ẏ of v = 1, in a second-order system.
@@ -28,20 +32,31 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         of_v: nothing(),
         of_y: nothing(),
         inputs: Inputs::default(),
-        column: vec![0.0; asked.shape.v + asked.shape.y + asked.given.whole("inputs")],
+        x: vec![0.0; asked.given.whole("inputs")],
         time: f64::NAN,
         speed: 0.0,
     })
 }
 
+/// Products with the same column, one after the other.
+struct Times<'a, const N: usize> {
+    products: [(&'a Panels, &'a mut [f64]); N],
+    parts: [&'a [f64]; 3],
+}
+
+impl<const N: usize> Task for Times<'_, N> {
+    #[inline(always)]
+    fn run(self) {
+        for (panels, out) in self.products {
+            panels.times(self.parts, out);
+        }
+    }
+}
+
 impl Linear {
-    fn look(&mut self, t: f64, v: &[f64], y: &[f64]) {
-        let (of_v, rest) = self.column.split_at_mut(v.len());
-        let (of_y, x) = rest.split_at_mut(y.len());
-        of_v.copy_from_slice(v);
-        of_y.copy_from_slice(y);
+    fn look(&mut self, t: f64) {
         if self.time != t {
-            self.inputs.fill(t, x);
+            self.inputs.fill(t, &mut self.x);
             self.time = t;
         }
     }
@@ -54,7 +69,7 @@ impl Rates for Linear {
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
         let (h, place) = (self.h, spec.given.place("rows").unwrap_or(0));
-        let columns = self.column.len();
+        let columns = self.shape.v + self.shape.y + self.x.len();
         let entry = |i: usize, j: usize| h * spec.rows[place + i * columns + j].at(first);
         self.of_v = Panels::new(self.shape.v, columns, entry);
         self.of_y = Panels::new(self.shape.y, columns, |i, j| entry(self.shape.v + i, j));
@@ -64,19 +79,21 @@ impl Rates for Linear {
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t, v, y);
-        out.copy_from_slice(self.of_v.times(self.level, &self.column));
+        self.look(t);
+        let task = Times { products: [(&self.of_v, out)], parts: [v, y, &self.x] };
+        with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t, v, y);
-        out.copy_from_slice(self.of_y.times(self.level, &self.column));
+        self.look(t);
+        let task = Times { products: [(&self.of_y, out)], parts: [v, y, &self.x] };
+        with_isa!(self.level, |isa| isa.run(task));
     }
 
-    fn both(&mut self, t: f64, v: &[f64], y: &[f64], out: [&mut [f64]; 2]) {
-        self.look(t, v, y);
-        let made = Panels::both_times([&mut self.of_v, &mut self.of_y], self.level, &self.column);
-        out.into_iter().zip(made).for_each(|(out, made)| out.copy_from_slice(made));
+    fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
+        self.look(t);
+        let task = Times { products: [(&self.of_v, dv), (&self.of_y, dy)], parts: [v, y, &self.x] };
+        with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn velocity(&mut self, d: &[f64], out: &mut [f64]) {

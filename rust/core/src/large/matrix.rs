@@ -1,9 +1,12 @@
 //! The transition-matrix form (Appendix B) of a large system: s ← P·s + Σ Q·u, one member at a time.
 
-use super::{inputs::Inputs, panels::Panels};
+use super::{
+    inputs::Inputs,
+    panels::{Panels, filled},
+};
 use crate::{
-    isa::Level,
-    run::{group::Group, stage::Clock},
+    isa::{Level, Task, with_isa},
+    run::{aligned::Aligned, group::Group, stage::Clock},
     spec::Spec,
     system::Shape,
     trace::How,
@@ -20,8 +23,10 @@ pub struct Matrix {
     inputs: Inputs,
     /// How many inputs there are.
     count: usize,
-    /// The state and the inputs at all nodes.
-    column: Vec<f64>,
+    /// The inputs at all nodes.
+    u: Vec<f64>,
+    state: Aligned,
+    next: Aligned,
     /// Whether what was taken from the first member serves all.
     prepared: bool,
 }
@@ -41,9 +46,32 @@ impl Matrix {
             pq: Panels::new(0, 0, |_, _| 0.0),
             inputs: Inputs::default(),
             count,
-            column: vec![0.0; n + nodes.len() * count],
+            u: vec![0.0; nodes.len() * count],
             nodes,
+            state: Aligned::new(filled(n)),
+            next: Aligned::new(filled(n)),
             prepared: false,
+        }
+    }
+}
+
+struct Steps<'a> {
+    of: &'a mut Matrix,
+    k: i64,
+    n: i64,
+}
+
+impl Task for Steps<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Matrix { shape, clock, nodes, pq, inputs, count, u, state, next, .. } = self.of;
+        for k in self.k..self.k + self.n {
+            let t = clock.at(k);
+            for (node, u) in nodes.iter().zip(u.chunks_exact_mut((*count).max(1))) {
+                inputs.fill(t + node * clock.h, u);
+            }
+            pq.times([&state[..shape.v + shape.y], u, &[]], next);
+            std::mem::swap(state, next);
         }
     }
 }
@@ -61,31 +89,23 @@ impl Group for Matrix {
         let (p, q) = (spec.given.place("p").unwrap_or(0), spec.given.place("q").unwrap_or(0));
         // P by rows; Q by columns, nodes and inputs, each with a number for every row.
         let place = |i: usize, j: usize| if j < n { p + i * n + j } else { q + (j - n) * n + i };
-        self.pq = Panels::new(n, self.column.len(), |i, j| spec.rows[place(i, j)].at(first));
+        self.pq = Panels::new(n, n + self.u.len(), |i, j| spec.rows[place(i, j)].at(first));
         self.inputs = Inputs::new(spec, first);
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
-        self.column[..self.shape.v + self.shape.y].split_at(self.shape.v)
+        self.state[..self.shape.v + self.shape.y].split_at(self.shape.v)
     }
 
     fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
-        self.column[..self.shape.v + self.shape.y].split_at_mut(self.shape.v)
+        self.state[..self.shape.v + self.shape.y].split_at_mut(self.shape.v)
     }
 
     // What a method carries is its own affair: the caller starts and finishes.
     fn start(&mut self, _k: i64) {}
 
     fn advance(&mut self, k: i64, n: i64) {
-        let numbers = self.shape.v + self.shape.y;
-        for k in k..k + n {
-            let t = self.clock.at(k);
-            for (node, u) in self.nodes.iter().zip(self.column[numbers..].chunks_exact_mut(self.count.max(1))) {
-                self.inputs.fill(t + node * self.clock.h, u);
-            }
-            let made = self.pq.times(self.level, &self.column);
-            self.column[..numbers].copy_from_slice(made);
-        }
+        with_isa!(self.level, |isa| isa.run(Steps { of: self, k, n }));
     }
 
     fn finish(&mut self, _k: i64) {}

@@ -33,7 +33,7 @@ use crate::{
 /// of instructions.
 pub const STRAIGHT: usize = 4000;
 /// Operations of the rates from which on they are no tapes either, if there is a kernel.
-pub const STRAIGHT_RATES: usize = 20_000;
+pub const STRAIGHT_RATES: usize = 45_000;
 
 /// What a course may take for granted of rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,8 @@ pub struct Facts {
 
 /// The rates of some members, times the step for which they were made.
 ///
-/// A block is a row for each of its numbers, each of a number for each lane.
+/// A block is a row for each of its numbers, each of a number for each lane. What is to be filled may be longer, up to whole vectors of eight:
+/// what stands behind a block is nobody's.
 pub trait Rates: Send + Sync {
     /// How many members there are.
     fn lanes(&self) -> usize {

@@ -167,10 +167,12 @@ impl TapeRates {
         self.state[at..at + y.len()].copy_from_slice(y);
     }
 
-    /// What was made by the last rate.
-    fn made(&self) -> &[f64] {
+    /// Gives what was made by the last rate, or more that is nobody's.
+    fn give(&self, out: &mut [f64]) {
         let (v, y) = self.sizes();
-        &self.state[v + y..]
+        let made = &self.state[v + y..behind(self.rated.shape) * self.lanes];
+        let numbers = out.len().min(made.len());
+        out[..numbers].copy_from_slice(&made[..numbers]);
     }
 }
 
@@ -199,7 +201,7 @@ impl Rates for TapeRates {
         if let (Some(loaded), Some(stage)) = (&mut self.dv, &self.rated.dv) {
             loaded.advance_at(stage, t, &mut self.state);
         }
-        out.copy_from_slice(&self.made()[..out.len()]);
+        self.give(out);
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
@@ -207,7 +209,7 @@ impl Rates for TapeRates {
         if let (Some(loaded), Some(stage)) = (&mut self.dy, &self.rated.dy) {
             loaded.advance_at(stage, t, &mut self.state);
         }
-        out.copy_from_slice(&self.made()[..out.len()]);
+        self.give(out);
     }
 
     fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
@@ -215,7 +217,7 @@ impl Rates for TapeRates {
         if let (Some(loaded), Some(stage)) = (&mut self.velocity, &self.rated.velocity) {
             loaded.advance_at(stage, 0.0, &mut self.state);
         }
-        out.copy_from_slice(&self.made()[..out.len()]);
+        self.give(out);
     }
 
     fn settle(&mut self, v: &mut [f64], y: &mut [f64]) {

@@ -131,6 +131,6 @@ enum Way {
 }
 
 /// Operations of the matrix form from which on a kernel that is written by hand is quicker than machine code for one number at a time.
-const LONE_MAP: usize = 2 * 14 * 14;
+const LONE_MAP: usize = 2 * 9 * 9;
 /// So many members of a large system are as quick one by one as side by side.
 const ALONE: usize = 4;

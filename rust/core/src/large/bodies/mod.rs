@@ -81,6 +81,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
 
 impl Bodies {
     fn meet(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
+        let out = &mut out[..y.len()];
         match self.kernel.dim {
             2 => self.round.fill::<2>(y),
             _ => self.round.fill::<3>(y),
@@ -113,7 +114,7 @@ impl Bodies {
     /// Finds the forces, if they are not at hand.
     fn find(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
         if self.has(y) {
-            out.copy_from_slice(&self.dv);
+            out[..y.len()].copy_from_slice(&self.dv);
         } else {
             self.at_hand = false;
             self.meet(energy, y, out);
