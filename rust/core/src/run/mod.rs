@@ -61,7 +61,12 @@ impl Model<'_> {
         let (rates, step) = traced.operations;
         let lone = width == Width::One;
         if let How::Matrix { .. } = &self.scene.how {
-            return if rates > if lone { LONE_MAP } else { STRAIGHT_RATES } { Way::Map } else { Way::Tape };
+            return match rates {
+                LONE_MAP.. if lone => Way::Map,
+                STRAIGHT_RATES.. => Way::Map,
+                STRAIGHT.. => Way::Vector(tapes::lanes(machine.level)),
+                _ => Way::Tape,
+            };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
@@ -80,7 +85,7 @@ impl Model<'_> {
                 let runner = &tapes.step.kit(machine.level, width).runner;
                 (runner.lanes(), runner.cost())
             }
-            Way::Rates(lanes) => (lanes, 1),
+            Way::Rates(lanes) | Way::Vector(lanes) => (lanes, 1),
             Way::Long(_) | Way::Map => (1, 1),
         })
     }
@@ -94,6 +99,7 @@ impl Model<'_> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, width, clock)?)),
+            Way::Vector(lanes) => return Ok(Box::new(Lanes::vector(traced, spec, level, lanes, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -106,7 +112,7 @@ impl Model<'_> {
     pub fn paced(&self, traced: &Traced, machine: Machine, width: Width, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
-            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
+            Way::Tape | Way::Vector(_) | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
             way => match (way, self.way(traced, machine, Width::One)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
@@ -139,6 +145,8 @@ impl Model<'_> {
 enum Way {
     /// One tape for the whole step.
     Tape,
+    /// The same, over a vector of so many lanes.
+    Vector(usize),
     /// Tapes for the rates, with so many lanes.
     Rates(usize),
     /// A kernel that is written by hand, for a lone member.
