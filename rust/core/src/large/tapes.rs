@@ -15,7 +15,7 @@ use crate::{
     spec::{Given, Spec},
     system::{Block, Kind, Shape, System},
     tape::{Id, Op, Tape},
-    trace::{block, cut, ids, kind, parameters, trace_record},
+    trace::{block, cut, ids, kind, parameters},
 };
 
 /// The rates of a system, traced. Their state is v, y, a block for what is made, and a number for what the system adds up.
@@ -27,8 +27,9 @@ pub struct Rated {
     dv: Option<Stage>,
     dy: Option<Stage>,
     velocity: Option<Stage>,
-    settle: Option<Stage>,
-    record: Option<Stage>,
+    /// Those that say so make the rate of v of their coordinates, too.
+    settle: Option<(Stage, bool)>,
+    record: Option<(Stage, bool)>,
 }
 
 /// The numbers of a state before what is made.
@@ -83,20 +84,39 @@ impl Rated {
         let stage = |traced: &(Tape, Vec<Id>)| Some(cut(given, traced));
         let dv = rate(kind, given, shape, |s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
         let dy = rate(kind, given, shape, |s, v, y| (Some(s.dy(time(), &v, &y)), v, y));
-        let settle = rate(kind, given, shape, |s, v, y| {
-            let (v, y) = s.settle(v, y);
-            (None, v, y)
-        });
         let second_order = shape.v == shape.y && is_v_times_step(&dy.0, &dy.1[before(shape)..][..shape.y]);
-        let reads_v =
-            dv.0.needed(dv.1[before(shape)..].iter().copied())
-                .iter()
-                .zip(dv.0.ops())
-                .any(|(needed, op)| *needed && matches!(op, Op::State(i) if (*i as usize) < shape.v));
+        let needed = dv.0.needed(dv.1[before(shape)..].iter().copied());
+        let reads = |what: &dyn Fn(Op) -> bool| needed.iter().zip(dv.0.ops()).any(|(needed, op)| *needed && what(*op));
+        let reads_v = reads(&|op| matches!(op, Op::State(i) if (i as usize) < shape.v));
+        let is_of_y = !reads_v && !reads(&|op| op == Op::Time);
         let velocity =
             (!second_order && shape.v == shape.y).then(|| rate(kind, given, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
-        let settles = (0..behind(shape) + 1).any(|i| settle.0.op(settle.1[i]) != Op::State(i as u32));
-        let recorded = if names.is_empty() { None } else { Some(trace_record(Tape::default(), given, names)?) };
+        // What stands beside a state and takes the forces along, costs hardly more than the forces: so it finds them for the next step.
+        let work = |(tape, next): &(Tape, Vec<Id>)| tape.needed(next.iter().copied()).iter().filter(|needed| **needed).count();
+        let along = |trace: &dyn Fn(bool) -> (Tape, Vec<Id>)| {
+            let (alone, both) = (trace(false), trace(is_of_y));
+            let is_cheap = is_of_y && 4 * work(&both) <= 4 * work(&alone) + work(&dv);
+            (cut(given, if is_cheap { &both } else { &alone }), is_cheap)
+        };
+        let settle = |with_dv: bool| {
+            rate(kind, given, shape, |s, v, y| {
+                let (v, y) = s.settle(v, y);
+                (with_dv.then(|| s.dv(time(), &v, &y)), v, y)
+            })
+        };
+        let (tape, next) = settle(false);
+        let settles = next.iter().enumerate().any(|(i, id)| tape.op(*id) != Op::State(i as u32));
+        let quantities = |with_dv: bool| {
+            record(Tape::default(), || {
+                let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+                let s = (kind.symbols)(&parameters(given, Symbol::new(Op::Step)));
+                let mut next = ids([&v, &y]);
+                let made = names.iter().filter_map(|name| s.record(name, &v, &y)).flatten();
+                next.extend(made.map(|symbol| symbol.0));
+                next.extend(with_dv.then(|| ids([&s.dv(time(), &v, &y)])).into_iter().flatten());
+                next
+            })
+        };
         Ok(Rated {
             shape,
             facts: Facts { second_order, reads_v },
@@ -104,15 +124,16 @@ impl Rated {
             dv: if shape.v > 0 { stage(&dv) } else { None },
             dy: if second_order { None } else { stage(&dy) },
             velocity: velocity.as_ref().and_then(stage),
-            settle: if settles { stage(&settle) } else { None },
-            record: recorded.as_ref().and_then(stage),
+            settle: settles.then(|| along(&settle)),
+            record: (!names.is_empty()).then(|| along(&quantities)),
         })
     }
 
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
-        let stages = [&self.dv, &self.dy, &self.velocity, &self.settle, &self.record];
-        stages.into_iter().flatten().map(Stage::size).sum::<usize>()
+        let rates = [&self.dv, &self.dy, &self.velocity].into_iter().flatten();
+        let others = [&self.settle, &self.record].into_iter().flatten().map(|(stage, _)| stage);
+        rates.chain(others).map(Stage::size).sum::<usize>()
     }
 }
 
@@ -133,25 +154,34 @@ pub struct TapeRates {
     state: Aligned,
     /// The state of what is recorded.
     aside: Vec<f64>,
+    /// The rate of v of these coordinates is known until others are asked for.
+    at_hand: bool,
+    y: Vec<f64>,
+    known: Vec<f64>,
+}
+
+fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
+    to.clear();
+    to.extend_from_slice(numbers);
 }
 
 impl TapeRates {
     /// For so many members side by side.
     pub fn new(rated: Arc<Rated>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
-        let load = |stage: &Option<Stage>| {
-            let stage = stage.as_ref()?;
-            Some(Loaded::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY))
-        };
-        let aside = rated.record.as_ref().map_or(0, |stage| stage.split.body.next.len());
+        let load = |stage: &Stage| Loaded::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
+        let aside = rated.record.as_ref().map_or(0, |(stage, _)| stage.split.body.next.len());
         TapeRates {
             lanes,
-            dv: load(&rated.dv),
-            dy: load(&rated.dy),
-            velocity: load(&rated.velocity),
-            settle: load(&rated.settle),
-            record: load(&rated.record),
+            dv: rated.dv.as_ref().map(load),
+            dy: rated.dy.as_ref().map(load),
+            velocity: rated.velocity.as_ref().map(load),
+            settle: rated.settle.as_ref().map(|(stage, _)| load(stage)),
+            record: rated.record.as_ref().map(|(stage, _)| load(stage)),
             state: Aligned::new((behind(rated.shape) + 1) * lanes),
             aside: vec![0.0; aside * lanes],
+            at_hand: false,
+            y: Vec::new(),
+            known: Vec::new(),
             rated,
         }
     }
@@ -187,8 +217,13 @@ impl Rates for TapeRates {
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         let TapeRates { rated, dv, dy, velocity, settle, record, .. } = self;
-        let all =
-            [(dv, &rated.dv), (dy, &rated.dy), (velocity, &rated.velocity), (settle, &rated.settle), (record, &rated.record)];
+        let all = [
+            (dv, rated.dv.as_ref()),
+            (dy, rated.dy.as_ref()),
+            (velocity, rated.velocity.as_ref()),
+            (settle, rated.settle.as_ref().map(|(stage, _)| stage)),
+            (record, rated.record.as_ref().map(|(stage, _)| stage)),
+        ];
         for (loaded, stage) in all {
             if let (Some(loaded), Some(stage)) = (loaded, stage) {
                 loaded.prepare(stage, spec, first, count);
@@ -197,6 +232,11 @@ impl Rates for TapeRates {
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        if self.at_hand && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits()) {
+            out[..self.known.len()].copy_from_slice(&self.known);
+            return;
+        }
+        self.at_hand = false;
         self.sit(if self.rated.facts.reads_v { v } else { &[] }, y);
         if let (Some(loaded), Some(stage)) = (&mut self.dv, &self.rated.dv) {
             loaded.advance_at(stage, t, &mut self.state);
@@ -225,22 +265,37 @@ impl Rates for TapeRates {
             return;
         }
         self.sit(v, y);
-        if let (Some(loaded), Some(stage)) = (&mut self.settle, &self.rated.settle) {
+        let (sizes, mut gives) = (self.sizes(), false);
+        if let (Some(loaded), Some((stage, with_dv))) = (&mut self.settle, &self.rated.settle) {
             loaded.advance_at(stage, 0.0, &mut self.state);
+            gives = *with_dv;
         }
-        let (new_v, new_y) = self.state.split_at(v.len());
+        let (new_v, rest) = self.state.split_at(sizes.0);
+        let (new_y, made) = rest.split_at(sizes.1);
         v.copy_from_slice(new_v);
-        y.copy_from_slice(&new_y[..y.len()]);
+        y.copy_from_slice(new_y);
+        if gives {
+            keep(&mut self.y, new_y);
+            keep(&mut self.known, &made[..sizes.0]);
+        }
+        self.at_hand = gives;
     }
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        let Some((stage, gives)) = &self.rated.record else { return };
         let before = v.len() + y.len();
         self.aside[..v.len()].copy_from_slice(v);
         self.aside[v.len()..before].copy_from_slice(y);
-        if let (Some(loaded), Some(stage)) = (&mut self.record, &self.rated.record) {
+        if let Some(loaded) = &mut self.record {
             loaded.advance_at(stage, 0.0, &mut self.aside);
         }
-        rows.copy_from_slice(&self.aside[before..]);
+        let (quantities, dv) = self.aside[before..].split_at(rows.len());
+        rows.copy_from_slice(quantities);
+        if *gives {
+            keep(&mut self.y, y);
+            keep(&mut self.known, dv);
+            self.at_hand = true;
+        }
     }
 
     fn tally(&self) -> &[f64] {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, Loaded, Stage},
+    stage::{Clock, Kit, Loaded, Stage},
 };
 use crate::{
     error::Error,
@@ -95,7 +95,18 @@ impl Lanes {
     /// For a run of so many members.
     pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes, Error> {
         let tapes = traced.tapes()?;
-        let step = Loaded::new(&tapes.step, spec, level, members, clock, f64::INFINITY);
+        Lanes::with(traced, tapes.step.kit(level, members), spec, level, clock)
+    }
+
+    /// For a vector of members: what is that large goes through the cache anyway.
+    pub fn vector(traced: &Traced, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> Result<Lanes, Error> {
+        let kit = traced.tapes()?.step.kit_of(level, lanes);
+        Lanes::with(traced, kit, spec, level, clock)
+    }
+
+    fn with(traced: &Traced, kit: Arc<Kit>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes, Error> {
+        let tapes = traced.tapes()?;
+        let step = Loaded::with(&tapes.step, kit, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
         let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
         let aside = |stage: &Option<Stage>| stage.as_ref().map(|stage| Aside::new(stage, spec, level, lanes, clock));

@@ -62,8 +62,12 @@ impl Model<'_> {
         let lone = members == 1;
         if let How::Matrix { .. } = &self.scene.how {
             // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-            let most = if members <= ALONE { LONE_MAP } else { STRAIGHT_RATES };
-            return if rates > most { Way::Map } else { Way::Tape };
+            return match rates {
+                LONE_MAP.. if members <= ALONE => Way::Map,
+                STRAIGHT_RATES.. => Way::Map,
+                STRAIGHT.. => Way::Vector(tapes::lanes(machine.level)),
+                _ => Way::Tape,
+            };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
@@ -79,7 +83,7 @@ impl Model<'_> {
     pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize) -> Result<usize, Error> {
         Ok(match self.way(traced, machine, members) {
             Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
-            Way::Rates(lanes) => lanes,
+            Way::Rates(lanes) | Way::Vector(lanes) => lanes,
             Way::Long(_) | Way::Map => 1,
         })
     }
@@ -93,6 +97,7 @@ impl Model<'_> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
+            Way::Vector(lanes) => return Ok(Box::new(Lanes::vector(traced, spec, level, lanes, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -105,7 +110,7 @@ impl Model<'_> {
     pub fn paced(&self, traced: &Traced, machine: Machine, members: usize, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
-            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
+            Way::Tape | Way::Vector(_) | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
             way => match (way, self.way(traced, machine, 1)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
@@ -122,6 +127,8 @@ impl Model<'_> {
 enum Way {
     /// One tape for the whole step.
     Tape,
+    /// The same, over a vector of so many lanes.
+    Vector(usize),
     /// Tapes for the rates, with so many lanes.
     Rates(usize),
     /// A kernel that is written by hand, for a lone member.

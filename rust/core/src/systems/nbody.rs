@@ -109,9 +109,10 @@ impl<N: Number> Bodies<N> {
         for slab in partners(n) {
             let (mut after, mut before, mut wells) = (vec![zero; n * dim], vec![zero; 2 * n * dim], vec![zero; n]);
             for group in slab {
-                let mut pushes = Vec::new();
-                for k in group {
-                    for i in 0..meeting(n, k) {
+                // Body after body, so that what belongs to one is at hand for all of its partners: a body gets what those before it
+                // push from the farthest distance to the nearest, which is a single push in each round.
+                for i in 0..n {
+                    for &k in group.iter().filter(|k| i < meeting(n, **k)) {
                         let j = (i + k) % n;
                         let d: Vec<N> = (0..dim).map(|c| y[dim * j + c] - y[dim * i + c]).collect();
                         let r2 = square(&d) + self.soft;
@@ -119,16 +120,12 @@ impl<N: Number> Bodies<N> {
                         let (to_i, to_j) = (pull * self.strength[j], pull * self.strength[i]);
                         for (c, d) in d.into_iter().enumerate() {
                             after[dim * i + c] += d * to_i;
-                            pushes.push((dim * (i + k) + c, d * to_j));
+                            before[dim * (i + k) + c] -= d * to_j;
                         }
                         if with_wells {
                             wells[i] += self.law.potential(r2, pull, self.strength[j]);
                         }
                     }
-                }
-                // From the farthest distance to the nearest; what a body gets at one distance is a single push in each round.
-                for (at, push) in pushes.into_iter().rev() {
-                    before[at] -= push;
                 }
             }
             for r in 0..n * dim {

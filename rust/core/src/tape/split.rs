@@ -4,7 +4,7 @@
 //! of a drive that all have in common). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
 //! last of them is in the hot loop.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, hash::Hash};
 
 use super::{Id, Op, Tape};
 
@@ -185,12 +185,10 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
 
     // The hot loop. What is of a lower rank is a leaf to it.
     let (mut rows, mut uniforms, mut entries) = (Vec::new(), Vec::new(), Vec::new());
+    // Each value is asked for once, the last of the tape first.
     let number = |list: &mut Vec<Id>, id: Id| {
-        let at = list.iter().position(|known| *known == id).unwrap_or_else(|| {
-            list.push(id);
-            list.len() - 1
-        });
-        at as u32
+        list.push(id);
+        list.len() as u32 - 1
     };
     let mut samples: Vec<(u32, Id)> = Vec::new();
     split.body = Body::of(&tape, &next, |id| match rank(id) {
@@ -212,13 +210,19 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         },
     });
     let behind = |place: u32| if place > u32::MAX / 2 { entries.len() as u32 + (u32::MAX - place) } else { place };
+    // Rows and uniforms stand in the order in which they are read: memory is quickest so.
+    let turned = |i: u32, list: &[Id]| list.len() as u32 - 1 - i;
     for op in &mut split.body.ops {
         *op = match *op {
+            Op::Row(i) => Op::Row(turned(i, &rows)),
+            Op::Uniform(i) => Op::Uniform(turned(i, &uniforms)),
             Op::PerStep(i) => Op::PerStep(behind(i)),
             Op::Held(i) => Op::Held(behind(i)),
             other => other,
         };
     }
+    rows.reverse();
+    uniforms.reverse();
     split.body = std::mem::take(&mut split.body).finished();
 
     // Numbers of samples are found like other values.
@@ -228,30 +232,42 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         entries.push(sample_number(&mut tape, input, t));
     }
 
-    let mut given = Vec::new();
-    let mut params = Vec::new();
+    let (mut given, mut params) = (Places::default(), Places::default());
     let mut leaf = |id: Id| match tape.op(id) {
-        Op::Step => Some(Op::Uniform(place(&mut given, Given::Step))),
-        Op::Param(i) if uniform(i) => Some(Op::Uniform(place(&mut given, Given::Param(i)))),
-        Op::Param(i) => Some(Op::Row(place(&mut params, i))),
-        Op::Uniform(fact) => Some(Op::Uniform(place(&mut given, fact_of(fact)))),
+        Op::Step => Some(Op::Uniform(given.of(Given::Step))),
+        Op::Param(i) if uniform(i) => Some(Op::Uniform(given.of(Given::Param(i)))),
+        Op::Param(i) => Some(Op::Row(params.of(i))),
+        Op::Uniform(fact) => Some(Op::Uniform(given.of(fact_of(fact)))),
         Op::Time => Some(Op::Row(0)),
         _ => None,
     };
     split.run = Body::of(&tape, &uniforms, &mut leaf).finished();
     split.member = Body::of(&tape, &rows, &mut leaf).finished();
     split.step = Body::of(&tape, &entries, &mut leaf).finished();
-    split.given = given;
-    split.params = params;
+    split.given = given.list;
+    split.params = params.list;
     split
 }
 
-fn place<T: PartialEq>(list: &mut Vec<T>, what: T) -> u32 {
-    let at = list.iter().position(|known| *known == what).unwrap_or_else(|| {
-        list.push(what);
-        list.len() - 1
-    });
-    at as u32
+/// Things in the order in which they were asked for, each once.
+struct Places<T> {
+    list: Vec<T>,
+    known: HashMap<T, u32>,
+}
+
+impl<T> Default for Places<T> {
+    fn default() -> Self {
+        Places { list: Vec::new(), known: HashMap::new() }
+    }
+}
+
+impl<T: Copy + Eq + Hash> Places<T> {
+    fn of(&mut self, what: T) -> u32 {
+        *self.known.entry(what).or_insert_with(|| {
+            self.list.push(what);
+            self.list.len() as u32 - 1
+        })
+    }
 }
 
 /// What a step does not know of an input and a run does, as a leaf of a tape that is being cut.

@@ -1,0 +1,315 @@
+//! Large systems: a method's program over long rows makes the bits that its tape makes, with rates of both kinds.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use stepwell_core::{
+    error::Error,
+    isa::Level,
+    kernel::runner::Width,
+    large::{
+        Asked, Facts, Rates,
+        course::{Act, Course, Goal},
+        group::LargeGroup,
+        lone,
+        matrix::Matrix,
+        paced::LargePaced,
+        tapes::TapeRates,
+    },
+    method,
+    pace::Pace,
+    run::{
+        Machine,
+        group::{Group, Lanes},
+        paced::{Paced, PacedLanes},
+        stage::Clock,
+    },
+    spec::{Given, Row, Spec, Table},
+    steppers::RECORDS,
+    system::{self, Shape},
+    trace::{How, Scene},
+};
+
+const CLOCK: Clock = Clock { t0: 0.3, h: 0.0123 };
+
+fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &[(&str, usize)], tables: &[&str]) -> Given {
+    Given {
+        system: system.to_owned(),
+        words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
+        wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        rows: rows.iter().map(|(name, count)| (name.to_string(), vec![false; *count])).collect(),
+        tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
+    }
+}
+
+const CONTROLS: [&[(&str, &str)]; 5] = [
+    &[],
+    &[("control", "energy"), ("control.form", "limited")],
+    &[("control", "energy"), ("control.form", "printed")],
+    &[("control", "projection"), ("control.way", "scaling")],
+    &[("control", "projection"), ("control.way", "nacozy")],
+];
+
+fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given {
+    let mut rows = vec![("masses", n), ("strength", n), ("softening", 1)];
+    match control.first() {
+        Some((_, "energy")) => rows.extend([("control.gain", 1), ("control.target", 1)]),
+        Some(_) => rows.push(("control.target", 1)),
+        None => {}
+    }
+    given("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
+}
+
+fn systems() -> Vec<Given> {
+    let sine = [("x.amplitude", 1), ("x.omega", 1), ("x.phase", 1)];
+    let mut all = vec![
+        given("oscillator", &[("form", "physical")], &[], &[&[("omega", 1), ("damping", 1)], &sine[..]].concat(), &["a"]),
+        given("pendulum", &[], &[], &[("omega", 1)], &[]),
+        given("restricted_three_body", &[], &[], &[("mu", 1)], &[]),
+        given("linear", &[("kind", "acceleration")], &[("n_v", 3)], &[("rows", 36)], &[]),
+        given("linear", &[], &[("n_v", 0)], &[("rows", 25)], &[]),
+        given("linear", &[], &[("n_v", 4)], &[("rows", 16)], &[]),
+        given("linear", &[], &[("n_v", 7), ("inputs", 2)], &[("rows", 19 * 21), ("inputs[0]", 1)], &["inputs[1]"]),
+    ];
+    all.extend([1, 2, 19].map(|n| given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[])));
+    for force in ["logarithmic", "newton", "printed"] {
+        for (n, dim) in [(1, 2), (2, 3), (9, 2), (17, 3)] {
+            all.extend(CONTROLS.map(|control| bodies(n, dim, force, control)));
+        }
+    }
+    all.extend([bodies(35, 2, "newton", &[]), bodies(35, 3, "newton", CONTROLS[4]), bodies(66, 2, "logarithmic", CONTROLS[1])]);
+    all
+}
+
+/// Numbers between ½ and 2, always the same.
+fn numbers(count: usize, seed: u64) -> Vec<f64> {
+    let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut next = || {
+        x ^= x << 13;
+        x ^= x >> 7;
+        x ^= x << 17;
+        0.5 + 1.5 * (x >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+/// Rows of parameters and samples of so many members.
+fn spec<'a>(given: &Given, numbers: &'a [f64], members: usize) -> Spec<'a> {
+    let rows: Vec<Row> = numbers.chunks(members).map(Row).collect();
+    let tables = given.tables.iter().map(|_| Table { samples: rows[..9].to_vec(), start: 0.29, interval: 0.011 }).collect();
+    Spec { given: given.clone(), rows: rows[..given.parameters()].to_vec(), tables }
+}
+
+/// What a group makes of members: states, quantities and sums after some steps, by bits, its lane's first for each row.
+fn made(group: &mut dyn Group, spec: &Spec, member: usize, count: usize, state: &[f64]) -> Vec<Vec<u64>> {
+    let lanes = group.lanes();
+    group.prepare(spec, member, count);
+    let (v, y) = group.slots_mut();
+    for (slot, numbers) in v.chunks_exact_mut(lanes).chain(y.chunks_exact_mut(lanes)).zip(state.chunks(13)) {
+        Row(numbers).fill(member, count, slot);
+    }
+    let mut seen = Vec::new();
+    let mut look = |group: &mut dyn Group| {
+        let (v, y) = group.slots();
+        let mut rows = vec![0.0; group.recorded() * lanes];
+        let all = [v, y, group.tally()].concat();
+        group.record(&mut rows);
+        for row in all.chunks_exact(lanes).chain(rows.chunks_exact(lanes)) {
+            seen.push(row[..count].iter().map(|number| number.to_bits()).collect());
+        }
+    };
+    group.start(5);
+    group.advance(5, 3);
+    look(group);
+    group.advance(8, 1);
+    group.finish(9);
+    look(group);
+    seen
+}
+
+fn scene(given: &Given, how: How) -> Scene {
+    let kind = system::kind(&given.system).unwrap();
+    let record = if matches!(how, How::Method { .. }) { (kind.quantities)(given) } else { Vec::new() };
+    Scene { given: given.clone(), how, record: record.into_iter().map(|(name, _)| name.to_owned()).collect() }
+}
+
+/// Panics unless the rows of several members are those of their own runs.
+fn same(of_all: &[Vec<u64>], of_each: &[Vec<Vec<u64>>], what: &str) {
+    for (i, of_one) in of_each.iter().enumerate() {
+        let mine: Vec<Vec<u64>> = of_all.iter().map(|row| vec![row[i]]).collect();
+        assert_eq!(&mine, of_one, "{what}, member {i}");
+    }
+}
+
+#[test]
+fn a_program_over_rows_is_its_tape() {
+    let mut tried = 0;
+    for (seed, given) in systems().into_iter().enumerate() {
+        let kind = system::kind(&given.system).unwrap();
+        let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
+        let spec = spec(&given, &parameters, 13);
+        for record in RECORDS {
+            let ways = record.carry.as_ref().map_or(1, |carry| carry.starts.len().max(1));
+            // Of what is long to trace some methods are enough.
+            if given.count("masses") > 17 && !["rk4", "verlet", "false_euler"].contains(&record.name) {
+                continue;
+            }
+            for choice in 0..ways {
+                let scene = scene(&given, How::Method { name: record.name.to_owned(), choice });
+                let traced = match scene.traced() {
+                    Err(Error::VelocityDependent { .. }) => continue,
+                    traced => traced.unwrap(),
+                };
+                let Shape { v, y } = traced.shape;
+                let state = numbers(13 * (v + y), 99);
+                let what = format!("{} {choice} on {given:?}", record.name);
+                let level = Level::choose().unwrap();
+                let mut tape = Lanes::new(&traced, &spec, level, Width::One, &CLOCK).unwrap();
+                let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
+                let large = |rates: Box<dyn Rates>| {
+                    let courses = traced.courses(rates.facts()).unwrap();
+                    LargeGroup::new(courses, rates, traced.shape, traced.recorded, level, &CLOCK)
+                };
+                for lanes in [8, 1] {
+                    let rates = Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, lanes, &CLOCK));
+                    let mut group = large(rates);
+                    for (at, of_each) in of_each.chunks(lanes.min(5)).enumerate() {
+                        let of_all = made(&mut group, &spec, 2 + lanes * at, of_each.len(), &state);
+                        same(&of_all, of_each, &format!("tapes of {lanes} lanes, {what}"));
+                    }
+                }
+                if let Some(long) = kind.long {
+                    for threads in [1, 2] {
+                        let machine = Machine { level, threads };
+                        let asked = Asked { given: &given, shape: traced.shape, record: &scene.record, machine, h: CLOCK.h };
+                        let mut group = large(lone(long, &asked));
+                        for (i, of_one) in of_each.iter().enumerate() {
+                            assert_eq!(&made(&mut group, &spec, 2 + i, 1, &state), of_one, "kernel, {what}, member {i}");
+                        }
+                    }
+                }
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 500, "{tried}");
+}
+
+#[test]
+fn every_level_makes_the_same_of_a_large_member() {
+    for given in [
+        bodies(100, 3, "newton", CONTROLS[3]),
+        systems().remove(6),
+        given("chain", &[], &[], &[("stiffness", 301), ("mass", 300)], &[]),
+    ] {
+        let parameters = numbers(13 * (given.parameters() + 9), 7);
+        let spec = spec(&given, &parameters, 13);
+        let scene = scene(&given, How::Method { name: "rk4".to_owned(), choice: 0 });
+        let traced = scene.traced().unwrap();
+        let state = numbers(13 * (traced.shape.v + traced.shape.y), 8);
+        let of_level = |level: Level| {
+            let machine = Machine { level, threads: 1 };
+            let asked = Asked { given: &given, shape: traced.shape, record: &scene.record, machine, h: CLOCK.h };
+            let rates = lone(system::kind(&given.system).unwrap().long.unwrap(), &asked);
+            let courses = traced.courses(rates.facts()).unwrap();
+            made(&mut LargeGroup::new(courses, rates, traced.shape, traced.recorded, level, &CLOCK), &spec, 3, 1, &state)
+        };
+        let all: Vec<_> = Level::available().into_iter().map(of_level).collect();
+        assert!(all.iter().all(|one| *one == all[0]), "{given:?}");
+    }
+}
+
+#[test]
+fn attempts_of_a_large_member_are_those_of_its_tape() {
+    for (seed, given) in systems().into_iter().filter(|given| given.word("control").is_empty()).enumerate() {
+        if given.count("masses") > 17 {
+            continue;
+        }
+        let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
+        let spec = spec(&given, &parameters, 13);
+        for record in RECORDS.iter().filter(|record| record.estimate.is_some()) {
+            let scene = scene(&given, How::Attempts { name: record.name.to_owned() });
+            let traced = scene.traced().unwrap();
+            let (level, shape) = (Level::choose().unwrap(), traced.shape);
+            let state = numbers(shape.v + shape.y, 98);
+            let run = |paced: &mut dyn Paced| {
+                let mut seen = Vec::new();
+                for member in [4, 11] {
+                    paced.prepare_lane(&spec, 0, member);
+                    paced.sit(0, &state);
+                    paced.set_pace(0, Pace { target: 0.9, ..Pace::new(0.3, 0.2, 1e-6, 1e-9) });
+                    for attempts in [1, 1, 40] {
+                        paced.attempt(attempts);
+                        let numbers = [paced.state(0), paced.pace(0).numbers().to_vec()].concat();
+                        seen.push(numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>());
+                    }
+                }
+                seen
+            };
+            let of_tape = run(&mut PacedLanes::new(&traced, &spec, level, Width::One, 30.0).unwrap());
+            let clock = Clock { t0: 0.0, h: 1.0 };
+            let mut rates: Vec<Box<dyn Rates>> = vec![Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, 1, &clock))];
+            let machine = Machine { level, threads: 1 };
+            let asked = Asked { given: &given, shape, record: &[], machine, h: 1.0 };
+            rates.extend(system::kind(&given.system).unwrap().long.map(|long| lone(long, &asked)));
+            for (kind, rates) in rates.into_iter().enumerate() {
+                let courses = traced.courses(rates.facts()).unwrap();
+                let mut large = LargePaced::new(courses, rates, &traced, level, 30.0).unwrap();
+                assert_eq!(run(&mut large), of_tape, "{} on {given:?}, rates {kind}", record.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_matrix_form_of_a_large_member_is_its_tape() {
+    for (n, inputs) in [(1, 0), (3, 1), (8, 2), (33, 1), (57, 0)] {
+        let how = How::Matrix { nodes: [0.0, 0.5, 1.0].map(f64::to_bits).to_vec() };
+        let rows =
+            [("p", n * n), ("q", 3 * inputs * n), ("inputs[0].amplitude", 1), ("inputs[0].omega", 1), ("inputs[0].phase", 1)];
+        let tables: &[&str] = if inputs == 2 { &["inputs[1]"] } else { &[] };
+        let mut given = given(
+            "matrix",
+            &[],
+            &[("n", n), ("n_v", n / 3), ("inputs", inputs)],
+            &rows[..if inputs > 0 { 5 } else { 2 }],
+            tables,
+        );
+        given.rows.retain(|(_, rows)| !rows.is_empty());
+        let parameters = numbers(13 * (given.parameters() + 9), n as u64);
+        let spec = spec(&given, &parameters, 13);
+        let traced = Scene { given, how: how.clone(), record: Vec::new() }.traced().unwrap();
+        let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
+        let mut tape = Lanes::new(&traced, &spec, level, Width::One, &CLOCK).unwrap();
+        let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
+        let mut map = Matrix::new(&spec, traced.shape, &how, level, &CLOCK);
+        for (i, of_one) in of_each.iter().enumerate() {
+            assert_eq!(&made(&mut map, &spec, 2 + i, 1, &state), of_one, "{n} states, member {i}");
+        }
+        let mut vector = Lanes::vector(&traced, &spec, level, 8, &CLOCK).unwrap();
+        same(&made(&mut vector, &spec, 2, 5, &state), &of_each, &format!("{n} states side by side"));
+    }
+}
+
+/// How many rows the arena of a method has, how often it asks for rates and how many passes it makes.
+fn course(name: &str, facts: Facts) -> (usize, usize, usize) {
+    let program = method::record(name).unwrap().program();
+    let course = Course::new(&program, &program.results, Goal::State, facts, Shape { v: 9, y: 9 });
+    let passes = course.acts.iter().filter(|act| matches!(act, Act::Pass(_))).count();
+    (course.rows, course.acts.len() - passes, passes)
+}
+
+#[test]
+fn no_row_is_kept_and_no_pass_is_made_that_is_not_needed() {
+    let bodies = Facts { second_order: true, reads_v: false };
+    let any = Facts { second_order: false, reads_v: true };
+    // v is replaced in its row, and y by way of it.
+    assert_eq!(course("false_euler", bodies), (3, 1, 1));
+    assert_eq!(course("false_euler", any), (3, 2, 2));
+    assert_eq!(course("standard_euler", any), (4, 1, 1));
+    assert_eq!(course("leapfrog", bodies), (3, 1, 1));
+    assert_eq!(course("verlet", bodies), (3, 1, 1));
+    // Four forces and two places to look from: forces do not depend on v, so two of them can be asked for at a time.
+    assert_eq!(course("rk4", bodies), (8, 4, 3));
+    // Two blocks of increments for each stage and two to look from.
+    assert_eq!(course("rk4", any), (12, 4, 4));
+}
