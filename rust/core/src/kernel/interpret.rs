@@ -176,7 +176,9 @@ fn apply(op: Op, scratch: &mut [f64], to: usize, [a, b, c]: [usize; 3], lanes: u
                         to[l].set(f64::from_bits(made));
                     }
                 })*
-                _ => {}
+                // Not a wild card: the compiler asks for a line for each new operation.
+                Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => {}
+                Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => {}
             }
         };
     }
