@@ -35,6 +35,13 @@ pub struct Plan<'a> {
     pub carried: bool,
 }
 
+impl Plan<'_> {
+    /// Steps of all members.
+    fn total(&self) -> f64 {
+        self.members as f64 * self.steps as f64
+    }
+}
+
 /// What a run fills: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
@@ -123,7 +130,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let (lanes, _) = plan.model.lanes(&traced, plan.machine, plan.model.width(&traced, plan.machine, b)?)?;
+    let total = plan.total();
+    let (lanes, _) = plan.model.lanes(&traced, plan.machine, plan.model.width(&traced, plan.machine, b, total)?, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
@@ -158,7 +166,6 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let total = b as f64 * plan.steps as f64;
     let worker = || Worker::new(plan, &traced, machine);
     crew::share(parts, threads, total, monitor, worker(), || Ok(worker()), Worker::part)
 }
@@ -190,11 +197,11 @@ impl<'a> Worker<'a> {
         let mut from = 0;
         while from < members {
             let Worker { plan, traced, machine, groups, good } = self;
-            let width = plan.model.width(traced, *machine, members - from)?;
+            let width = plan.model.width(traced, *machine, members - from, plan.total())?;
             let slot = &mut groups[width as usize];
             let group = match slot {
                 Some(group) => group,
-                None => slot.insert(plan.model.group(traced, *machine, width, &plan.clock)?),
+                None => slot.insert(plan.model.group(traced, *machine, width, &plan.clock, plan.total())?),
             };
             let count = (members - from).min(group.lanes());
             let carries = traced.carries;

@@ -21,7 +21,7 @@ use crate::{
     isa::Level,
     kernel::runner::Width,
     large::{
-        self, Asked, Long, Rates, STRAIGHT, STRAIGHT_RATES,
+        self, Asked, Long, Rates, STRAIGHT,
         group::LargeGroup,
         matrix::Matrix,
         paced::LargePaced,
@@ -56,36 +56,33 @@ impl Model<'_> {
         self.scene.traced()
     }
 
-    /// By what a group of that width is stepped.
-    fn way(&self, traced: &Traced, machine: Machine, width: Width) -> Way {
+    /// By what a group of that width is stepped, if so many steps of members are to be made in all.
+    fn way(&self, traced: &Traced, machine: Machine, width: Width, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let lone = width == Width::One;
         if let How::Matrix { .. } = &self.scene.how {
-            return match rates {
-                LONE_MAP.. if lone => Way::Map,
-                STRAIGHT_RATES.. => Way::Map,
-                STRAIGHT.. => Way::Vector(tapes::lanes(machine.level)),
-                _ => Way::Tape,
-            };
+            return if rates >= if lone { LONE_MAP } else { MAP } { Way::Map } else { Way::Tape };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
+        // Tapes of rates are traced and written before they are quicker.
+        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64;
         match long {
-            Some(long) if lone && rates >= long.from || large && rates > STRAIGHT_RATES => Way::Long(long),
+            Some(long) if lone && rates >= long.from || large && (rates >= long.beside || !pays()) => Way::Long(long),
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
     }
 
     /// How many members a group of that width steps together, and about what a step costs beside one of few.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width) -> Result<(usize, usize), Error> {
-        Ok(match self.way(traced, machine, width) {
+    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width, steps: f64) -> Result<(usize, usize), Error> {
+        Ok(match self.way(traced, machine, width, steps) {
             Way::Tape => {
                 let tapes = traced.tapes()?;
                 let runner = &tapes.step.kit(machine.level, width).runner;
                 (runner.lanes(), runner.cost())
             }
-            Way::Rates(lanes) | Way::Vector(lanes) => (lanes, 1),
+            Way::Rates(lanes) => (lanes, 1),
             Way::Long(_) | Way::Map => (1, 1),
         })
     }
@@ -95,11 +92,17 @@ impl Model<'_> {
     }
 
     /// A group that steps it.
-    pub fn group(&self, traced: &Traced, machine: Machine, width: Width, clock: &Clock) -> Result<Box<dyn Group>, Error> {
+    pub fn group(
+        &self,
+        traced: &Traced,
+        machine: Machine,
+        width: Width,
+        clock: &Clock,
+        steps: f64,
+    ) -> Result<Box<dyn Group>, Error> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
+        let rates: Box<dyn Rates> = match self.way(traced, machine, width, steps) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, width, clock)?)),
-            Way::Vector(lanes) => return Ok(Box::new(Lanes::vector(traced, spec, level, lanes, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -111,10 +114,10 @@ impl Model<'_> {
     /// A group whose members go at a pace of their own each.
     pub fn paced(&self, traced: &Traced, machine: Machine, width: Width, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width) {
-            Way::Tape | Way::Vector(_) | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, width, 0.0) {
+            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
-            way => match (way, self.way(traced, machine, Width::One)) {
+            way => match (way, self.way(traced, machine, Width::One, 0.0)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
                 _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
             },
@@ -124,18 +127,18 @@ impl Model<'_> {
     }
 
     /// Which width serves so many members best.
-    pub fn width(&self, traced: &Traced, machine: Machine, members: usize) -> Result<Width, Error> {
+    pub fn width(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<Width, Error> {
         if members == 1 {
             return Ok(Width::One);
         }
-        if let Way::Tape = self.way(traced, machine, Width::Wide) {
-            let (lanes, cost) = self.lanes(traced, machine, Width::Wide)?;
-            let (few, each) = self.lanes(traced, machine, Width::Few)?;
+        if let Way::Tape = self.way(traced, machine, Width::Wide, steps) {
+            let (lanes, cost) = self.lanes(traced, machine, Width::Wide, steps)?;
+            let (few, each) = self.lanes(traced, machine, Width::Few, steps)?;
             let narrow = members < lanes && members.div_ceil(few) * each < cost;
             return Ok(if narrow { Width::Few } else { Width::Wide });
         }
         // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-        let alone = members <= ALONE && matches!(self.way(traced, machine, Width::One), Way::Long(_) | Way::Map);
+        let alone = members <= ALONE && matches!(self.way(traced, machine, Width::One, steps), Way::Long(_) | Way::Map);
         Ok(if alone { Width::One } else { Width::Wide })
     }
 }
@@ -145,8 +148,6 @@ impl Model<'_> {
 enum Way {
     /// One tape for the whole step.
     Tape,
-    /// The same, over a vector of so many lanes.
-    Vector(usize),
     /// Tapes for the rates, with so many lanes.
     Rates(usize),
     /// A kernel that is written by hand, for a lone member.
@@ -155,7 +156,11 @@ enum Way {
     Map,
 }
 
-/// Operations of the matrix form from which on a kernel that is written by hand is quicker than machine code for one number at a time.
+/// Operations of the matrix form of a lone member from which on a kernel that is written by hand is quicker than a tape, and those of several
+/// members, one by one.
 const LONE_MAP: usize = 2 * 9 * 9;
+const MAP: usize = 2 * 24 * 24;
+/// Tapes of rates pay if rates are asked for so often for each of their operations, by all members together.
+const WORTH_A_TAPE: usize = 5;
 /// So many members of a large system are as quick one by one as side by side.
 const ALONE: usize = 4;
