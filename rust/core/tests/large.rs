@@ -284,8 +284,6 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
         for (i, of_one) in of_each.iter().enumerate() {
             assert_eq!(&made(&mut map, &spec, 2 + i, 1, &state), of_one, "{n} states, member {i}");
         }
-        let mut vector = Lanes::vector(&traced, &spec, level, 8, &CLOCK).unwrap();
-        same(&made(&mut vector, &spec, 2, 5, &state), &of_each, &format!("{n} states side by side"));
     }
 }
 

@@ -32,9 +32,6 @@ use crate::{
 /// Operations of a step from which on it is no tape. Writing the code of one takes about a microsecond, and more would not stay in the cache
 /// of instructions.
 pub const STRAIGHT: usize = 4000;
-/// Operations of the rates from which on they are no tapes either, if there is a kernel.
-pub const STRAIGHT_RATES: usize = 45_000;
-
 /// What a course may take for granted of rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facts {
@@ -125,6 +122,8 @@ pub struct Asked<'a> {
 pub struct Long {
     /// Operations of the rates from which on it is quicker than machine code for one number at a time.
     pub from: usize,
+    /// Operations of the rates from which on members one by one are as quick as several side by side with tapes for the rates.
+    pub beside: usize,
     /// Makes them, without control.
     pub make: fn(&Asked) -> Box<dyn Rates>,
 }

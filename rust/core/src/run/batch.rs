@@ -35,6 +35,13 @@ pub struct Plan<'a> {
     pub carried: bool,
 }
 
+impl Plan<'_> {
+    /// Steps of all members.
+    fn total(&self) -> f64 {
+        self.members as f64 * self.steps as f64
+    }
+}
+
 /// What a run fills: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
@@ -123,7 +130,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let lanes = plan.model.lanes(&traced, plan.machine, b)?;
+    let total = plan.total();
+    let lanes = plan.model.lanes(&traced, plan.machine, b, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
@@ -158,7 +166,6 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
     }
 
-    let total = b as f64 * plan.steps as f64;
     let worker = || Worker::new(plan, &traced, machine);
     crew::share(parts, threads, total, monitor, worker(), || Ok(worker()), Worker::part)
 }
@@ -189,7 +196,7 @@ impl<'a> Worker<'a> {
 
     /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
     fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
-        let make = |members| self.plan.model.group(self.traced, self.machine, members, &self.plan.clock);
+        let make = |members| self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total());
         if left >= lanes {
             let full = match self.full.take() {
                 Some(full) => full,
@@ -206,7 +213,7 @@ impl<'a> Worker<'a> {
 
     fn part(&mut self, mut part: Part, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
         let (plan, carries, members) = (self.plan, self.traced.carries, part.first_bad.len());
-        let lanes = plan.model.lanes(self.traced, self.machine, plan.members)?;
+        let lanes = plan.model.lanes(self.traced, self.machine, plan.members, plan.total())?;
         let mut from = 0;
         while from < members {
             let mut good = std::mem::take(&mut self.good);

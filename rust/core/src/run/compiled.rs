@@ -39,7 +39,7 @@ impl Model<'_> {
     /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
-        if !matches!(self.way(&traced, machine, members), Way::Tape) {
+        if !matches!(self.way(&traced, machine, members, f64::INFINITY), Way::Tape) {
             return Ok(None);
         }
         let began = Instant::now();

@@ -98,12 +98,6 @@ impl Lanes {
         Lanes::with(traced, tapes.step.kit(level, members), spec, level, clock)
     }
 
-    /// For a vector of members: what is that large goes through the cache anyway.
-    pub fn vector(traced: &Traced, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> Result<Lanes, Error> {
-        let kit = traced.tapes()?.step.kit_of(level, lanes);
-        Lanes::with(traced, kit, spec, level, clock)
-    }
-
     fn with(traced: &Traced, kit: Arc<Kit>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes, Error> {
         let tapes = traced.tapes()?;
         let step = Loaded::with(&tapes.step, kit, spec, clock, f64::INFINITY);

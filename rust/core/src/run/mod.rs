@@ -21,7 +21,7 @@ use crate::{
     error::Error,
     isa::Level,
     large::{
-        self, Asked, Long, Rates, STRAIGHT, STRAIGHT_RATES,
+        self, Asked, Long, Rates, STRAIGHT,
         group::LargeGroup,
         matrix::Matrix,
         paced::LargePaced,
@@ -56,34 +56,31 @@ impl Model<'_> {
         self.scene.traced()
     }
 
-    /// By what so many members are stepped.
-    fn way(&self, traced: &Traced, machine: Machine, members: usize) -> Way {
+    /// By what so many members are stepped, if so many steps of members are to be made in all.
+    fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let lone = members == 1;
         if let How::Matrix { .. } = &self.scene.how {
             // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-            return match rates {
-                LONE_MAP.. if members <= ALONE => Way::Map,
-                STRAIGHT_RATES.. => Way::Map,
-                STRAIGHT.. => Way::Vector(tapes::lanes(machine.level)),
-                _ => Way::Tape,
-            };
+            return if rates >= if members <= ALONE { LONE_MAP } else { MAP } { Way::Map } else { Way::Tape };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
+        // Tapes of rates are traced and written before they are quicker.
+        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64;
         match long {
             Some(long) if lone && rates >= long.from => Way::Long(long),
-            Some(long) if large && (rates > STRAIGHT_RATES || members <= ALONE && rates >= long.from) => Way::Long(long),
+            Some(long) if large && (rates >= long.beside || members <= ALONE && rates >= long.from || !pays()) => Way::Long(long),
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
     }
 
-    /// How many members a group steps together in a run of so many.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize) -> Result<usize, Error> {
-        Ok(match self.way(traced, machine, members) {
+    /// How many members a group steps together in a run of so many, and of so many steps of members in all.
+    pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<usize, Error> {
+        Ok(match self.way(traced, machine, members, steps) {
             Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
-            Way::Rates(lanes) | Way::Vector(lanes) => lanes,
+            Way::Rates(lanes) => lanes,
             Way::Long(_) | Way::Map => 1,
         })
     }
@@ -92,12 +89,18 @@ impl Model<'_> {
         Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h }
     }
 
-    /// A group that steps it, in a run of so many members.
-    pub fn group(&self, traced: &Traced, machine: Machine, members: usize, clock: &Clock) -> Result<Box<dyn Group>, Error> {
+    /// A group that steps it, in a run of so many members and of so many steps of members in all.
+    pub fn group(
+        &self,
+        traced: &Traced,
+        machine: Machine,
+        members: usize,
+        clock: &Clock,
+        steps: f64,
+    ) -> Result<Box<dyn Group>, Error> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members, steps) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
-            Way::Vector(lanes) => return Ok(Box::new(Lanes::vector(traced, spec, level, lanes, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -109,10 +112,10 @@ impl Model<'_> {
     /// A group whose members go at a pace of their own each.
     pub fn paced(&self, traced: &Traced, machine: Machine, members: usize, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, members) {
-            Way::Tape | Way::Vector(_) | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
+            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
-            way => match (way, self.way(traced, machine, 1)) {
+            way => match (way, self.way(traced, machine, 1, 0.0)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
                 _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
             },
@@ -127,8 +130,6 @@ impl Model<'_> {
 enum Way {
     /// One tape for the whole step.
     Tape,
-    /// The same, over a vector of so many lanes.
-    Vector(usize),
     /// Tapes for the rates, with so many lanes.
     Rates(usize),
     /// A kernel that is written by hand, for a lone member.
@@ -137,7 +138,11 @@ enum Way {
     Map,
 }
 
-/// Operations of the matrix form from which on a kernel that is written by hand is quicker than machine code for one number at a time.
+/// Operations of the matrix form of a lone member from which on a kernel that is written by hand is quicker than a tape, and those of several
+/// members, one by one.
 const LONE_MAP: usize = 2 * 9 * 9;
+const MAP: usize = 2 * 24 * 24;
+/// Tapes of rates pay if rates are asked for so often for each of their operations, by all members together.
+const WORTH_A_TAPE: usize = 5;
 /// So many members of a large system are as quick one by one as side by side.
 const ALONE: usize = 4;

@@ -21,6 +21,9 @@ pub struct World {
     step: i64,
 }
 
+/// How often a world is stepped: nobody knows, but it is made for that.
+const MANY: f64 = f64::INFINITY;
+
 fn load(array: &[f64], members: usize, share: (usize, usize), slot: &mut [f64], lanes: usize) {
     let (first, count) = share;
     for (row, slot) in array.chunks_exact(members).zip(slot.chunks_exact_mut(lanes)) {
@@ -48,8 +51,8 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let whole = members - first >= model.lanes(&traced, machine, members)?;
-            let mut group = model.group(&traced, machine, if whole { members } else { members - first }, &clock)?;
+            let whole = members - first >= model.lanes(&traced, machine, members, MANY)?;
+            let mut group = model.group(&traced, machine, if whole { members } else { members - first }, &clock, MANY)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
             group.settle();
