@@ -24,7 +24,7 @@ pub fn filled(rows: usize) -> usize {
 /// The sums of all rows that fill panels of `R`; what is left of entries and rows.
 #[inline(always)]
 fn panels<'a, const R: usize>(mut entries: &'a [f64], mut out: &'a mut [f64], parts: [&[f64]; 3]) -> (&'a [f64], &'a mut [f64]) {
-    let columns: usize = parts.iter().map(|part| part.len()).sum();
+    let columns: usize = parts.iter().map(|part| part.len()).sum::<usize>();
     while out.len() >= R {
         let (now, later) = out.split_at_mut(R);
         let (panel, rest) = entries.split_at(R * columns);
