@@ -32,9 +32,9 @@ pub struct Kit {
     /// Once for each member that takes a lane by itself.
     lone: Interpreter,
     /// Once for each step.
-    step: Interpreter,
+    step: Runner,
     /// Once for each time that comes alone.
-    moment: Interpreter,
+    moment: Runner,
 }
 
 impl Kit {
@@ -43,8 +43,8 @@ impl Kit {
             run: Interpreter::new(&split.run, 1, Level::Baseline),
             member: Interpreter::new(&split.member, runner.lanes(), level),
             lone: Interpreter::new(&split.member, 1, Level::Baseline),
-            step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
-            moment: Interpreter::new(&split.step, 1, Level::Baseline),
+            step: Runner::long(&split.step, level, STEPS_AT_ONCE as usize),
+            moment: Runner::long(&split.step, Level::Baseline, 1),
             runner,
         })
     }
@@ -126,6 +126,9 @@ pub struct Loaded {
     kit: Arc<Kit>,
     /// What is the same for all members, in the order of [`Split::given`].
     given: Vec<f64>,
+    /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
+    given_pool: Vec<f64>,
+    given_for: Option<bool>,
     /// The uniforms of the hot loop.
     uniforms: Vec<f64>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
@@ -180,6 +183,8 @@ impl Loaded {
         let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
         Loaded {
             given,
+            given_pool: Vec::new(),
+            given_for: None,
             uniforms,
             pool: Aligned::new(0),
             pool_for: None,
@@ -323,12 +328,17 @@ impl Loaded {
     }
 
     /// The entries of steps at these times, as many as the interpreter has lanes.
-    fn fill(&mut self, stage: &Stage, step: &Interpreter, times: &[f64], table: &mut Vec<u64>) {
+    fn fill(&mut self, stage: &Stage, step: &Runner, times: &[f64], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
         self.values.clear();
         self.values.resize(entries.len() * steps, 0.0);
-        let tile = &mut Tile { state: &mut self.values, rows: times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        step.run(tile, &mut self.scratch);
+        let (kernel, written) = step.kernel(1);
+        if self.given_for != Some(written) {
+            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(written));
+        }
+        let (values, pool) = (&mut self.values, &self.given_pool);
+        let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };
+        kernel.run(tile, &mut self.scratch);
         table.clear();
         table.resize(steps * entries.len(), 0);
         for (e, entry) in entries.iter().enumerate() {
