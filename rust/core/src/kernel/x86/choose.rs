@@ -47,15 +47,22 @@ fn quickest(body: &Body, level: Level, members: usize) -> Shape {
     if body.work() <= 5 * changed || vectors == 1 {
         let (most, together) = if level == Level::Avx512 { (24, 4) } else { (40, 1) };
         let abreast = even(vectors, (most / changed).clamp(1, 20));
-        return Shape { level, width, abreast, together, blocks: 1, resident: true };
+        // Several blocks, for what is done once for a tile: before a few steps it takes longer than they do.
+        let blocks = blocks(body, width, abreast).min(vectors / abreast).max(1);
+        return Shape { level, width, abreast, together, blocks, resident: true };
     }
     let most = (MOST_CODE / body.work()).max(1);
     let abreast = even(vectors, wanted(body, level).min(most));
-    let row = 8 * width * abreast * (body.next.len() + body.rows);
-    let blocks = (MOST_ROWS / row).clamp(1, 4).min(vectors.div_ceil(abreast));
+    let blocks = blocks(body, width, abreast).min(vectors.div_ceil(abreast));
     // Of short steps the machine sees several at once by itself.
     let together = if body.work() < SHORT { abreast.min(3) } else { abreast };
     Shape { level, width, abreast, together, blocks, resident: false }
+}
+
+/// How many blocks of vectors abreast a tile has whose rows stay in the cache.
+fn blocks(body: &Body, width: usize, abreast: usize) -> usize {
+    let row = 8 * width * abreast * (body.next.len() + body.rows);
+    (MOST_ROWS / row).clamp(1, 4)
 }
 
 /// At most so many of all vectors at once, so that the last turn has not fewer than it must.
