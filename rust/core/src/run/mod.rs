@@ -68,7 +68,9 @@ impl Model<'_> {
         // Tapes of rates are traced and written before they are quicker.
         let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64;
         match long {
-            Some(long) if lone && rates >= long.from || large && (rates >= long.beside || !pays()) => Way::Long(long),
+            Some(long) if lone && (rates >= long.from.0 || step >= long.from.1) || large && (rates >= long.beside || !pays()) => {
+                Way::Long(long)
+            }
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
