@@ -37,6 +37,7 @@ impl Level {
 
     /// Whether this machine has it.
     #[cfg(target_arch = "x86_64")]
+    #[inline]
     pub fn here(self) -> bool {
         match self {
             Level::Baseline => true,
@@ -129,6 +130,7 @@ mod x86 {
     }
 
     impl Isa for Avx2 {
+        #[inline]
         fn detect() -> Option<Self> {
             Level::Avx2.here().then_some(Avx2(()))
         }
@@ -142,6 +144,7 @@ mod x86 {
     }
 
     impl Isa for Avx512 {
+        #[inline]
         fn detect() -> Option<Self> {
             Level::Avx512.here().then_some(Avx512(()))
         }

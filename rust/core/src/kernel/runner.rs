@@ -86,6 +86,7 @@ impl Runner {
     }
 
     /// What makes so many more steps, and whether that is machine code.
+    #[inline]
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {

@@ -13,7 +13,7 @@ use crate::{
 
 /// What the core knows of it. Given: `stiffness` of the n + 1 springs, `mass` of the n masses.
 pub const KIND: Kind =
-    Kind { name: "chain", shape, velocity_term: |_| None, quantities: |_| Vec::new(), operations: |given| 6 * given.count("mass"), long: Some(Long { from: (6 * 80, 1000), beside: 0, make: chain::make }),
+    Kind { name: "chain", shape, velocity_term: |_| None, quantities: |_| Vec::new(), operations: |given| 6 * given.count("mass"), long: Some(Long { from: (6 * 48, 800), beside: 0, make: chain::make }),
     numbers: make, symbols: make };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
