@@ -96,13 +96,18 @@ impl Runner {
         if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED {
             return (&self.interpreter, false);
         }
+        match self.write() {
+            Some(written) => (written, true),
+            None => (&self.interpreter, false),
+        }
+    }
+
+    /// Writes the machine code, unless it is there or cannot be: for whoever knows that it pays.
+    pub fn write(&self) -> Option<&dyn Kernel> {
         let write = || {
             let written = writer::write(&self.body, self.shape?)?;
             Some(Box::new(written) as Box<dyn Kernel>)
         };
-        match self.written.get_or_init(write) {
-            Some(written) => (written.as_ref(), true),
-            None => (&self.interpreter, false),
-        }
+        self.written.get_or_init(write).as_deref()
     }
 }

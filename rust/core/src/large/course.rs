@@ -59,7 +59,7 @@ pub enum Act {
         out: [usize; 2],
     },
     /// One pass over the rows.
-    Pass(Stage),
+    Pass(Box<Stage>),
 }
 
 /// What is done to an arena.
@@ -266,7 +266,7 @@ impl Plan {
         let mut home = [goal == Goal::State; 2];
         let mut take = |node: usize, time: usize, rows: &mut Vec<Option<usize>>| {
             // Those that are asked for at one time all read and write: none may take what another reads. A pass goes number by number.
-            let is_free = |until: usize| if time % 2 == 0 { until <= time } else { until < time };
+            let is_free = |until: usize| if time.is_multiple_of(2) { until <= time } else { until < time };
             let own = [V, Y].into_iter().find(|row| home[*row] && self.results[*row] == node && is_free(busy[*row]));
             let row = own.or_else(|| (2..busy.len()).find(|row| is_free(busy[*row]))).unwrap_or_else(|| {
                 busy.push(0);
@@ -299,7 +299,7 @@ impl Plan {
                 writes.extend(away.filter(|(home, node)| row(*node) != *home));
             }
             if !writes.is_empty() {
-                acts.push(Act::Pass(self.pass(pass, &writes, count, &row)));
+                acts.push(Act::Pass(Box::new(self.pass(pass, &writes, count, &row))));
             }
             for (i, node) in self.nodes.iter().enumerate().filter(|(i, _)| self.turn[*i] == Some(pass)) {
                 if let Node::Ask(rate, at, v, y) = *node {

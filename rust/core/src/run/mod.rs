@@ -65,8 +65,8 @@ impl Model<'_> {
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
-        // Tapes of rates are traced and written before they are quicker.
-        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64;
+        // Tapes of rates are traced and written before they are quicker, unless they are there from before.
+        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64 || traced.is_rated();
         match long {
             Some(long) if lone && (rates >= long.from.0 || step >= long.from.1) || large && (rates >= long.beside || !pays()) => {
                 Way::Long(long)
@@ -163,6 +163,6 @@ enum Way {
 const LONE_MAP: usize = 2 * 9 * 9;
 const MAP: usize = 2 * 24 * 24;
 /// Tapes of rates pay if rates are asked for so often for each of their operations, by all members together.
-const WORTH_A_TAPE: usize = 5;
+const WORTH_A_TAPE: usize = 1;
 /// So many members of a large system are as quick one by one as side by side.
 const ALONE: usize = 4;

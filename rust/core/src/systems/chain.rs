@@ -12,9 +12,16 @@ use crate::{
 };
 
 /// What the core knows of it. Given: `stiffness` of the n + 1 springs, `mass` of the n masses.
-pub const KIND: Kind =
-    Kind { name: "chain", shape, velocity_term: |_| None, quantities: |_| Vec::new(), operations: |given| 6 * given.count("mass"), long: Some(Long { from: (6 * 48, 800), beside: 0, make: chain::make }),
-    numbers: make, symbols: make };
+pub const KIND: Kind = Kind {
+    name: "chain",
+    shape,
+    velocity_term: |_| None,
+    quantities: |_| Vec::new(),
+    operations: |given| 6 * given.count("mass"),
+    long: Some(Long { from: (6 * 64, 800), beside: 0, make: chain::make }),
+    numbers: make,
+    symbols: make,
+};
 
 fn shape(given: &Given) -> Result<Shape, Error> {
     let n = given.count("mass").max(1);

@@ -21,8 +21,16 @@ use crate::{
 
 /// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
 /// `softening`, ε.
-pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, operations: |given| 11 * given.count("masses").pow(2), long: Some(Long { from: (11 * 10 * 10, usize::MAX), beside: 11 * 106 * 106, make: bodies::make }),
-    numbers: make::<f64>, symbols: make };
+pub const KIND: Kind = Kind {
+    name: "nbody",
+    shape,
+    velocity_term: |_| None,
+    quantities,
+    operations: |given| 11 * given.count("masses").pow(2),
+    long: Some(Long { from: (11 * 10 * 10, usize::MAX), beside: 11 * 106 * 106, make: bodies::make }),
+    numbers: make::<f64>,
+    symbols: make,
+};
 
 fn shape(given: &Given) -> Result<Shape, Error> {
     let dim = given.whole("dim");

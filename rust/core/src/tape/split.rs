@@ -4,9 +4,9 @@
 //! of a drive that all have in common). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
 //! last of them is in the hot loop.
 
-use std::{collections::HashMap, hash::Hash};
+use std::hash::Hash;
 
-use super::{Id, Op, Tape};
+use super::{Id, Op, Tape, quick::QuickMap};
 
 /// Operations over lanes: what an interpreter or a kernel writer takes.
 ///
@@ -57,7 +57,7 @@ impl Body {
             }
         }
         let mut place = vec![0; tape.ops().len()];
-        let mut known: HashMap<Op, Id> = HashMap::new();
+        let mut known: QuickMap<Op, Id> = QuickMap::default();
         let mut body = Body::default();
         for id in (0..tape.ops().len()).filter(|id| needed[*id]) {
             let op = leaves[id].unwrap_or_else(|| tape.ops()[id].with(|operand| place[operand as usize]));
@@ -271,12 +271,12 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
 /// Things in the order in which they were asked for, each once.
 struct Places<T> {
     list: Vec<T>,
-    known: HashMap<T, u32>,
+    known: QuickMap<T, u32>,
 }
 
 impl<T> Default for Places<T> {
     fn default() -> Self {
-        Places { list: Vec::new(), known: HashMap::new() }
+        Places { list: Vec::new(), known: QuickMap::default() }
     }
 }
 
