@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import functools
 import heapq
+import itertools
 import math
 import sys
 import time
@@ -92,6 +93,7 @@ class Brute:
             assert np.abs(a - b).max(initial=0.0) <= 10 * CLOSE * scale
         self._errors: dict[tuple[Any, ...], float] = {}
         self._paced: dict[str, list[Try]] = {}
+        self._others: dict[tuple[str, float], list[float]] = {}
 
     # ---- fixed steps
 
@@ -139,19 +141,30 @@ class Brute:
 
     def paced(self, method: str, tolerance: float) -> Try:
         """A run with a tolerance, as wrong as the worst of it and of those that look between the times at which it is asked."""
-        asked = self.asked()
-        run = self._integrated(method, tolerance, asked)
+        return self.looked_between(self.judged(method, tolerance))
+
+    def looked_between(self, judged: Try) -> Try:
+        """The run with the error of the worst of all that look between; one that is wrong altogether is left at that."""
+        assert judged.tolerance is not None
+        if judged.error > 1.0:
+            return judged
+        return judged._replace(error=max(judged.error, *self.others(judged.method, judged.tolerance)))
+
+    def judged(self, method: str, tolerance: float) -> Try:
+        """The run itself, as wrong as it is at the times at which it is asked."""
+        run = self._integrated(method, tolerance, self.asked())
         assert run.paces is not None
         tried = int(run.paces.accepted + run.paces.rejected)
         error = math.inf if run.status else float(self.scene.state_error(run).max())
-        if error <= 1.0:
-            error = max(error, *self.others(method, tolerance))
         return Try(method, tried, tolerance, tried * self.prices[f"{method}, tolerance"], error)
 
     def others(self, method: str, tolerance: float) -> list[float]:
         """The errors of runs that are asked at other times as well; each of these ends a step, so each is another run."""
-        runs = (self._integrated(method, tolerance, np.union1d(self.asked(), self._between[i::OTHERS])) for i in range(OTHERS))
-        return [float(self.scene.state_error(run).max()) for run in runs]
+        if (method, tolerance) not in self._others:
+            times = (np.union1d(self.asked(), self._between[i::OTHERS]) for i in range(OTHERS))
+            errors = [float(self.scene.state_error(self._integrated(method, tolerance, at)).max()) for at in times]
+            self._others[method, tolerance] = errors
+        return self._others[method, tolerance]
 
     @functools.cached_property
     def _between(self) -> Any:
@@ -180,8 +193,10 @@ class Brute:
                 following = self.ratio ** (-POWER * len(kept))
                 if following < LAST:
                     break
-                kept.append(self.paced(method.name, following))
-            found += [each for each in kept if each.error <= tolerance and each.cost <= most]
+                kept.append(self.judged(method.name, following))
+            # Only what may be good enough is looked at between as well, the cheapest first.
+            maybe = sorted((each for each in kept if each.error <= tolerance and each.cost <= most), key=lambda each: each.cost)
+            found += itertools.islice((each for each in map(self.looked_between, maybe) if each.error <= tolerance), 1)
         return min(found, key=lambda each: each.cost, default=None)
 
     # ---- both

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import stepwell as sw
 from PIL import Image
+from stepwell import _core, engine
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +54,70 @@ def write_best(panel: sw.charts.Panel) -> None:
     print("docs/work-precision.md")
 
 
+def tape() -> Figure:
+    """Text, tape, readers: what becomes of a step."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import FancyBboxPatch
+
+    plan = engine.Plan(sw.Oscillator(omega=1.0), sw.method("false_euler"), (), 0.1)
+    symbols = _core.Tape()
+    _, y = symbols.trace(engine.model(plan), "step")
+    figure = Figure(figsize=(14, 6.4))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set(xlim=(0, 100), ylim=(0, 46))
+
+    def box(
+        x: float, y: float, width: float, height: float, title: str, text: str, shade: str = "#ffffff", mono: bool = True
+    ) -> None:
+        axes.add_patch(
+            FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0,rounding_size=0.8", facecolor=shade, edgecolor="#333333")
+        )
+        axes.text(x + 1, y + height - 1, title, fontsize=12, weight="bold", va="top")
+        family = "monospace" if mono else "sans-serif"
+        axes.text(x + 1, y + height - 3.9, text, fontsize=11, family=family, va="top", linespacing=1.45)
+
+    def arrow(start: tuple[float, float], end: tuple[float, float]) -> None:
+        axes.annotate(
+            "", end, start, arrowprops={"arrowstyle": "-|>", "color": "#333333", "linewidth": 1.6, "mutation_scale": 18}
+        )
+
+    for x, head in ((2, "Text, once in each language"), (41, "Tape: one step, straight"), (67, "Readers")):
+        axes.text(x, 44.5, head, fontsize=15, va="top")
+    box(2, 29, 30, 12, "A method, over blocks", "v = v + s.dv(t, v, y)\ny = y + s.dy(t, v, y)", "#f2f2f2")
+    box(2, 15, 30, 12, "A system, over numbers", "dv = -(stiffness * y)\ndy = speed * v", "#f2f2f2")
+    box(
+        2,
+        1,
+        30,
+        12,
+        "What is around them",
+        "control, projection, inputs,\nrecorded quantities,\nthe choice of the next step",
+        "#f2f2f2",
+        mono=False,
+    )
+    box(41, 1, 20, 40, "v, y → v, y", symbols.listing(y).rstrip(), "#dcdcdc")
+    axes.text(42, 12.6, "%6 is the same in every step:\ncomputed once, before them", fontsize=10, va="top", style="italic")
+    axes.text(42, 7.6, "the last four lines\nare the hot loop", fontsize=10, va="top", style="italic")
+    for height in (35, 21, 7):
+        arrow((32.3, height), (40.7, height))
+    axes.text(36.4, 36.2, "run once\nwith symbols", fontsize=10, ha="center", va="bottom")
+    readers = (
+        ("Kernel writer", "machine code at run time (AVX2, AVX-512)"),
+        ("Interpreter", "the same bits, on any machine"),
+        ("Comparer", "core and reference: the same graph?"),
+        ("Counter", "operations of a step, by kind"),
+        ("Printer", "a listing to read"),
+    )
+    for i, (title, text) in enumerate(readers):
+        low = 33.8 - 8.2 * i
+        box(67, low, 31, 7.2, title, text, mono=False)
+        arrow((61.3, low + 3.6), (66.7, low + 3.6))
+    return figure
+
+
 if __name__ == "__main__":
+    write("tape.png", tape())
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panel = sw.charts.panel(each.name for each in sw.scenes.scenes())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
-from collections.abc import Callable, Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 import stepwell as sw
 
 Make = Callable[[np.random.Generator, int], sw.System]
@@ -136,6 +139,32 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
         for form in forms:
             for start in record.starts or (None,):
                 yield Case(method, system, form, start)
+
+
+def number(*words: Any) -> int:
+    """A whole number that looks random and is always the same of the same words."""
+    return int.from_bytes(hashlib.blake2b(repr(words).encode(), digest_size=8).digest(), "little")
+
+
+def representative(every: Iterable[Case], several: Mapping[str, int], *salt: str) -> list[Case]:
+    """Cases in which every system and every method occurs so many times in each of its forms, with all its starts.
+
+    They are drawn by their names, so that a new system or method moves few others; another salt draws others.
+    """
+    drawn = {case: number(*salt, case.system, case.method, case.form) for case in every}
+    groups: dict[tuple[str, str], set[int]] = defaultdict(set)
+    for case, lot in drawn.items():
+        groups[case.system, case.form].add(lot)
+        groups[case.method, case.form].add(lot)
+    chosen = {lot for (_, form), lots in groups.items() for lot in sorted(lots)[: several.get(form, 0)]}
+    return [case for case, lot in drawn.items() if lot in chosen]
+
+
+def thinned(every: Iterable[Case], several: Mapping[str, int], salt: str) -> list[Any]:
+    """Parameters of a test: representative cases, and the others for the long run."""
+    every = list(every)
+    chosen = set(representative(every, several, salt))
+    return [pytest.param(case, id=str(case), marks=() if case in chosen else pytest.mark.long) for case in every]
 
 
 def assert_same(a: sw.Run, b: sw.Run) -> None:

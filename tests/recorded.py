@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import stepwell as sw
-from cases import SYSTEMS, Case, cases
+from cases import SYSTEMS, Case, cases, number, representative
 
 PATH = Path(__file__).with_name("recorded_bits.json")
 
@@ -43,7 +43,7 @@ class Numbers:
     """Numbers that look random and are the same with every version of NumPy: splitmix64, the part of a Generator used here."""
 
     def __init__(self, *seed: Any) -> None:
-        self.state = np.uint64(_digest(*seed))
+        self.state = np.uint64(number(*seed))
 
     def _bits(self, n: int) -> Any:
         golden = np.uint64(0x9E3779B97F4A7C15)
@@ -63,10 +63,6 @@ class Numbers:
         twelve = self._bits(12 * int(np.prod(size))).reshape(12, -1) >> np.uint64(44)
         whole = twelve.astype(np.int64).sum(axis=0) - 6 * 2**20
         return mean + deviation * (whole * 2.0**-20).reshape(size)
-
-
-def _digest(*words: Any) -> int:
-    return int.from_bytes(hashlib.blake2b(repr(words).encode(), digest_size=8).digest(), "little")
 
 
 # ---- what is written down of a run
@@ -103,10 +99,14 @@ def made(recorded: Recorded, backend: str = "rust") -> Arrays:
 # ---- the families
 
 
-METHODS = [m.name for m in sw.methods()]
-ABLE = [m.name for m in sw.methods() if m.error_order is not None]
+#: The methods that take turns; one that is new must not move the others.
+METHODS = (
+    *("standard_euler", "damped_euler", "false_euler", "leapfrog", "verlet", "standard_heun", "false_heun", "semi_false_heun"),
+    *("fehlberg", "merson", "rk4", "fehlberg_5", "pefrl", "dop853"),
+)
+ABLE = [m for m in METHODS if sw.method(m).error_order is not None]
 #: Those that a control or a projection goes with.
-HELD = [m.name for m in sw.methods() if not m.needs_acceleration]
+HELD = [m for m in METHODS if not sw.method(m).needs_acceleration]
 QUANTITIES = ("energy", "momentum", "angular_momentum", "closest")
 FORCES = ("logarithmic", "newton", "printed")
 #: A lone member without a batch axis, a lone one with it, part of a group of lanes, one more than a group, and several groups.
@@ -140,18 +140,11 @@ def _case(case: Case, members: int) -> tuple[sw.System, dict[str, Any]]:
 
 
 def drawn() -> list[Case]:
-    """Of each system five methods in direct form, three in matrix form and three by powers, with every start that they have;
-    of the free oscillator all.
-
-    Which ones is drawn by their names, so that a new system or method moves few others.
-    """
-    several, chosen = {"direct": 5, "matrix": 3, "power": 3}, []
-    whole = sorted(cases(), key=lambda c: (list(SYSTEMS).index(c.system), c.form))
-    for (system, form), group in itertools.groupby(whole, key=lambda c: (c.system, c.form)):
-        every = list(group)
-        methods = sorted({c.method for c in every}, key=lambda m: _digest(system, m, form))[: several[form]]
-        chosen += [case for case in every if case.method in methods or system == "free"]
-    return chosen
+    """Every system and every method several times in each form, the free oscillator always, and all that was drawn before."""
+    every = list(cases())
+    chosen = set(representative(every, {"direct": 5, "matrix": 3, "power": 3}))
+    before = written()
+    return [case for case in every if case in chosen or case.system == "free" or _varied(case).name in before]
 
 
 def plain() -> Iterator[Recorded]:
@@ -160,7 +153,7 @@ def plain() -> Iterator[Recorded]:
 
 
 def _varied(case: Case) -> Recorded:
-    draw = _digest("varied", str(case))
+    draw = number("varied", str(case))
     members = BATCHES[1:][draw % 4]
     t0, start_step = ((0.0, 0), (0.0, 0), (0.3, 0), (-7.25, 12), (2.5, 1_000_003))[draw // 4 % 5]
     every = (None, 1, 5)[draw // 20 % 3]
@@ -526,7 +519,7 @@ def runs() -> dict[str, Recorded]:
 
 def written() -> dict[str, list[str]]:
     """The hashes that were written down, by name."""
-    return dict(json.loads(PATH.read_text(encoding="utf-8")))
+    return dict(json.loads(PATH.read_text(encoding="utf-8"))) if PATH.exists() else {}
 
 
 def main() -> int:
@@ -545,7 +538,7 @@ def main() -> int:
         return 0
     now = {name: hashes(kept) for name, kept in found.items()}
     if asked.write:
-        lines = ",\n".join(f"  {json.dumps(name, ensure_ascii=False)}: {json.dumps(pair)}" for name, pair in now.items())
+        lines = ",\n".join(f"  {json.dumps(name, ensure_ascii=False)}: {json.dumps(pair)}" for name, pair in sorted(now.items()))
         PATH.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
         return 0
     was = written()

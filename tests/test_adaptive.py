@@ -37,8 +37,14 @@ def same(a: sw.Run, b: sw.Run) -> None:
         assert np.array_equal(ours, theirs)
 
 
-@pytest.mark.parametrize("method", ABLE)
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=() if j == i % len(ABLE) else pytest.mark.long)
+        for i, name in enumerate(SYSTEMS)
+        for j, method in enumerate(ABLE)
+    ],
+)
 def test_equals_the_reference(name: str, method: str) -> None:
     rng = np.random.default_rng(5)
     system = SYSTEMS[name](rng, MEMBERS)

@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import warnings
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,36 @@ def brute_of(name: str, frames: int | None = None) -> Brute:
     """All that can be tried on a built-in scene, with any steps or in so many frames."""
     scene = scene_of(name)
     return Brute(scene, None if frames is None else scene.horizon / frames, RATIO)
+
+
+#: What was measured so far, by what was measured.
+MEASURED: dict[tuple[str, ...], dict[str, float]] = {}
+
+
+@pytest.fixture(autouse=True)
+def _times_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a step takes is measured once for each system and its methods: that is up to a second, and most tests only show it."""
+
+    def once(name: str) -> Any:
+        measure = getattr(sw.advice, name)
+
+        def times(scene: Scene, methods: Any) -> dict[str, float]:
+            key = (name, repr(scene.system), repr(scene.control), *(m.name for m in methods))
+            if key not in MEASURED:
+                MEASURED[key] = measure(scene, methods)
+            return MEASURED[key]
+
+        return times
+
+    for name in ("step_times", "tried_times"):
+        monkeypatch.setattr(f"stepwell.advice.{name}", once(name))
+
+
+@pytest.fixture
+def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every step takes a nanosecond: for tests that rank by evaluations and look at no time."""
+    for name in ("step_times", "tried_times"):
+        monkeypatch.setattr(f"stepwell.advice.{name}", lambda scene, methods: {m.name: 1.0 for m in methods})
 
 
 def assert_true(brute: Brute, advice: sw.advice.Advice) -> None:
@@ -94,14 +125,20 @@ SLOW = {
     "plummer": (),
     "pythagorean": (1e-3,),
 }
-CASES = [
-    (scene.name, tolerance)
-    for scene in sw.scenes.scenes()
-    for tolerance in (TOLERANCES if scene.name in QUICK else SLOW.get(scene.name, TOLERANCES))
-]
+CASES = {scene.name: TOLERANCES if scene.name in QUICK else SLOW.get(scene.name, TOLERANCES) for scene in sw.scenes.scenes()}
 
 
-@pytest.mark.parametrize(("name", "tolerance"), CASES)
+def tried(cases: Mapping[str, Sequence[float]], long: Collection[str] = ()) -> list[Any]:
+    """A scene and a tolerance: by default each scene but the ``long`` once, with one tolerance after the other."""
+    return [
+        pytest.param(name, each, marks=() if i == turn % len(of) and name not in long else pytest.mark.long)
+        for turn, (name, of) in enumerate(cases.items())
+        for i, each in enumerate(of)
+    ]
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("name", "tolerance"), tried(CASES, ["figure_eight", "pythagorean"]))
 def test_the_advice_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
     brute = brute_of(name)
     advice = sw.advise(brute.given, frame=None, tolerance=tolerance, cost="evaluations")
@@ -113,10 +150,11 @@ def test_the_advice_is_true_and_near_the_cheapest(name: str, tolerance: float) -
     assert sorted(listed) == sorted([*(m.name for m in sw.methods()), *paced])
 
 
-@pytest.mark.parametrize(
-    ("name", "tolerance"),
-    [*((name, t) for name in QUICK for t in (1e-2, 1e-4)), ("chain", 1e-2), ("figure_eight", 1e-4), ("kepler", 1e-3)],
-)
+FRAMES = dict.fromkeys(QUICK, (1e-2, 1e-4)) | {"chain": (1e-2,), "figure_eight": (1e-4,), "kepler": (1e-3,)}
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("name", "tolerance"), tried(FRAMES, ["chain", "figure_eight"]))
 def test_the_advice_for_a_frame_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
     brute = brute_of(name, 160)
     advice = sw.advise(brute.given, frame=brute.frame, tolerance=tolerance, cost="evaluations")
@@ -125,7 +163,8 @@ def test_the_advice_for_a_frame_is_true_and_near_the_cheapest(name: str, toleran
     assert_cheap(brute, advice)
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("energy_control", 1e-1), ("plummer", 1e-3)])
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("name", "tolerance"), [("energy_control", 1e-1), pytest.param("plummer", 1e-3, marks=pytest.mark.long)])
 def test_the_advice_for_what_takes_long_is_true(name: str, tolerance: float) -> None:
     """Their runs are long, so only few methods are asked for."""
     methods = ("rk4",) if name == "energy_control" else ("pefrl", "fehlberg_5")
@@ -136,7 +175,7 @@ def test_the_advice_for_what_takes_long_is_true(name: str, tolerance: float) -> 
     assert_true(brute_of(name), advice)
 
 
-@pytest.mark.parametrize("name", ["kepler", "arenstorf", "pythagorean"])
+@pytest.mark.parametrize("name", ["kepler", "arenstorf", pytest.param("pythagorean", marks=pytest.mark.long)])
 def test_steps_of_chosen_length_win_where_bodies_meet(name: str) -> None:
     advice = sw.advise(scene_of(name), frame=None, tolerance=1e-2)
     best = advice.best
@@ -148,6 +187,7 @@ def test_steps_of_chosen_length_win_where_bodies_meet(name: str) -> None:
     assert "what is too long is rejected" in str(advice)
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_fixed_steps_only() -> None:
     both = sw.advise("kepler", frame=0.1, tolerance=1e-2, cost="evaluations").best
     advice = sw.advise("kepler", frame=0.1, tolerance=1e-2, cost="evaluations", fixed=True)
@@ -157,6 +197,7 @@ def test_fixed_steps_only() -> None:
     assert advice.best.evaluations_per_time > 2.0 * both.evaluations_per_time
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_worst_frame_is_counted() -> None:
     """Against runs that end with each frame, whose steps are counted.
 
@@ -181,6 +222,7 @@ def test_the_worst_frame_is_counted() -> None:
     assert row.objects == int(0.1 / (1e-9 * row.ns_per_step * row.worst_evaluations / row.method.evaluations))
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_worst_frame_of_many_is_found_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     one = sw.advise("kepler", frame=0.1, tolerance=1e-3, methods=["merson"], cost="evaluations")
     monkeypatch.setattr("stepwell.advice.paced.PIECES", 30)
@@ -390,6 +432,19 @@ LONG = {
     "controlled": 3e-5,
     "four stars": 5e-2,
 }
+UNSEEN = {name: (LONG[name],) if name in LONG else (5e-2, 2e-3, 3e-5) for name in HELD_OUT}
+
+#: Of these there is another of the same kind, which is quicker.
+FURTHER = (
+    "resonant",
+    "chain of 3",
+    "chain of 15",
+    "unequal chain",
+    "uneven ellipse",
+    "long ellipse",
+    "nearly upright",
+    "four stars",
+)
 
 
 @functools.cache
@@ -397,9 +452,8 @@ def held_out(name: str) -> Brute:
     return Brute(HELD_OUT[name](), None, RATIO)
 
 
-@pytest.mark.parametrize(
-    ("name", "tolerance"), [(name, t) for name in HELD_OUT for t in (5e-2, 2e-3, 3e-5) if t == LONG.get(name, t)]
-)
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("name", "tolerance"), tried(UNSEEN, FURTHER))
 def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
     brute = held_out(name)
     advice = sw.advise(brute.given, frame=None, tolerance=tolerance, cost="evaluations")
@@ -411,7 +465,10 @@ def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: st
 FRAMED = {"over the top": lambda: pendulum(2.5, 0.0, 30.0), "ellipse": lambda: sw.scenes.kepler(0.6)}
 
 
-@pytest.mark.parametrize(("name", "frame"), [("over the top", 0.9), ("over the top", 100.0), ("ellipse", 7.3)])
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(
+    ("name", "frame"), [("over the top", 0.9), pytest.param("over the top", 100.0, marks=pytest.mark.long), ("ellipse", 7.3)]
+)
 def test_frames_that_do_not_divide_the_horizon(name: str, frame: float) -> None:
     """The last one ends beyond it, where the true motion is known too."""
     brute = Brute(FRAMED[name](), frame, RATIO)
@@ -431,6 +488,7 @@ def test_a_motion_that_is_not_known_to_the_end_of_the_first_frame_is_no_scene_to
 # ---- prediction and margin
 
 
+@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("name", ["oscillator", "chain"])
 def test_modes_predict_the_error(name: str) -> None:
     """A free linear system does what its modes say; some hundred roundings of each of a few thousand steps may differ."""
@@ -456,6 +514,7 @@ def test_no_prediction_where_it_makes_no_sense() -> None:
     assert (advice.best.predicted, advice.best.predicted_by, advice.best.frequency_error) == (None, None, None)
 
 
+@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("name", ["oscillator", "chain"])
 def test_the_margin_is_where_it_blows_up(name: str) -> None:
     """A run a thousandth inside the limit is bounded, one a thousandth outside grows."""
@@ -481,6 +540,7 @@ def test_the_margin_is_where_it_blows_up(name: str) -> None:
     assert tried >= 3
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_observed_limit_is_where_runs_begin_to_grow() -> None:
     advice = sw.advise("clover", frame=None, tolerance=1e-2, cost="evaluations")
     scene = sw.scenes.clover()
@@ -514,6 +574,7 @@ def test_nothing_fits_a_budget() -> None:
     assert sw.advise("oscillator", frame=0.5, tolerance=1e-3, budget=10 * gap.needed_budget).best is not None
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_nothing_meets_the_tolerance() -> None:
     """Rounding alone is worse than 1e-17; the least error that is told was reached."""
     advice = sw.advise("oscillator", frame=0.5, tolerance=1e-17, methods=["rk4", "pefrl"])
@@ -529,6 +590,7 @@ def test_nothing_meets_the_tolerance() -> None:
     assert "Nothing that was tried meets the tolerance" in str(advice)
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_methods_that_the_system_refuses_are_named() -> None:
     advice = sw.advise("forced_oscillator", frame=0.1, tolerance=1e-1)
     refused = {each.method: each.reason for each in advice.rejected if each.kind == "refused"}
@@ -539,6 +601,7 @@ def test_methods_that_the_system_refuses_are_named() -> None:
     assert "Nothing fits" in str(only)
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_a_choice_whose_neighbours_fail_says_so() -> None:
     """Where errors dip, the row says from where on they stay below the tolerance; all that were tried there do."""
     advice = sw.advise("pendulum", frame=None, tolerance=0.03, cost="evaluations")
@@ -585,6 +648,7 @@ def test_what_is_wrong_is_said(arguments: dict[str, Any], error: type[Exception]
 # ---- telling
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_text_fits_a_screen(tmp_path: Any) -> None:
     for name in ("oscillator", "clover"):
         advice = sw.advise(name, frame=None, tolerance=1e-2, cost="evaluations")
@@ -604,6 +668,7 @@ def told(capsys: Any, *words: str) -> tuple[int, str, str]:
     return code, *capsys.readouterr()
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_the_command_says_what_advise_says(capsys: Any, tmp_path: Any) -> None:
     words = ("advise", "clover", "--frame", "3/10", "--tolerance", "0.01", "--cost", "evaluations")
     code, out, err = told(capsys, *words, "--json")

@@ -25,7 +25,14 @@ def named(each: workloads.Workload | peers.Contestant) -> str:
     return each.name if isinstance(each, peers.Contestant) else f"{each.name}-{each.kind}-{each.size.split()[0]}"
 
 
-ABLE = [(contestant, work) for contestant in peers.catalogue() for work in WORKS if work.kind in contestant.kernels]
+#: The first work of each kind for everybody; works that differ from it in their size alone are for the long run.
+FIRST = {work.kind: work for work in reversed(WORKS)}
+ABLE = [
+    pytest.param(contestant, work, marks=() if work is FIRST[work.kind] else pytest.mark.long)
+    for contestant in peers.catalogue()
+    for work in WORKS
+    if work.kind in contestant.kernels
+]
 
 
 @pytest.mark.parametrize(("contestant", "work"), ABLE, ids=named)
@@ -74,17 +81,19 @@ def cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip().strip("|").split("|")]
 
 
-def test_the_quick_run_writes_a_report(tmp_path: Path) -> None:
+@pytest.mark.parametrize("only", [("W2", "chosen"), pytest.param(("",), marks=pytest.mark.long)], ids=["some", "all"])
+def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) -> None:
     out = tmp_path / "report.md"
-    command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "-o", out]
+    asked = [work for work in workloads.catalogue() if work.name.startswith(only)]
+    command: list[Any] = [sys.executable, "-m", "benches.compare", "--quick", "--only", ",".join(only), "-o", out]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     report = out.read_text(encoding="utf-8")
     lines = [cells(line) for line in report.splitlines() if line.startswith("|")]
     first_chosen = next(i for i, line in enumerate(lines) if line[1] == "1e-03")
     tables = [i for i, line in enumerate(lines[:first_chosen]) if line[0] == "contestant"]
-    assert len(tables) == len(workloads.catalogue())
-    units = {work.unit.name for work in workloads.catalogue()}
+    assert len(tables) == len(asked) > 0
+    units = {work.unit.name for work in asked}
     for row in lines[first_chosen : next(i for i, line in enumerate(lines) if line[0] == "what")]:
         if row[0].startswith("stepwell"):
             assert float(row[1]) > 0
@@ -99,6 +108,6 @@ def test_the_quick_run_writes_a_report(tmp_path: Path) -> None:
             assert float(row[1]) > 0
             assert re.fullmatch(r"\d\.\de-\d\d", row[3]), row
     rows = {row[0] for row in lines}
-    assert {c.name for c in peers.catalogue()} <= rows
+    assert {c.name for c in peers.catalogue() if any(work.kind in c.kernels for work in asked)} <= rows
     assert {"wheel", "`import stepwell` after NumPy"} <= rows
     assert sw.isa() in report

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import functools
 import itertools
 import json
 import math
@@ -19,14 +20,39 @@ SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and s
 CHAOTIC = [scene for scene in sw.scenes.scenes() if scene.exact is None]
 METHODS = sw.methods()
 
+#: The function hides the module of its name.
+LADDER = sys.modules["stepwell.charts.work_precision"]
+
 #: Below this, rounding is part of an error: it is some 1e-13 on these scenes, so a hundredth.
 ROUNDING = 1e-11
 
 
 @pytest.fixture(scope="module")
 def charts():
-    """These scenes by every method on the whole ladder: what `stepwell chart` draws."""
-    return {scene.name: sw.charts.work_precision(scene) for scene in SCENES}
+    """These scenes by every method: what `stepwell chart` draws, but for the finest rungs of the ladder and with hasty times."""
+    with pytest.MonkeyPatch.context() as patched:
+        hasty(patched)
+        patched.setattr(LADDER, "SMALLEST", 1 / 30)
+        return {scene.name: sw.charts.work_precision(scene) for scene in SCENES}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """These scenes, when they are asked for, on the whole ladder."""
+
+    @functools.cache
+    def chart(name):
+        with pytest.MonkeyPatch.context() as patched:
+            hasty(patched)
+            return sw.charts.work_precision(name, tolerances=[])
+
+    return chart
+
+
+def hasty(patched):
+    """Times of steps are not what is looked at."""
+    patched.setattr(measure, "REPEATS", 2)
+    patched.setattr(measure, "TIMED_SECONDS", 1e-4)
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +80,16 @@ def slope(curve):
 # ---- orders
 
 
+#: A linear scene and one that is not; test_orders.py looks at every method on more of either.
+SHOWN = ("clover", "oscillator")
+
+
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
-@pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
-def test_the_error_falls_with_the_order_that_is_declared(charts, scene, method):
-    chart = charts[scene.name]
+@pytest.mark.parametrize(
+    "scene", [pytest.param(s, marks=() if s.name in SHOWN else pytest.mark.long) for s in SCENES], ids=lambda s: s.name
+)
+def test_the_error_falls_with_the_order_that_is_declared(whole, scene, method):
+    chart = whole(scene.name)
     if method.name in chart.refused:
         assert method.needs_acceleration
         return
@@ -76,7 +108,7 @@ def test_the_error_falls_with_the_order_that_is_declared(charts, scene, method):
         ("figure_eight", (3000, 6000), ("rk4",)),
         ("kepler", (300_000, 600_000), ("standard_heun", "semi_false_heun", "leapfrog")),
         ("kepler", (60_000, 120_000), ("rk4",)),
-        ("pythagorean", (1_000_000, 2_000_000), ("rk4",)),
+        pytest.param("pythagorean", (1_000_000, 2_000_000), ("rk4",), marks=pytest.mark.long),
     ],
 )
 def test_the_error_falls_with_the_order_on_hard_scenes_too(scene, steps, methods):
@@ -112,8 +144,7 @@ def test_the_true_motion_between_its_nodes_is_that_of_a_run():
 
 
 def test_no_ladder_is_so_long_that_it_takes_minutes(monkeypatch):
-    # The function hides the module of its name.
-    monkeypatch.setattr(sys.modules["stepwell.charts.work_precision"], "MOST", 5000)
+    monkeypatch.setattr(LADDER, "MOST", 5000)
     chart = sw.charts.work_precision("pythagorean", ["leapfrog"])
     assert chart.curves[0].points[-1].steps == 5000
 

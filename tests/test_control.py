@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import warnings
 from typing import Any
@@ -188,10 +189,18 @@ def test_a_gain_for_each_member_equals_single_runs(form: str, method: str) -> No
         assert one.first_bad_step == batch.first_bad_step[i]
 
 
-@pytest.mark.parametrize("method", STEPPED)
-@pytest.mark.parametrize("force", FORCES)
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(("bodies", "dim", "members"), [(3, 2, 1), (3, 2, 13), (2, 3, 5), (9, 3, 9), (40, 2, 1), (40, 3, 3)])
+SIZES = [(3, 2, 1), (3, 2, 13), (2, 3, 5), (9, 3, 9), (40, 2, 1), (40, 3, 3)]
+
+
+@pytest.mark.parametrize(
+    ("bodies", "dim", "members", "form", "force", "method"),
+    [
+        # By default two methods for each of the others, which take turns.
+        pytest.param(*size, form, force, method, marks=() if (i - j) % len(STEPPED) < 2 else pytest.mark.long)
+        for i, (size, form, force) in enumerate(itertools.product(SIZES, FORMS, FORCES))
+        for j, method in enumerate(STEPPED)
+    ],
+)
 def test_both_backends_agree_to_the_bit(bodies: int, dim: int, members: int, form: str, force: str, method: str) -> None:
     """In batches of one and more, and alone."""
     rng = np.random.default_rng([bodies, dim, members])

@@ -4,6 +4,8 @@ import contextlib
 import importlib.util
 import io
 import re
+import sys
+import types
 import warnings
 from pathlib import Path
 
@@ -14,7 +16,7 @@ PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"
 #: Where a page may find the files that it names, by their last parts.
 FOLDERS = ["benches", "docs", "examples", "python", "rust", "tests"]
 
-FENCE = re.compile(r"(?:<!-- file: python/(\S+)/\w+\.py -->\n)?^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"(?:<!-- file: python/(\S+)\.py -->\n)?^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SAID = re.compile(r"#\s*→ (.*)$", re.MULTILINE)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
@@ -37,7 +39,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def blocks(page: Path) -> list[tuple[int, str, str]]:
-    """Line number and code of every Python block, and the package that it says it is a file of, if it does."""
+    """Line number and code of every Python block, and the module that it says it is, if it does."""
     whole = text(page)
     found = [m for m in FENCE.finditer(whole) if m[2] == "python"]
     return [(whole[: m.start(3)].count("\n"), m[3], (m[1] or "").replace("/", ".")) for m in found]
@@ -47,12 +49,14 @@ def blocks(page: Path) -> list[tuple[int, str, str]]:
 def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": page.stem}
-    for line, code, package in blocks(page):
-        namespace["__package__"] = package
+    for line, code, module in blocks(page):
+        namespace["__package__"] = module.rpartition(".")[0]
         printed = io.StringIO()
         # A block that changes the filters must not change them for the next one.
         with contextlib.redirect_stdout(printed), warnings.catch_warnings():
             exec(compile("\n" * line + code, str(page), "exec"), namespace)
+        if module:  # later blocks may import it
+            monkeypatch.setitem(sys.modules, module, types.SimpleNamespace(**namespace))
         said = SAID.findall(code)
         assert printed.getvalue().splitlines() == said, f"{page.name}, block at line {line}"
 

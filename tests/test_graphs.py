@@ -93,7 +93,7 @@ def test_a_difference_is_shown() -> None:
     system, _, _ = made("pendulum")
     tape = _core.Tape()
     core = tape.trace(model(system, sw.method("false_euler")), "step")
-    with pytest.raises(pytest.fail.Exception, match="the core has .* where the reference has"):
+    with pytest.raises(pytest.fail.Exception, match=r"the core has .* where the reference has"):
         assert_one_graph(tape, core, Tracer(system, tape).step(sw.method("damped_euler")))
 
 

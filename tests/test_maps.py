@@ -141,20 +141,22 @@ def agree(observation, undecided):
     assert np.array_equal(observation.bounded | observation.predicted, observation.bounded)
 
 
+@pytest.mark.parametrize("size", [(100, 64), pytest.param((400, 256), marks=pytest.mark.long)], ids=["coarse", "fine"])
 @pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
-def test_every_point_does_what_its_eigenvalues_say(method):
-    """400 × 256 oscillators for 2000 steps. The band is half a percent wide, and few points of the map are in it."""
-    chart = sw.charts.stability_map(method, size=(400, 256))
+def test_every_point_does_what_its_eigenvalues_say(method, size):
+    """Oscillators by the thousand for 2000 steps. The band is half a percent wide, and few points of the map are in it."""
+    chart = sw.charts.stability_map(method, size=size)
     observation = chart.observe(2000)
     agree(observation, 0.02)
     assert (observation.decided & observation.bounded).any()
     assert observation.band < 0.008
 
 
+@pytest.mark.parametrize("size", [10_000, pytest.param(100_000, marks=pytest.mark.long)])
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
-def test_every_undamped_point_does_what_its_eigenvalues_say(method):
-    """100 000 angles at D = 0, where the stable ones of the symplectic methods are on the circle itself."""
-    chart = sw.charts.stability_map(method, damping=None, size=(100_000, 1))
+def test_every_undamped_point_does_what_its_eigenvalues_say(method, size):
+    """So many angles at D = 0, where the stable ones of the symplectic methods are on the circle itself."""
+    chart = sw.charts.stability_map(method, damping=None, size=(size, 1))
     observation = chart.observe(1000)
     # Where growth begins with a power of Φ, r₁² = 1 + c·Φᵏ, it is seen by its area from 3δ on. Small steps are near to a rotation
     # by Φ, so the norm of P − z₁I is 2Φ, κ = 3 and δ = 2ρ·9, and not a tenth larger up to Φ = 0.05: Fehlberg's c are 5/936
@@ -169,10 +171,11 @@ def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     assert not method.limit or not chart.stable[0, below + 1]
 
 
+@pytest.mark.parametrize("size", [(100, 64), pytest.param((200, 100), marks=pytest.mark.long)], ids=["coarse", "fine"])
 @pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
-def test_a_map_of_other_oscillators_is_found_out(method):
+def test_a_map_of_other_oscillators_is_found_out(method, size):
     """The prediction of steps that are a fiftieth shorter than those that are made."""
-    chart = sw.charts.stability_map(method, size=(200, 100))
+    chart = sw.charts.stability_map(method, size=size)
     assert dataclasses.replace(chart, phi=1.02 * chart.phi).observe(2000).disagreements > 10
 
 

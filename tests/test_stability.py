@@ -323,7 +323,7 @@ def test_each_eigenvalue_of_two_continues_its_own_rate(method: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("omega", [2.0**-40, 2.0**-20, 2.0**20, 2.0**40])
+@pytest.mark.parametrize("omega", [2.0**-40, *(pytest.param(2.0**k, marks=pytest.mark.long) for k in (-20, 20)), 2.0**40])
 def test_units_do_not_matter(method: str, omega: float) -> None:
     """Rad per microsecond or per year: all scaled by powers of two, so what is found is the same to the bit, or nearly."""
     phi = np.array([0.01, 0.1, 0.5, 1.0, 1.5, 1.9, 2.1, 3.0])
@@ -583,22 +583,24 @@ def test_growth_for_less_than_a_rung_is_found(kicks: Any, drifts: Any) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_limits_of_chains_with_soft_and_stiff_springs(method: str) -> None:
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 8))])
+def test_limits_of_chains_with_soft_and_stiff_springs(seed: int, method: str) -> None:
     """Eight decades of stiffness, four of mass, with walls and without: the fastest mode decides, by the matrix K/√mm."""
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        n = int(rng.integers(2, 9))
-        stiffness, mass = 10.0 ** (rng.uniform(-4, 4, n + 1) + rng.uniform(-3, 6)), 10.0 ** rng.uniform(-2, 2, n)
-        if seed % 2:
-            stiffness[0] = stiffness[-1] = 0.0  # it floats: a double eigenvalue 1
-        k = np.diag(stiffness[:-1] + stiffness[1:]) - np.diag(stiffness[1:-1], 1) - np.diag(stiffness[1:-1], -1)
-        fastest = math.sqrt(np.linalg.eigvalsh(k / np.sqrt(np.outer(mass, mass))).max())
-        limit = sw.stability_limit(sw.Chain(n, stiffness=stiffness, mass=mass), method)
-        # eigvalsh: some eps of the fastest, and the limit some 1e-14 of its own.
-        assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-12)
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 9))
+    stiffness, mass = 10.0 ** (rng.uniform(-4, 4, n + 1) + rng.uniform(-3, 6)), 10.0 ** rng.uniform(-2, 2, n)
+    if seed % 2:
+        stiffness[0] = stiffness[-1] = 0.0  # it floats: a double eigenvalue 1
+    k = np.diag(stiffness[:-1] + stiffness[1:]) - np.diag(stiffness[1:-1], 1) - np.diag(stiffness[1:-1], -1)
+    fastest = math.sqrt(np.linalg.eigvalsh(k / np.sqrt(np.outer(mass, mass))).max())
+    limit = sw.stability_limit(sw.Chain(n, stiffness=stiffness, mass=mass), method)
+    # eigvalsh: some eps of the fastest, and the limit some 1e-14 of its own.
+    assert limit == pytest.approx(sw.method(method).limit / fastest, rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["false_euler", "verlet", "pefrl", "rk4"])
+@pytest.mark.parametrize(
+    "method", ["false_euler", *(pytest.param(m, marks=pytest.mark.long) for m in ("verlet", "pefrl", "rk4"))]
+)
 def test_limits_of_a_long_chain(method: str) -> None:
     n = 40
     fastest = 2 * math.sin(n * math.pi / (2 * (n + 1)))

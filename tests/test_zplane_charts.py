@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import itertools
 import json
 import math
 from pathlib import Path
@@ -253,8 +254,15 @@ def panels(figure, chart):
     return dict(zip((locus.method.name for locus in chart.loci), used, strict=True))
 
 
-@pytest.mark.parametrize("kind", ["loci", "curves"])
-@pytest.mark.parametrize("methods", [None, ["false_heun"], ["verlet", "rk4", "standard_euler"]], ids=str)
+@pytest.mark.parametrize(
+    ("methods", "kind"),
+    [
+        (None, "loci"),
+        pytest.param(None, "curves", marks=pytest.mark.long),  # three seconds
+        *itertools.product([["false_heun"], ["verlet", "rk4", "standard_euler"]], ["loci", "curves"]),
+    ],
+    ids=str,
+)
 def test_a_picture_is_whole(kind, methods, tmp_path):
     chart = sw.charts.stability(methods)
     figure = chart.plot(tmp_path / "chart.png", kind=kind)

@@ -9,7 +9,7 @@ from pathlib import Path
 from . import extras, machine, peers, report, runner, workloads
 from .chosen import tables
 
-EPILOG = """To compare at another CPU level: STEPWELL_ISA=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
+EPILOG = """To compare at another CPU level: STEPWELL_KERNELS=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
 NUMBA_CPU_NAME=haswell NUMBA_CPU_FEATURES=+avx2,+fma (numba)."""
 
 

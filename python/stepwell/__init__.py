@@ -63,7 +63,10 @@ __all__ = [
 
 
 def isa() -> str:
-    """The CPU level in use: the best of this machine, or the one that ``STEPWELL_ISA`` names. All give the same bits."""
+    """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
+
+    At ``baseline`` steps are interpreted (``STEPWELL_KERNELS=interpret``); at the others they become machine code.
+    """
     return _core.isa()
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import operator
 import os
 from collections.abc import Iterable
+from functools import cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,8 @@ def known(argument: str, name: object, names: Iterable[str]) -> str:
 
 def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
     """Return ``value`` as float64, if it is real, finite unless told otherwise, and positive if asked."""
+    if type(value) is float and isfinite(value) and (not positive or value > 0.0):
+        return np.array(value)  # what is given most often: no more to look at
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -51,6 +55,8 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
 
 def number(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> float:
     """Return ``value`` as one float."""
+    if type(value) is float and isfinite(value) and (not positive or value > 0.0):
+        return value
     array = numbers(argument, value, positive=positive, unit=unit)
     if array.ndim:
         raise ShapeError(f"{argument}: expected one number{_in(unit)}, got an array of shape {array.shape}")
@@ -74,18 +80,28 @@ def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = 
     """Return a state block whose leading axes are ``shape``; a single number fills the whole block."""
     array = numbers(argument, value, finite=finite)
     if array.ndim == 0:
-        return np.broadcast_to(array, shape)
+        return over(array, shape)
     if array.shape[: len(shape)] != shape:
         raise ShapeError(f"{argument}: expected shape {_shape(shape, axes)}, got {array.shape}; batch axes come last")
     return array
 
 
+def over(array: Array, shape: Shape) -> Array:
+    """One number over a whole shape, as ``np.broadcast_to`` gives it, which takes ten times as long."""
+    if not shape:
+        return array
+    wide = np.ndarray(shape, np.float64, np.ascontiguousarray(array), strides=(0,) * len(shape))
+    wide.flags.writeable = False
+    return wide
+
+
 def batch_shape(shapes: dict[str, Shape]) -> Shape:
     """Return the shape to which all batches broadcast, the arguments by name."""
-    if not any(shapes.values()):
+    different = set(shapes.values()) - {()}
+    if not different:
         return ()
     try:
-        shape = np.broadcast_shapes(*shapes.values())
+        shape = different.pop() if len(different) == 1 else np.broadcast_shapes(*different)
     except ValueError:
         given = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
         raise ShapeError(f"these batch shapes do not broadcast to one: {given}") from None
@@ -121,11 +137,16 @@ def fits(what: str, rows: int, batch: Shape, remedy: str) -> None:
     for n in batch:
         members *= int(n)
     needed = 8.0 * rows * members
-    memory = float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 2.0**63
-    if needed > memory:
+    if needed > (memory := _memory()):
         raise TooLargeError(
             f"{what} of {members} members need {needed / 2**30:.3g} GiB, but this machine has {memory / 2**30:.3g} GiB; {remedy}"
         )
+
+
+@cache
+def _memory() -> float:
+    """This machine's memory in bytes; no bound where it cannot be asked."""
+    return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 2.0**63
 
 
 def in_place(argument: str, array: Any, shape: Shape) -> Array:

@@ -144,10 +144,8 @@ def integrate(
     if carry is not None:
         v = _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
     y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
-    batch = _checks.batch_shape(
-        {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-        | ({} if control is None else {"control": control.batch})
-    )
+    batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    batch = _checks.batch_shape(batches if control is None else batches | {"control": control.batch})
     rows = prod(system.v_shape) + prod(system.y_shape)
     kept = 1 if every is None else steps // every + 2
     _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
@@ -158,8 +156,8 @@ def integrate(
     before = _checks.diverged_before(first_bad_step, v, y, batch)
 
     with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
-        plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told)
-        plan = plan._replace(record=tuple(name for name in record if name in system.quantities))
+        beside = tuple(name for name in record if name in system.quantities)
+        plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told, beside)
         out = engine.advance(plan, v, y, before, carried=carry is not None)
     if isinstance(system, NBody) and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
@@ -343,6 +341,8 @@ def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Arr
     axes = array.shape[len(block) :]
     if axes == batch:
         return array
+    if not array.ndim:
+        return _checks.over(array, batch)
     return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
 
 
@@ -356,7 +356,7 @@ def _bar(title: str) -> Any:
 
 def _warn(run: Run, before: Whole | None) -> None:
     """Warn of the members that diverged in this run."""
-    if not run.status.any():
+    if not np.count_nonzero(run.status):
         return
     bad = run.first_bad_step >= 0 if before is None else (run.first_bad_step >= 0) & (before < 0)
     if not bad.any():

@@ -26,42 +26,39 @@ class Steps(Protocol):
 
 
 class Method:
-    """A method and what is known of it.
+    """A method and what is known of it: what its record in the core says."""
 
-    Attributes:
-        name: what you type.
-        title: the document's name.
-        other_names: standard names of the same method.
-        false_friends: methods that it is easily taken for.
-        order: order of convergence.
-        evaluations: rate evaluations per step.
-        family: what kind of method it is.
-        limit: the undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
-        nodes: times within a step at which rates are asked for, as fractions of the step.
-        needs_acceleration: whether it asks for a second-order system whose forces do not depend on the velocity.
-        carry: what it carries between steps in the place of v, or None.
-        starts: ways to start it, the default first.
-        error_order: order of h in which it estimates the error of a step, or None; with one it takes ``tolerance=``.
-        section: section of the document.
-        reference: where it comes from.
-        about: what it does.
-    """
-
+    #: What you type.
     name: str
+    #: The document's name.
     title: str
+    #: Standard names of the same method.
     other_names: tuple[str, ...]
+    #: Methods that it is easily taken for.
     false_friends: tuple[str, ...]
+    #: Order of convergence.
     order: int
+    #: Rate evaluations per step.
     evaluations: int
+    #: What kind of method it is.
     family: str
+    #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
     limit: float
+    #: Times within a step at which rates are asked for, as fractions of the step.
     nodes: tuple[float, ...]
+    #: Whether it asks for a second-order system whose forces do not depend on the velocity.
     needs_acceleration: bool
+    #: What it carries between steps in the place of v, or None.
     carry: str | None
+    #: Ways to start it, the default first.
     starts: tuple[str, ...]
+    #: Order of h in which it estimates the error of a step, or None; with one it takes ``tolerance=``.
     error_order: int | None
+    #: Section of the document.
     section: str
+    #: Where it comes from.
     reference: str
+    #: What it does.
     about: str
 
     def __init__(self, record: dict[str, Any]) -> None:

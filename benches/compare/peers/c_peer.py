@@ -156,7 +156,7 @@ def contestant(name: str, exact: bool) -> Contestant:
     """C in its fastest form."""
 
     def ready(forms, work: Workload, quick: bool) -> Ready:
-        return fastest([form.made for form in forms(work, quick, exact)], work)
+        return fastest([form.made for form in forms(work, quick, exact)], work, quick)
 
     return Contestant(name, {kind: functools.partial(ready, forms) for kind, forms in FORMS.items()})
 

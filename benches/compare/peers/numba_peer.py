@@ -267,7 +267,7 @@ def best(kernel, shapes, told, more=lambda work: 0):
         return Ready(lambda: run(work.dt, work.steps, *rows), f"{told(shape)}; JIT {seconds:.1f} s", more(work))
 
     def ready(work: Workload, quick: bool) -> Ready:
-        return fastest([functools.partial(make, shape) for shape in shapes(work, quick)], work)
+        return fastest([functools.partial(make, shape) for shape in shapes(work, quick)], work, quick)
 
     return ready
 

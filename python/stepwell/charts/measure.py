@@ -310,6 +310,7 @@ def _in_turns(
     sizes = {}
     for method in methods:
         n = least
+        timed(method, n)  # whose step is traced and written as machine code now, and not in what is timed
         while timed(method, n)[0] < TIMED_SECONDS:
             n *= 2
         sizes[method.name] = n

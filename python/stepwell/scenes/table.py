@@ -17,6 +17,9 @@ FEWEST, MOST = 200, 20_000
 NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 12))
 BETWEEN = 0.5 * (NODES[1:] + NODES[:-1])
 
+#: The product of a node's distances to the others.
+APART = [float(np.prod(node - np.delete(NODES, j))) for j, node in enumerate(NODES)]
+
 
 def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
     """A quicker function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
@@ -34,7 +37,7 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
         blocks = [block.reshape(*asked.shape, *block.shape[1:]) for block in exact(np.minimum(asked, until).ravel())]
         close_enough = np.ones(len(begins), dtype=bool)
         for block, scale in zip(blocks, scales, strict=True):
-            found = np.tensordot(_shares(BETWEEN), block[:, : len(NODES)], axes=(1, 1)).swapaxes(0, 1)
+            found = np.tensordot(_shares(BETWEEN), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
             missed = np.abs(found - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
             close_enough &= missed <= close * scale
         v, y = (block[close_enough, : len(NODES)] for block in blocks)
@@ -43,27 +46,33 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
         begins = np.sort(np.concatenate([left, left + length]))
     starts, lengths, v, y = (np.concatenate(each) for each in zip(*good, strict=True))
     order = np.argsort(starts)
-    starts, lengths, tables = starts[order], lengths[order], (v[order], y[order])
+    starts, lengths = starts[order], lengths[order]
+    # For each node the numbers of a state as rows, for operations on long rows are the quick ones.
+    tables = [np.ascontiguousarray(block[order].reshape(*block.shape[:2], -1).transpose(1, 2, 0)) for block in (v, y)]
 
     def answer(t: Array) -> tuple[Array, Array]:
         piece = np.clip(np.searchsorted(starts, t, "right") - 1, 0, len(starts) - 1)
         shares = _shares((t - starts[piece]) / lengths[piece])
         found = []
-        for table in tables:
-            value = np.zeros((len(t), *table.shape[2:]))
-            for j in range(len(NODES)):
-                value += shares[:, j].reshape(-1, *(1,) * (table.ndim - 2)) * table[piece, j]
-            found.append(value)
+        for table, block in zip(tables, (v, y), strict=True):
+            value = np.zeros((table.shape[1], len(t)))
+            for share, at_node in zip(shares, table, strict=True):
+                value += share * np.take(at_node, piece, axis=1)
+            found.append(np.ascontiguousarray(value.T).reshape(len(t), *block.shape[2:]))
         return found[0], found[1]
 
     return answer
 
 
 def _shares(u: Array) -> Array:
-    """What each node counts for in the polynomial through all at places u within an interval, shape (places, nodes)."""
-    shares = np.ones((len(u), len(NODES)))
-    for j in range(len(NODES)):
-        for m in range(len(NODES)):
-            if m != j:
-                shares[:, j] *= (u - NODES[m]) / (NODES[j] - NODES[m])
+    """What each node counts for in the polynomial through all at places u within an interval, shape (nodes, places)."""
+    away = u - NODES[:, np.newaxis]
+    shares, product = np.empty_like(away), np.ones(len(u))
+    for j in range(len(NODES)):  # times the distances to the nodes before it
+        shares[j] = product / APART[j]
+        product *= away[j]
+    product = np.ones(len(u))
+    for j in reversed(range(len(NODES))):  # times those to the nodes after it
+        shares[j] *= product
+        product *= away[j]
     return shares

@@ -51,13 +51,8 @@ pub enum Error {
         got: usize,
     },
     /// A CPU level that this machine does not have or nobody knows.
-    #[error("STEPWELL_ISA={given:?} is not a CPU level of this machine; it has {known}")]
-    Isa {
-        /// What was given.
-        given: String,
-        /// What the machine has.
-        known: String,
-    },
+    #[error(transparent)]
+    Level(#[from] stepwell_base::isa::UnknownLevel),
     /// The caller's monitor said stop.
     #[error("interrupted")]
     Interrupted,

@@ -1,9 +1,20 @@
 //! # stepwell-core
+//!
+//! Fixed and chosen steps of very large batches of small systems, bit for bit the same on every CPU level, thread count and batch. A step
+//! is written once, over any kind of number ([`number`]); run once with symbols, it becomes a tape ([`tape`]), and the tape becomes
+//! machine code ([`kernel`]).
+//!
+//! * a **system** ([`system::System`], `systems/`) is two blocks, velocities `v` and coordinates `y`, with an increment for each;
+//! * a **method** ([`method::Record`], `steppers/`) is a record and a step, recorded as a [`program`] over blocks;
+//! * a **kernel** ([`kernel::Kernel`]) makes many steps of a tile of members;
+//! * the **driver** ([`run`]) splits a batch into tiles and threads, keeps what was asked for and finds who diverged.
+//!
+//! [`trace`] goes from names to tapes; [`large`] serves systems that are no straight line.
+
+pub use stepwell_base::{bodies, functions, isa};
 
 pub mod controls;
 pub mod error;
-pub mod functions;
-pub mod isa;
 pub mod kernel;
 pub mod large;
 pub mod method;

@@ -77,7 +77,49 @@ pub struct Estimate {
     pub coarse: Option<Blocks>,
 }
 
+/// A fact about a method, for whoever shows it.
+#[derive(Debug)]
+pub enum Fact {
+    /// Words.
+    Text(&'static str),
+    /// Words that may not be there.
+    MaybeText(Option<&'static str>),
+    /// Several of them.
+    Texts(&'static [&'static str]),
+    /// A whole number that may not be there.
+    Whole(Option<usize>),
+    /// A number.
+    Number(f64),
+    /// Several of them.
+    Numbers(Vec<f64>),
+    /// Yes or no.
+    Truth(bool),
+}
+
 impl Record {
+    /// All there is to say, by the names that Python has for it. What follows from the step itself is read from its program.
+    pub fn facts(&self) -> Vec<(&'static str, Fact)> {
+        let program = self.program();
+        vec![
+            ("name", Fact::Text(self.name)),
+            ("title", Fact::Text(self.title)),
+            ("other_names", Fact::Texts(self.other_names)),
+            ("false_friends", Fact::Texts(self.false_friends)),
+            ("order", Fact::Whole(Some(self.order as usize))),
+            ("evaluations", Fact::Whole(Some(program.evaluations()))),
+            ("family", Fact::Text(self.family)),
+            ("limit", Fact::Number(self.limit)),
+            ("nodes", Fact::Numbers(program.nodes(self.needs == Needs::Rates))),
+            ("needs_acceleration", Fact::Truth(self.needs == Needs::Acceleration)),
+            ("carry", Fact::MaybeText(self.carry.as_ref().map(|carry| carry.name))),
+            ("starts", Fact::Texts(self.carry.as_ref().map_or(&[], |carry| carry.starts))),
+            ("error_order", Fact::Whole(self.estimate.as_ref().map(|estimate| estimate.order as usize))),
+            ("section", Fact::Text(self.section)),
+            ("reference", Fact::Text(self.reference)),
+            ("about", Fact::Text(self.about)),
+        ]
+    }
+
     /// The program of a step: results are the new v and y.
     pub fn program(&self) -> Program {
         Program::record(|s, t, h, v, y| {

@@ -91,13 +91,13 @@ impl Given {
 
     /// How many rows of parameters there are in all.
     pub fn parameters(&self) -> usize {
-        self.rows.iter().map(|(_, rows)| rows.len()).sum()
+        self.rows.iter().map(|(_, rows)| rows.len()).sum::<usize>()
     }
 
     /// The place of a parameter's first row among all.
     pub fn place(&self, name: &str) -> Option<usize> {
         let at = self.rows.iter().position(|(known, _)| known == name)?;
-        Some(self.rows[..at].iter().map(|(_, rows)| rows.len()).sum())
+        Some(self.rows[..at].iter().map(|(_, rows)| rows.len()).sum::<usize>())
     }
 
     /// Whether all members have a row of parameters in common.

@@ -368,8 +368,8 @@ impl Traced {
 }
 
 impl Scene {
-    /// Traces all that a run needs.
-    fn trace(&self) -> Result<Tapes, Error> {
+    /// Traces all that a run needs, anew.
+    pub fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
         let mut start = None;
         let mut finish = None;

@@ -2,28 +2,35 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod common;
+
+use common::{Of, model, oscillators, spec};
 use proptest::prelude::*;
 use stepwell_core::{
-    batch::{Arrays, Plan, run, saves},
     error::Error,
-    group::{Clock, Row, Spec, Table},
-    isa::Level,
-    table::{Model, RECORDS},
-    world::World,
+    isa::{Level, UnknownLevel},
+    run::{
+        Machine, Model,
+        batch::{Arrays, Plan, run, saves},
+        stage::{Clock, Loaded, Stage},
+        world::World,
+    },
+    spec::{Row, Spec, Table},
+    steppers::RECORDS,
+    tape::{Op, Tape, split::split},
 };
 
 fn clock(h: f64) -> Clock {
-    Clock { t0: 0.0, h, start: 0, level: Level::choose().unwrap(), threads: 1 }
+    Clock { t0: 0.0, h }
 }
 
-fn oscillators<'a>(omega: &'a [f64], method: &'a str) -> Model<'a> {
-    let spec = Spec { system: "oscillator", options: vec!["canonical"], rows: vec![Row(omega)], ..Spec::default() };
-    Model::Direct { spec, method }
+fn machine(threads: usize) -> Machine {
+    Machine { level: Level::choose().unwrap(), threads }
 }
 
-fn plan<'a>(model: Model<'a>, h: f64, steps: i64, members: usize, threads: usize) -> Plan<'a> {
+fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) -> Plan<'_> {
     let (v, y) = (vec![Row(&[0.0])], vec![Row(&[1.0])]);
-    Plan { model, clock: clock(h), first: 0, steps, every: None, v, y, members, threads, carried: false, carries: false }
+    Plan { model, clock: clock(h), machine: machine(threads), first: 0, steps, every: None, v, y, members, carried: false }
 }
 
 type Last = (Vec<f64>, Vec<f64>, Vec<i64>);
@@ -64,16 +71,26 @@ fn every_method_is_the_same_for_every_number_of_threads() {
 
 #[test]
 fn a_batch_of_any_size_is_its_members() {
-    // Wide groups of 192 lanes, three members abreast, narrow ones of 8, one or several after another: sizes on both sides of each.
+    // Tiles of some vectors abreast, narrow ones of one vector, and lone members, one or several after another: sizes on both sides of
+    // each.
     let omega: Vec<f64> = (0..385).map(|i| 0.5 + f64::from(i) / 200.0).collect();
-    let parameters: Vec<&[f64]> = vec![&omega, &[0.2], &[0.7], &[1.1], &[0.3]];
     let pendulums = |members: usize| {
-        let rows = parameters.iter().map(|x| Row(&x[..x.len().min(members)])).collect();
-        let spec = Spec { system: "pendulum", options: vec!["damped", "sine"], rows, ..Spec::default() };
-        Model::Direct { spec, method: "rk4" }
+        let one = |x: &'static f64| vec![Row(std::slice::from_ref(x))];
+        let rows = [
+            ("omega", vec![Row(&omega[..members])]),
+            ("damping", one(&0.2)),
+            ("a.amplitude", one(&0.7)),
+            ("a.omega", one(&1.1)),
+            ("a.phase", one(&0.3)),
+        ];
+        model(spec("pendulum", Of { rows: &rows, ..Of::default() }), "rk4")
     };
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
-    for members in [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384] {
+    let whole = pendulums(385);
+    let tile = |members: usize| whole.lanes(&whole.traced().unwrap(), machine(1), members, 1e9).unwrap();
+    let edges = [tile(385), tile(8)].into_iter().flat_map(|tile| [tile - 1, tile, tile + 1, 2 * tile + 1]);
+    let sizes = [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384];
+    for members in sizes.into_iter().chain(edges).filter(|members| (1..=385).contains(members)) {
         let (some_v, some_y, _) = last(&plan(pendulums(members), 0.1, 50, members, 1)).unwrap();
         assert_eq!((&some_v[..], &some_y[..]), (&v[..members], &y[..members]), "{members} members");
     }
@@ -116,14 +133,12 @@ fn what_does_not_fit_is_refused() {
     let error = |model: Model, members: usize| last(&plan(model, 0.1, 1, members, 1)).unwrap_err().to_string();
     assert!(error(oscillators(&[1.0], "rk5"), 1).starts_with("there is no method \"rk5\"; known: damped_euler, "));
     assert_eq!(error(oscillators(&[1.0, 2.0], "rk4"), 3), "a parameter: expected 3, got 2");
-    let spec = Spec { system: "spring", ..Spec::default() };
-    let model = Model::Direct { spec, method: "rk4" };
     assert_eq!(
-        error(model, 1),
+        error(model(spec("spring", Of::default()), "rk4"), 1),
         "there is no system \"spring\"; known: chain, linear, nbody, oscillator, pendulum, restricted_three_body"
     );
-    let spec = Spec { system: "oscillator", options: vec!["canonical", "damped"], ..Spec::default() };
-    let model = Model::Direct { spec, method: "verlet" };
+    let rows = [("omega", vec![Row(&[1.0])]), ("damping", vec![Row(&[0.1])])];
+    let model = model(spec("oscillator", Of { words: &[("form", "canonical")], rows: &rows, ..Of::default() }), "verlet");
     assert_eq!(error(model, 1), "verlet needs forces that do not depend on the velocity, but oscillator has damping");
 }
 
@@ -132,17 +147,40 @@ fn a_world_in_pieces_is_a_run() {
     let omega: Vec<f64> = (0..91).map(|i| 0.5 + f64::from(i) / 100.0).collect();
     for record in RECORDS {
         let model = oscillators(&omega, record.name);
-        let carries = record.carry.is_some();
         let (mut v, mut y) = (vec![0.0; 91], vec![1.0; 91]);
-        let mut world = World::new(&model, clock(0.1), 91, carries, 0).unwrap();
+        let mut world = World::new(&model, clock(0.1), machine(1), 91, 0).unwrap();
         for n in [1, 0, 40, 59] {
             world.step(n, &mut v, &mut y);
         }
-        let mut whole = plan(model, 0.1, 100, 91, 1);
-        whole.carries = carries;
-        let (sv, sy, _) = last(&whole).unwrap();
+        let (sv, sy, _) = last(&plan(model, 0.1, 100, 91, 1)).unwrap();
         assert_eq!((v, y), (sv, sy), "{}", record.name);
         assert_eq!((world.step_number(), world.time()), (100, 100.0 * 0.1));
+    }
+}
+
+#[test]
+fn kernels_are_chosen_by_name() {
+    let asked = |kernels: &str, isa: &str| Level::asked(Some(kernels.into()), Some(isa.into()));
+    let best = Level::available().last().copied().unwrap();
+    assert_eq!(Level::asked(None, None), Ok(best));
+    assert_eq!(asked("", ""), Ok(best));
+    for level in Level::available() {
+        assert_eq!(asked(level.kernels(), ""), Ok(level));
+        assert_eq!(asked("", level.name()), Ok(level));
+        assert_eq!(asked("interpret", level.name()), Ok(Level::Baseline), "the newer name counts");
+    }
+    let known = |name: fn(Level) -> &'static str| Level::available().into_iter().map(name).collect::<Vec<_>>().join(", ");
+    for given in ["baseline", "avx1024", "Interpret"] {
+        assert_eq!(
+            asked(given, "baseline"),
+            Err(UnknownLevel { variable: "STEPWELL_KERNELS", given: given.to_owned(), known: known(Level::kernels) })
+        );
+    }
+    for given in ["interpret", "avx1024"] {
+        assert_eq!(
+            asked("", given),
+            Err(UnknownLevel { variable: "STEPWELL_ISA", given: given.to_owned(), known: known(Level::name) })
+        );
     }
 }
 
@@ -156,20 +194,50 @@ fn kept_steps() {
     assert_eq!(kept(2, Some(7)), [0, 2]);
 }
 
+/// A stage whose state is, after a step, the sampled input 0 at that step's time; or, `own`, at the time that the member has in its
+/// second number.
+fn sampled(common: bool, own: bool) -> Stage {
+    let mut tape = Tape::default();
+    let time = tape.push(if own { Op::State(1) } else { Op::Time });
+    let sample = tape.push(Op::Sample(0, time));
+    let next = if own { vec![sample, time] } else { vec![sample] };
+    Stage::new(split(&tape, &next, |_| true, |_| common))
+}
+
+const LANES: usize = 8;
+
+/// The samples that members find: `rows` holds one number for all or one each, `t0` is the time of step 0, and `own` says that members
+/// are at times of their own. What a step and its time give.
+fn found(rows: &[Vec<f64>], h: f64, own: bool, t0: f64, steps: std::ops::RangeInclusive<i64>) -> Vec<(i64, Vec<f64>)> {
+    let table = Table { samples: rows.iter().map(|row| Row(row)).collect(), start: 0.0, interval: h };
+    let spec = Spec { tables: vec![table], ..Spec::default() };
+    let (stage, clock) = (sampled(rows[0].len() == 1, own), Clock { t0, h });
+    let mut loaded = Loaded::new(&stage, &spec, Level::Baseline, 8, &clock, 0.0);
+    assert_eq!(loaded.lanes(), LANES);
+    loaded.prepare(&stage, &spec, 0, LANES);
+    let step = |k: i64| {
+        let mut state = vec![-1.0; LANES];
+        state.extend(vec![clock.at(k); if own { LANES } else { 0 }]);
+        loaded.advance(&stage, &clock, k, 1, &mut state);
+        (k, state[..LANES].to_vec())
+    };
+    steps.map(step).collect()
+}
+
 proptest! {
-    /// A held input gives sample k at t0 + k·h for every k, however h and t0 round, and holds in between.
+    /// A held input gives sample k at t0 + k·h for every k, however h and t0 round, and holds in between: whether members have it in
+    /// common or not, and whether they are at the same time or not.
     #[test]
     fn every_sample_is_found(h in 1e-6..1e3f64, n in 1usize..200, later in 0.0..0.999f64) {
-        let values: Vec<[f64; 1]> = (0..n).map(|i| [i as f64]).collect();
-        let samples = values.iter().map(|v| Row(v)).collect();
-        let table = Table { samples, start: 0.0, interval: h };
-        let held = stepwell_core::tile::Samples::<2>::new(&table, |_| 1.0, |_| 0);
-        for k in 0..n {
-            let t = k as f64 * h;
-            prop_assert_eq!(held.view().at(t), &[k as f64; 2]);
-            prop_assert_eq!(held.view().at(t + later * h), &[k as f64; 2]);
+        for (width, own) in [(1, false), (LANES, false), (1, true), (LANES, true)] {
+            let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..width).map(|l| (i + 1000 * l) as f64).collect()).collect();
+            let expected = |i: usize| (0..LANES).map(|l| rows[i][l.min(width - 1)]).collect::<Vec<f64>>();
+            let last = n as i64 - 1;
+            for t0 in [0.0, later * h] {
+                for (k, got) in found(&rows, h, own, t0, -1..=last + 6) {
+                    prop_assert_eq!(got, expected(k.clamp(0, last) as usize), "step {} at {:e} from {:e}", k, h, t0);
+                }
+            }
         }
-        prop_assert_eq!(held.view().at(-h), &[0.0; 2]);
-        prop_assert_eq!(held.view().at(h * (n as f64 + 5.0)), &[(n - 1) as f64; 2]);
     }
 }

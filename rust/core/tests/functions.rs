@@ -2,7 +2,7 @@
 //! compiled twice for the tests.
 
 mod trig {
-    use stepwell_core::trig::sin;
+    use stepwell_core::functions::sin;
 
     #[test]
     fn agrees_with_libm() {
@@ -32,7 +32,7 @@ mod trig {
 }
 
 mod log {
-    use stepwell_core::log::log;
+    use stepwell_core::functions::log;
 
     #[test]
     fn agrees_with_libm() {
@@ -47,5 +47,35 @@ mod log {
             assert!((log(x) - f64::ln(x)).abs() <= 2.0 * f64::EPSILON * f64::ln(x).abs(), "log({x})");
         }
         assert_eq!(log(1.0), 0.0);
+    }
+}
+
+mod symbols {
+    use stepwell_core::{
+        functions::{log, sin},
+        number::{Symbol, record},
+        tape::{Op, Tape, eval},
+    };
+
+    /// A function's tape makes the bits that the function makes.
+    fn holds(f: fn(f64) -> f64, of_symbol: fn(Symbol) -> Symbol, numbers: impl Iterator<Item = f64>) {
+        let (tape, made) = record(Tape::default(), || of_symbol(Symbol::new(Op::State(0))));
+        for x in numbers {
+            let mut values: Vec<u64> = Vec::new();
+            for op in tape.ops() {
+                let of = |id: u32| values.get(id as usize).copied().unwrap_or_default();
+                let ([a, b, c], _) = op.operands();
+                values.push(if *op == Op::State(0) { x.to_bits() } else { eval::apply(*op, of(a), of(b), of(c)) });
+            }
+            assert_eq!(values[made.0 as usize], f(x).to_bits(), "of {x:?}");
+        }
+    }
+
+    #[test]
+    fn of_symbols_are_those_of_numbers() {
+        let small = (-4000..4000).map(|i| f64::from(i) * 0.0137);
+        let wide = (-300..300).map(|i| 1.7 * 10f64.powi(i));
+        holds(sin, sin, small.chain([0.0, -0.0, 1e6, 1e12, f64::MIN_POSITIVE, 5e-324]));
+        holds(log, log, wide.chain([1.0, 0.5, 2.0, 1.0 + 1e-15, 1.0 - 1e-15, f64::MAX, f64::MIN_POSITIVE]));
     }
 }

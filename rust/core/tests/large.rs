@@ -5,7 +5,6 @@
 use stepwell_core::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     large::{
         Asked, Facts, Rates,
         course::{Act, Course, Goal},
@@ -163,7 +162,7 @@ fn a_program_over_rows_is_its_tape() {
                 let state = numbers(13 * (v + y), 99);
                 let what = format!("{} {choice} on {given:?}", record.name);
                 let level = Level::choose().unwrap();
-                let mut tape = Lanes::new(&traced, &spec, level, Width::One, &CLOCK).unwrap();
+                let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
                 let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
                 let large = |rates: Box<dyn Rates>| {
                     let courses = traced.courses(rates.facts()).unwrap();
@@ -245,7 +244,7 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
                 }
                 seen
             };
-            let of_tape = run(&mut PacedLanes::new(&traced, &spec, level, Width::One, 30.0).unwrap());
+            let of_tape = run(&mut PacedLanes::new(&traced, &spec, level, 1, 30.0).unwrap());
             let clock = Clock { t0: 0.0, h: 1.0 };
             let mut rates: Vec<Box<dyn Rates>> = vec![Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, 1, &clock))];
             let machine = Machine { level, threads: 1 };
@@ -279,7 +278,7 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
         let spec = spec(&given, &parameters, 13);
         let traced = Scene { given, how: how.clone(), record: Vec::new() }.traced().unwrap();
         let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
-        let mut tape = Lanes::new(&traced, &spec, level, Width::One, &CLOCK).unwrap();
+        let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
         let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();
         let mut map = Matrix::new(&spec, traced.shape, &how, level, &CLOCK);
         for (i, of_one) in of_each.iter().enumerate() {

@@ -4,14 +4,14 @@
 
 use nalgebra::DVector;
 use stepwell_core::{
-    controls,
+    bodies, controls,
     error::Error,
     method::{self, Needs, Record},
     number::{Number, Symbol, record},
     spec::{Given, Parameters},
     steppers::RECORDS,
     system::{self, Make, Shape, System},
-    systems::{KINDS, nbody},
+    systems::KINDS,
     tape::{Counts, Id, Op, Tape, eval},
 };
 
@@ -264,8 +264,8 @@ fn zeros_that_begin_the_sums_of_a_few_bodies_cost_nothing() {
 fn every_pair_of_bodies_meets_once() {
     for n in (1..=131).chain([256, 511, 512, 513, 600]) {
         let mut met = vec![false; n * n];
-        for k in nbody::partners(n).into_iter().flatten().flatten() {
-            for i in 0..nbody::meeting(n, k) {
+        for k in bodies::partners(n).into_iter().flatten().flatten() {
+            for i in 0..bodies::meeting(n, k) {
                 let j = (i + k) % n;
                 let pair = &mut met[i.min(j) * n + i.max(j)];
                 assert!(i != j && !*pair, "{n} bodies: {i} and {j}");

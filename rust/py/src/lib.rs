@@ -9,7 +9,7 @@ use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
     isa::Level,
-    method::{Needs, Record},
+    method::{Fact, Record},
     run::{
         Machine,
         batch::{self, Arrays, Plan},
@@ -18,6 +18,7 @@ use stepwell_core::{
     },
     spec::Row,
     steppers, systems as kinds,
+    tape::Counts,
 };
 
 use model::{ModelSpec, by_row, core_error};
@@ -25,23 +26,17 @@ use model::{ModelSpec, by_row, core_error};
 /// Everything that a method says of itself.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
-    let program = r.program();
-    d.set_item("name", r.name)?;
-    d.set_item("title", r.title)?;
-    d.set_item("other_names", r.other_names)?;
-    d.set_item("false_friends", r.false_friends)?;
-    d.set_item("order", r.order)?;
-    d.set_item("evaluations", program.evaluations())?;
-    d.set_item("family", r.family)?;
-    d.set_item("limit", r.limit)?;
-    d.set_item("nodes", program.nodes(r.needs == Needs::Rates))?;
-    d.set_item("needs_acceleration", r.needs == Needs::Acceleration)?;
-    d.set_item("carry", r.carry.as_ref().map(|c| c.name))?;
-    d.set_item("starts", r.carry.as_ref().map_or(&[][..], |c| c.starts))?;
-    d.set_item("error_order", r.estimate.as_ref().map(|e| e.order))?;
-    d.set_item("section", r.section)?;
-    d.set_item("reference", r.reference)?;
-    d.set_item("about", r.about)?;
+    for (name, fact) in r.facts() {
+        match fact {
+            Fact::Text(text) => d.set_item(name, text)?,
+            Fact::MaybeText(text) => d.set_item(name, text)?,
+            Fact::Texts(texts) => d.set_item(name, texts)?,
+            Fact::Whole(whole) => d.set_item(name, whole)?,
+            Fact::Number(number) => d.set_item(name, number)?,
+            Fact::Numbers(numbers) => d.set_item(name, numbers)?,
+            Fact::Truth(truth) => d.set_item(name, truth)?,
+        }
+    }
     Ok(d)
 }
 
@@ -60,7 +55,7 @@ fn systems() -> Vec<&'static str> {
 /// The CPU level in use.
 #[pyfunction]
 fn isa() -> PyResult<&'static str> {
-    Level::choose().map(Level::name).map_err(core_error)
+    Level::choose().map(Level::name).map_err(|unknown| core_error(unknown.into()))
 }
 
 /// The CPU levels that this machine has, ascending.
@@ -104,7 +99,7 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
     let plan_of_core = Plan {
         model: model.model(model.started(plan.choice), &rows, &tables)?,
         clock: Clock { t0: plan.t0, h: plan.dt },
-        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         first: plan.first,
         steps: plan.steps,
         every: plan.every,
@@ -152,7 +147,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf<'_>, 
     let tables = model.tables(py)?;
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
-        machine: Machine { level: Level::choose().map_err(core_error)?, threads: plan.threads },
+        machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         t0: plan.t0,
         at: &pacing.at,
         first: Row(pacing.first.as_slice()?),
@@ -200,6 +195,49 @@ fn detached(
     }
 }
 
+/// A number of operations of each kind.
+fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, PyDict>> {
+    let d = PyDict::new(py);
+    d.set_item("additions", counts.additions)?;
+    d.set_item("multiplications", counts.multiplications)?;
+    d.set_item("divisions", counts.divisions)?;
+    d.set_item("square_roots", counts.square_roots)?;
+    d.set_item("choices", counts.choices)?;
+    d.set_item("bits", counts.bits)?;
+    Ok(d)
+}
+
+/// What a step becomes, traced and compiled anew for so many members: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, members, *, choice=0, attempts=false))]
+fn compiled<'py>(
+    py: Python<'py>,
+    model: &ModelSpec,
+    members: usize,
+    choice: usize,
+    attempts: bool,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let level = Level::choose().map_err(|unknown| core_error(unknown.into()))?;
+    let how = if attempts { model.attempts() } else { model.started(choice) };
+    let made = model.model(how, &rows, &tables)?.compiled(Machine { level, threads: 1 }, members).map_err(core_error)?;
+    let Some(made) = made else { return Ok(None) };
+    let d = PyDict::new(py);
+    d.set_item("level", level.name())?;
+    d.set_item("written", kinds_of(py, &made.written)?)?;
+    d.set_item("computed", kinds_of(py, &made.computed)?)?;
+    let [run, member, step] = made.before;
+    d.set_item("per_run", run)?;
+    d.set_item("per_member", member)?;
+    d.set_item("per_step", step)?;
+    d.set_item("lanes", made.lanes)?;
+    d.set_item("bytes", made.bytes)?;
+    d.set_item("spills", made.spills)?;
+    d.set_item("trace", made.trace.as_secs_f64())?;
+    d.set_item("compile", made.compile.as_secs_f64())?;
+    Ok(Some(d))
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -209,6 +247,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
+    m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;

@@ -55,7 +55,8 @@ impl World {
     #[new]
     fn new(py: Python<'_>, model: &ModelSpec, plan: WorldPlan, v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>>) -> PyResult<Self> {
         let WorldPlan { t0, dt, choice, first, members } = plan;
-        let (clock, machine) = (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(core_error)?, threads: 1 });
+        let (clock, machine) =
+            (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 });
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
         let model = model.model(model.started(choice), &rows, &tables)?;

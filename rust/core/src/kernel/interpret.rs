@@ -3,54 +3,97 @@
 //! It serves where no machine code may be written, where a run is too short for writing any, and the tests: it is what a kernel
 //! writer is held against.
 
+use std::cell::Cell;
+
 use super::{Kernel, Tile, check};
 use crate::{
     isa::{Level, Task, with_isa},
     tape::{Id, Op, eval, split::Body},
 };
 
-/// A body with a place for each value.
+/// A body with a place in the scratch for each value.
+///
+/// First come the rows of the state, then what stays over all steps, then what an operation makes, for as long as it is needed.
 #[derive(Clone, Debug)]
 pub struct Interpreter {
-    body: Body,
     lanes: usize,
     level: Level,
-    /// Where each value is while it is needed.
-    places: Vec<u32>,
-    /// How many values there are at once at most.
-    most: usize,
+    /// What the tile is checked against.
+    body: Body,
+    /// What stays, and where.
+    fixed: Vec<(Op, usize)>,
+    /// What is done in a step.
+    steps: Vec<Step>,
+    /// Which row of the state is replaced by which.
+    next: Vec<(usize, usize)>,
+    /// How many rows the scratch has.
+    rows: usize,
+}
+
+/// An operation with the places of its result and its operands.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    op: Op,
+    to: usize,
+    of: [usize; 3],
 }
 
 impl Interpreter {
     /// For rows of so many lanes.
     pub fn new(body: &Body, lanes: usize, level: Level) -> Self {
-        let mut last = vec![0usize; body.ops.len()];
+        let count = body.ops.len();
+        let mut last = vec![0; count];
         for (at, op) in body.ops.iter().enumerate() {
             last[at] = at;
             let (operands, n) = op.operands();
             operands[..n].iter().for_each(|id| last[*id as usize] = at);
         }
-        body.next.iter().for_each(|id| last[*id as usize] = body.ops.len());
-        let (mut free, mut most, mut places) = (Vec::new(), 0, Vec::with_capacity(body.ops.len()));
+        body.next.iter().for_each(|id| last[*id as usize] = count);
+
+        let mut rows = body.next.len();
+        let mut free = Vec::new();
+        let mut places: Vec<usize> = Vec::with_capacity(count);
+        let mut made =
+            Interpreter { lanes, level, body: body.clone(), fixed: Vec::new(), steps: Vec::new(), next: Vec::new(), rows: 0 };
+        let new = |rows: &mut usize| {
+            *rows += 1;
+            *rows - 1
+        };
         for (at, op) in body.ops.iter().enumerate() {
+            if let Op::State(s) = *op {
+                places.push(s as usize);
+                continue;
+            }
+            if matches!(op, Op::Row(_) | Op::Uniform(_) | Op::Const(_)) {
+                places.push(new(&mut rows));
+                made.fixed.push((*op, places[at] * lanes));
+                continue;
+            }
             // The place of an operand that is not needed any more can be taken at once: an operation goes lane by lane.
             let (operands, n) = op.operands();
             for (i, id) in operands[..n].iter().enumerate() {
-                if last[*id as usize] == at && !operands[..i].contains(id) {
+                if last[*id as usize] == at && !operands[..i].contains(id) && is_made(body.ops[*id as usize]) {
                     free.push(places[*id as usize]);
                 }
             }
-            let place = free.pop().unwrap_or_else(|| {
-                most += 1;
-                most as u32 - 1
-            });
-            places.push(place);
+            let to = free.pop().unwrap_or_else(|| new(&mut rows));
+            places.push(to);
             if last[at] == at {
-                free.push(place);
+                free.push(to);
             }
+            let of = |i: usize| if i < n { places[operands[i] as usize] * lanes } else { to * lanes };
+            made.steps.push(Step { op: *op, to: to * lanes, of: [of(0), of(1), of(2)] });
         }
-        Interpreter { body: body.clone(), lanes, level, places, most }
+        let changed = (0..body.next.len()).filter(|s| !body.keeps(*s));
+        made.next = changed.map(|s| (s * lanes, places[body.next[s] as usize] * lanes)).collect();
+        made.rows = rows;
+        made
     }
+}
+
+/// Whether a value is made anew in every step.
+fn is_made(op: Op) -> bool {
+    !matches!(op, Op::State(_) | Op::Row(_) | Op::Uniform(_) | Op::Const(_))
 }
 
 impl Kernel for Interpreter {
@@ -65,7 +108,7 @@ impl Kernel for Interpreter {
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
         check(&self.body, self.lanes, tile);
         assert!(tile.pool.len() >= self.body.uniforms, "pool");
-        scratch.resize(scratch.len().max(self.most * self.lanes), 0.0);
+        scratch.resize(scratch.len().max(self.rows * self.lanes), 0.0);
         with_isa!(self.level, |isa| isa.run(Run { of: self, tile, scratch }));
     }
 }
@@ -80,81 +123,84 @@ impl Task for Run<'_, '_> {
     #[inline(always)]
     fn run(self) {
         let Run { of, tile, scratch } = self;
-        let (lanes, body) = (of.lanes, &of.body);
-        let at = |id: Id| of.places[id as usize] as usize * lanes;
-        for step in 0..tile.steps {
-            for (id, op) in body.ops.iter().enumerate() {
-                let to = at(id as Id);
-                match *op {
-                    Op::State(i) => scratch[to..to + lanes].copy_from_slice(&tile.state[i as usize * lanes..][..lanes]),
-                    Op::Row(i) => scratch[to..to + lanes].copy_from_slice(&tile.rows[i as usize * lanes..][..lanes]),
-                    Op::Uniform(i) => scratch[to..to + lanes].fill(tile.pool[i as usize]),
-                    Op::Const(bits) => scratch[to..to + lanes].fill(f64::from_bits(bits)),
-                    Op::PerStep(i) => {
-                        scratch[to..to + lanes].fill(f64::from_bits(tile.per_step[step * body.per_step + i as usize]));
-                    }
-                    Op::Held(i) => {
-                        let from = tile.per_step[step * body.per_step + i as usize] as usize;
-                        scratch[to..to + lanes].copy_from_slice(&tile.held[from..from + lanes]);
-                    }
-                    Op::Gather(place) => {
-                        let from = at(place);
-                        for l in 0..lanes {
-                            // A place that is none is a NaN's: what comes of it is of no use to anybody.
-                            let place = scratch[from + l] as usize + l;
-                            scratch[to + l] = tile.held.get(place).copied().unwrap_or(f64::NAN);
-                        }
-                    }
-                    _ => apply(*op, scratch, &at, to, lanes),
-                }
-            }
-            for (s, id) in body.next.iter().enumerate() {
-                let from = at(*id);
-                tile.state[s * lanes..(s + 1) * lanes].copy_from_slice(&scratch[from..from + lanes]);
+        let (lanes, numbers) = (of.lanes, of.body.next.len() * of.lanes);
+        scratch[..numbers].copy_from_slice(&tile.state[..numbers]);
+        for (op, to) in &of.fixed {
+            let to = &mut scratch[*to..*to + lanes];
+            match *op {
+                Op::Row(i) => to.copy_from_slice(&tile.rows[i as usize * lanes..][..lanes]),
+                Op::Uniform(i) => to.fill(tile.pool[i as usize]),
+                Op::Const(bits) => to.fill(f64::from_bits(bits)),
+                _ => {}
             }
         }
+        for step in 0..tile.steps {
+            let entries = &tile.per_step[(step * of.body.per_step).min(tile.per_step.len())..];
+            for Step { op, to, of } in &of.steps {
+                match *op {
+                    Op::PerStep(i) => scratch[*to..*to + lanes].fill(f64::from_bits(entries[i as usize])),
+                    Op::Held(i) => {
+                        let from = entries[i as usize] as usize;
+                        scratch[*to..*to + lanes].copy_from_slice(&tile.held[from..from + lanes]);
+                    }
+                    Op::Gather(_) => {
+                        for l in 0..lanes {
+                            // A place that is none is a NaN's: what comes of it is of no use to anybody.
+                            let place = scratch[of[0] + l] as usize + l;
+                            scratch[*to + l] = tile.held.get(place).copied().unwrap_or(f64::NAN);
+                        }
+                    }
+                    op => apply(op, scratch, *to, *of, lanes),
+                }
+            }
+            for (to, from) in &of.next {
+                scratch.copy_within(*from..*from + lanes, *to);
+            }
+        }
+        tile.state[..numbers].copy_from_slice(&scratch[..numbers]);
     }
 }
 
 /// An operation over rows of the scratch. Each kind has a loop of its own, which is vector code.
 #[inline(always)]
-fn apply(op: Op, scratch: &mut [f64], at: &impl Fn(Id) -> usize, to: usize, lanes: usize) {
-    let ([a, b, c], n) = op.operands();
-    let (a, b, c) = (at(a), if n > 1 { at(b) } else { to }, if n > 2 { at(c) } else { to });
+fn apply(op: Op, scratch: &mut [f64], to: usize, [a, b, c]: [usize; 3], lanes: usize) {
+    // Cells, because the place of an operand may be that of the result.
+    let cells = Cell::from_mut(scratch).as_slice_of_cells();
+    let (to, a, b, c) = (&cells[to..to + lanes], &cells[a..a + lanes], &cells[b..b + lanes], &cells[c..c + lanes]);
     macro_rules! each {
         ($($kind:pat => $same:expr),* $(,)?) => {
             match op {
                 $($kind => {
-                    // Cells, because the place of an operand may be that of the result.
-                    let cells = std::cell::Cell::from_mut(&mut *scratch).as_slice_of_cells();
-                    let (to, a, b, c) = (&cells[to..to + lanes], &cells[a..a + lanes], &cells[b..b + lanes], &cells[c..c + lanes]);
                     for l in 0..lanes {
                         let made = eval::apply($same, a[l].get().to_bits(), b[l].get().to_bits(), c[l].get().to_bits());
                         to[l].set(f64::from_bits(made));
                     }
                 })*
-                _ => {}
+                // Not a wild card: the compiler asks for a line for each new operation.
+                Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => {}
+                Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => {}
             }
         };
     }
+    const ANY: Id = 0;
     each! {
-        Op::Add(..) => Op::Add(0, 0),
-        Op::Sub(..) => Op::Sub(0, 0),
-        Op::Mul(..) => Op::Mul(0, 0),
-        Op::Div(..) => Op::Div(0, 0),
-        Op::Sqrt(_) => Op::Sqrt(0),
-        Op::Neg(_) => Op::Neg(0),
-        Op::Floor(_) => Op::Floor(0),
-        Op::Less(..) => Op::Less(0, 0),
-        Op::LessEqual(..) => Op::LessEqual(0, 0),
-        Op::Equal(..) => Op::Equal(0, 0),
-        Op::Select(..) => Op::Select(0, 0, 0),
-        Op::And(..) => Op::And(0, 0),
-        Op::Or(..) => Op::Or(0, 0),
-        Op::Xor(..) => Op::Xor(0, 0),
-        Op::AddBits(..) => Op::AddBits(0, 0),
-        Op::ShiftUp(_, n) => Op::ShiftUp(0, n),
-        Op::ShiftDown(_, n) => Op::ShiftDown(0, n),
-        Op::Copy(_) => Op::Copy(0),
+        Op::Add(..) => Op::Add(ANY, ANY),
+        Op::Sub(..) => Op::Sub(ANY, ANY),
+        Op::Mul(..) => Op::Mul(ANY, ANY),
+        Op::Div(..) => Op::Div(ANY, ANY),
+        Op::Sqrt(_) => Op::Sqrt(ANY),
+        Op::Neg(_) => Op::Neg(ANY),
+        Op::Floor(_) => Op::Floor(ANY),
+        Op::Less(..) => Op::Less(ANY, ANY),
+        Op::LessEqual(..) => Op::LessEqual(ANY, ANY),
+        Op::Equal(..) => Op::Equal(ANY, ANY),
+        Op::Select(..) => Op::Select(ANY, ANY, ANY),
+        Op::And(..) => Op::And(ANY, ANY),
+        Op::Or(..) => Op::Or(ANY, ANY),
+        Op::Xor(..) => Op::Xor(ANY, ANY),
+        Op::AddBits(..) => Op::AddBits(ANY, ANY),
+        Op::ShiftUp(_, n) => Op::ShiftUp(ANY, n),
+        Op::ShiftDown(_, n) => Op::ShiftDown(ANY, n),
+        Op::Copy(_) => Op::Copy(ANY),
     }
 }

@@ -53,6 +53,16 @@ pub trait Kernel: Send + Sync {
     ///
     /// If the tile's slices are shorter than its body says.
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>);
+
+    /// How long its machine code is, in bytes; zero if it is interpreted.
+    fn bytes(&self) -> usize {
+        0
+    }
+
+    /// How many values are kept beside at most, because registers do not suffice.
+    fn spills(&self) -> usize {
+        0
+    }
 }
 
 /// Panics unless a tile holds what a body asks for. What is written as machine code relies on it.
@@ -60,7 +70,7 @@ pub trait Kernel: Send + Sync {
 pub fn check(body: &Body, lanes: usize, tile: &Tile) {
     assert!(tile.state.len() >= body.next.len() * lanes, "state");
     assert!(tile.rows.len() >= body.rows * lanes, "rows");
-    assert!(tile.per_step.len() >= body.per_step * tile.steps, "steps");
+    assert!(tile.per_step.len() >= body.per_step.saturating_mul(tile.steps), "steps");
     for op in &body.ops {
         if let crate::tape::Op::Held(i) = op {
             let places = tile.per_step.iter().skip(*i as usize).step_by(body.per_step).take(tile.steps);

@@ -12,35 +12,17 @@ use super::{
 };
 use crate::{isa::Level, tape::split::Body};
 
-/// How many members to expect: a wide tile has the throughput, a narrow one the latency.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Width {
-    /// As many lanes as keep the machine busy.
-    Wide,
-    /// One vector of lanes, for a few members.
-    Few,
-    /// One member.
-    One,
-}
-
-impl Width {
-    /// All of them.
-    pub const ALL: [Width; 3] = [Width::Wide, Width::Few, Width::One];
-}
-
 /// What is interpreted before machine code is written, in operations over one lane for each operation of the body: writing an
 /// operation takes about as long as interpreting it so often.
 const INTERPRETED: u64 = 4000;
 /// What the interpreter pays to begin an operation over a row of lanes, in lanes.
 const TO_BEGIN: usize = 10;
 
-/// Lanes that the interpreter takes at once where nothing else sets their number: the values of a step stay in the first cache.
-const INTERPRETED_LANES: [usize; 3] = [64, 8, 1];
+/// Lanes that the interpreter takes at once where nothing else sets their number, of few members and of many: the values of a step stay
+/// in the first cache.
+const INTERPRETED_LANES: [usize; 2] = [8, 64];
 
-/// Members to expect at each width.
-const MEMBERS: [usize; 3] = [usize::MAX, 8, 1];
-
-/// A body at a width.
+/// A body, over tiles of one length.
 pub struct Runner {
     body: Body,
     lanes: usize,
@@ -53,11 +35,12 @@ pub struct Runner {
 }
 
 impl Runner {
-    /// For so many members as the width says.
-    pub fn new(body: &Body, level: Level, width: Width) -> Runner {
-        let shape = writer::choose(body, level, MEMBERS[width as usize]);
-        let lanes = shape.as_ref().map_or(INTERPRETED_LANES[width as usize], Shape::lanes);
-        Runner::shaped(body, level, lanes, shape)
+    /// For a run of so many members.
+    pub fn new(body: &Body, level: Level, members: usize) -> Runner {
+        let shape = writer::choose(body, level, members);
+        let [few, many] = INTERPRETED_LANES;
+        let interpreted = if members <= few { members.max(1) } else { many };
+        Runner::shaped(body, level, shape.as_ref().map_or(interpreted, Shape::lanes), shape)
     }
 
     /// For rows of so many lanes, each a number of a long block.
@@ -75,34 +58,26 @@ impl Runner {
         self.lanes
     }
 
-    /// What a step of the tile costs, in steps of a vector of lanes.
-    pub fn cost(&self) -> usize {
-        self.shape.as_ref().map_or(self.lanes.div_ceil(8), Shape::cost)
-    }
-
     /// What it makes steps of.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
     /// What makes so many more steps, and whether that is machine code.
-    #[inline]
     pub fn kernel(&self, steps: usize) -> (&dyn Kernel, bool) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {
             return (written.as_ref(), true);
         }
         let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
-        if self.shape.is_none() || self.done.fetch_add(coming, Relaxed) + coming < INTERPRETED {
-            return (&self.interpreter, false);
-        }
-        match self.write() {
+        let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETED;
+        match pays.then(|| self.write()).flatten() {
             Some(written) => (written, true),
             None => (&self.interpreter, false),
         }
     }
 
-    /// Writes the machine code, unless it is there or cannot be: for whoever knows that it pays.
+    /// The machine code, written now if it was not before; none where none can be.
     pub fn write(&self) -> Option<&dyn Kernel> {
         let write = || {
             let written = writer::write(&self.body, self.shape?)?;

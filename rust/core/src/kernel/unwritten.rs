@@ -12,11 +12,6 @@ impl Shape {
     pub fn lanes(&self) -> usize {
         match *self {}
     }
-
-    /// What a step of the tile costs, in steps of a vector of lanes.
-    pub fn cost(&self) -> usize {
-        match *self {}
-    }
 }
 
 /// The shape for so many members.

@@ -132,7 +132,8 @@ impl Rated {
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
         let rates = [&self.dv, &self.dy, &self.velocity].into_iter().flatten();
-        rates.chain([&self.settle, &self.record].into_iter().flatten().map(|(stage, _)| stage)).map(Stage::size).sum()
+        let others = [&self.settle, &self.record].into_iter().flatten().map(|(stage, _)| stage);
+        rates.chain(others).map(Stage::size).sum::<usize>()
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     group::Group,
     stage::Clock,
 };
-use crate::{error::Error, kernel::runner::Width, spec::Row, trace::Traced};
+use crate::{error::Error, spec::Row, trace::Traced};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
@@ -131,7 +131,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     }
 
     let total = plan.total();
-    let (lanes, _) = plan.model.lanes(&traced, plan.machine, plan.model.width(&traced, plan.machine, b, total)?, total)?;
+    let lanes = plan.model.lanes(&traced, plan.machine, b, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
@@ -178,35 +178,51 @@ struct Good {
     tally: Vec<f64>,
 }
 
-/// One thread's groups, one for each width, and where it stands.
+/// One thread's groups, and where it stands.
 struct Worker<'a> {
     plan: &'a Plan<'a>,
     traced: &'a Arc<Traced>,
     machine: Machine,
-    groups: [Option<Box<dyn Group>>; Width::ALL.len()],
+    /// For as many members as there are, and for those that fill no group of these, with their number.
+    full: Option<Box<dyn Group>>,
+    rest: Option<(usize, Box<dyn Group>)>,
     good: Good,
 }
 
 impl<'a> Worker<'a> {
     fn new(plan: &'a Plan<'a>, traced: &'a Arc<Traced>, machine: Machine) -> Self {
-        Worker { plan, traced, machine, groups: Default::default(), good: Good::default() }
+        Worker { plan, traced, machine, full: None, rest: None, good: Good::default() }
+    }
+
+    /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
+    fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
+        let make = |members| self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total());
+        if left >= lanes {
+            let full = match self.full.take() {
+                Some(full) => full,
+                None => make(self.plan.members)?,
+            };
+            return Ok(self.full.insert(full).as_mut());
+        }
+        let rest = match self.rest.take() {
+            Some((members, rest)) if members == left => rest,
+            _ => make(left)?,
+        };
+        Ok(self.rest.insert((left, rest)).1.as_mut())
     }
 
     fn part(&mut self, mut part: Part, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
-        let members = part.first_bad.len();
+        let (plan, carries, members) = (self.plan, self.traced.carries, part.first_bad.len());
+        let lanes = plan.model.lanes(self.traced, self.machine, plan.members, plan.total())?;
         let mut from = 0;
         while from < members {
-            let Worker { plan, traced, machine, groups, good } = self;
-            let width = plan.model.width(traced, *machine, members - from, plan.total())?;
-            let slot = &mut groups[width as usize];
-            let group = match slot {
-                Some(group) => group,
-                None => slot.insert(plan.model.group(traced, *machine, width, &plan.clock, plan.total())?),
-            };
+            let mut good = std::mem::take(&mut self.good);
+            let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
-            let carries = traced.carries;
-            let mut job = Job { plan, carries, group: group.as_mut(), part: &mut part, from, count, good };
-            if !job.run(go_on) {
+            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good };
+            let ran = job.run(go_on);
+            self.good = good;
+            if !ran {
                 return Err(Error::Interrupted);
             }
             from += count;

@@ -8,7 +8,7 @@ use super::{
     crew::{self, GoOn},
     paced::Paced,
 };
-use crate::{error::Error, kernel::runner::Width, pace::Pace, spec::Row, trace::Traced};
+use crate::{error::Error, pace::Pace, spec::Row, trace::Traced};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
@@ -137,8 +137,7 @@ impl<'a> Worker<'a> {
     fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>) -> Result<Self, Error> {
         let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
         let machine = Machine { threads, ..plan.machine };
-        let width = if plan.members > 1 { Width::Wide } else { Width::One };
-        Ok(Worker { plan, group: plan.model.paced(traced, machine, width, plan.budget as f64)? })
+        Ok(Worker { plan, group: plan.model.paced(traced, machine, plan.members, plan.budget as f64)? })
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {

@@ -9,7 +9,6 @@ use super::{
 use crate::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     spec::Spec,
     system::Shape,
     trace::{Tapes, Traced},
@@ -25,6 +24,9 @@ pub trait Group: Send + Sync {
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Makes now what would be made when it pays: for a loop that cannot wait.
+    fn settle(&mut self) {}
 
     /// Both slots.
     fn slots(&self) -> (&[f64], &[f64]);
@@ -90,11 +92,10 @@ pub struct Lanes {
 }
 
 impl Lanes {
-    /// For tiles of so many lanes as the width says.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, width: Width, clock: &Clock) -> Result<Lanes, Error> {
+    /// For a run of so many members.
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes, Error> {
         let tapes = traced.tapes()?;
-        let kit = Arc::clone(tapes.step.kit(level, width));
-        Lanes::with(traced, kit, spec, level, clock)
+        Lanes::with(traced, tapes.step.kit(level, members), spec, level, clock)
     }
 
     fn with(traced: &Traced, kit: Arc<Kit>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes, Error> {
@@ -141,6 +142,11 @@ impl Group for Lanes {
             aside.loaded.prepare(stage, spec, first, count);
         }
         self.tally_mut().fill(0.0);
+    }
+
+    fn settle(&mut self) {
+        self.step.settle();
+        self.asides().for_each(|(aside, _)| aside.loaded.settle());
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {

@@ -1,8 +1,9 @@
 //! The driver: many members, some threads, what to keep, and who diverged. It knows nothing of the systems that it steps.
 
-pub mod aligned;
+pub use stepwell_base::aligned;
 pub mod batch;
 pub mod chosen;
+pub mod compiled;
 pub mod crew;
 pub mod group;
 pub mod paced;
@@ -19,7 +20,6 @@ use self::{
 use crate::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     large::{
         self, Asked, Long, Rates, STRAIGHT,
         group::LargeGroup,
@@ -56,36 +56,33 @@ impl Model<'_> {
         self.scene.traced()
     }
 
-    /// By what a group of that width is stepped, if so many steps of members are to be made in all.
-    fn way(&self, traced: &Traced, machine: Machine, width: Width, steps: f64) -> Way {
+    /// By what so many members are stepped, if so many steps of members are to be made in all.
+    fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
-        let lone = width == Width::One;
+        let lone = members == 1;
         if let How::Matrix { .. } = &self.scene.how {
-            return if rates >= if lone { LONE_MAP } else { MAP } { Way::Map } else { Way::Tape };
+            // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
+            return if rates >= if members <= ALONE { LONE_MAP } else { MAP } { Way::Map } else { Way::Tape };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
         // Tapes of rates are traced and written before they are quicker, unless they are there from before.
         let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64 || traced.is_rated();
+        let is_long = |long: Long| rates >= long.from.0 || step >= long.from.1;
         match long {
-            Some(long) if lone && (rates >= long.from.0 || step >= long.from.1) || large && (rates >= long.beside || !pays()) => {
-                Way::Long(long)
-            }
+            Some(long) if lone && is_long(long) => Way::Long(long),
+            Some(long) if large && (rates >= long.beside || members <= ALONE && is_long(long) || !pays()) => Way::Long(long),
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
     }
 
-    /// How many members a group of that width steps together, and about what a step costs beside one of few.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, width: Width, steps: f64) -> Result<(usize, usize), Error> {
-        Ok(match self.way(traced, machine, width, steps) {
-            Way::Tape => {
-                let tapes = traced.tapes()?;
-                let runner = &tapes.step.kit(machine.level, width).runner;
-                (runner.lanes(), runner.cost())
-            }
-            Way::Rates(lanes) => (lanes, 1),
-            Way::Long(_) | Way::Map => (1, 1),
+    /// How many members a group steps together in a run of so many, and of so many steps of members in all.
+    pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<usize, Error> {
+        Ok(match self.way(traced, machine, members, steps) {
+            Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
+            Way::Rates(lanes) => lanes,
+            Way::Long(_) | Way::Map => 1,
         })
     }
 
@@ -93,18 +90,18 @@ impl Model<'_> {
         Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h }
     }
 
-    /// A group that steps it.
+    /// A group that steps it, in a run of so many members and of so many steps of members in all.
     pub fn group(
         &self,
         traced: &Traced,
         machine: Machine,
-        width: Width,
+        members: usize,
         clock: &Clock,
         steps: f64,
     ) -> Result<Box<dyn Group>, Error> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width, steps) {
-            Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, width, clock)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members, steps) {
+            Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
@@ -114,34 +111,18 @@ impl Model<'_> {
     }
 
     /// A group whose members go at a pace of their own each.
-    pub fn paced(&self, traced: &Traced, machine: Machine, width: Width, budget: f64) -> Result<Box<dyn Paced>, Error> {
+    pub fn paced(&self, traced: &Traced, machine: Machine, members: usize, budget: f64) -> Result<Box<dyn Paced>, Error> {
         let (spec, level) = (&self.spec, machine.level);
-        let rates: Box<dyn Rates> = match self.way(traced, machine, width, 0.0) {
-            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, width, budget)?)),
+        let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
+            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
-            way => match (way, self.way(traced, machine, Width::One, 0.0)) {
+            way => match (way, self.way(traced, machine, 1, 0.0)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
                 _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
             },
         };
         let courses = traced.courses(rates.facts())?;
         Ok(Box::new(LargePaced::new(courses, rates, traced, level, budget)?))
-    }
-
-    /// Which width serves so many members best.
-    pub fn width(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<Width, Error> {
-        if members == 1 {
-            return Ok(Width::One);
-        }
-        if let Way::Tape = self.way(traced, machine, Width::Wide, steps) {
-            let (lanes, cost) = self.lanes(traced, machine, Width::Wide, steps)?;
-            let (few, each) = self.lanes(traced, machine, Width::Few, steps)?;
-            let narrow = members < lanes && members.div_ceil(few) * each < cost;
-            return Ok(if narrow { Width::Few } else { Width::Wide });
-        }
-        // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-        let alone = members <= ALONE && matches!(self.way(traced, machine, Width::One, steps), Way::Long(_) | Way::Map);
-        Ok(if alone { Width::One } else { Width::Wide })
     }
 }
 

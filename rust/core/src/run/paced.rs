@@ -9,7 +9,6 @@ use super::{
 use crate::{
     error::Error,
     isa::Level,
-    kernel::runner::Width,
     pace::Pace,
     spec::Spec,
     trace::{Tapes, Traced},
@@ -53,10 +52,10 @@ pub struct PacedLanes {
 pub(crate) const NO_CLOCK: Clock = Clock { t0: 0.0, h: 1.0 };
 
 impl PacedLanes {
-    /// For tiles of so many lanes as the width says.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, width: Width, budget: f64) -> Result<PacedLanes, Error> {
+    /// For a run of so many members.
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<PacedLanes, Error> {
         let tapes = traced.tapes()?;
-        let step = Loaded::new(&tapes.step, spec, level, width, &NO_CLOCK, budget);
+        let step = Loaded::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
         let numbers = traced.shape.v + traced.shape.y;
         let state = Aligned::new((numbers + Pace::<f64>::NUMBERS) * step.lanes());
         Ok(PacedLanes { state, step, numbers, tapes })

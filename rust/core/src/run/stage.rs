@@ -1,17 +1,13 @@
 //! A cut tape, ready to be run over tiles: the hot loop, and what is computed before it.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::aligned::Aligned;
 use crate::{
     isa::Level,
-    kernel::{
-        Kernel, Tile,
-        interpret::Interpreter,
-        runner::{Runner, Width},
-    },
+    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner},
     spec::Spec,
-    tape::split::{Entry, Given, Split},
+    tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
 };
 
@@ -19,7 +15,8 @@ use crate::{
 pub struct Stage {
     /// The tape.
     pub split: Split,
-    kits: [[OnceLock<Arc<Kit>>; Width::ALL.len()]; Level::ALL.len()],
+    /// By the number of members that they are for.
+    kits: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
     /// Those for rows of a length that something else has set.
     long: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
 }
@@ -35,9 +32,9 @@ pub struct Kit {
     /// Once for each member that takes a lane by itself.
     lone: Interpreter,
     /// Once for each step.
-    step: Interpreter,
+    step: Runner,
     /// Once for each time that comes alone.
-    moment: Interpreter,
+    moment: Runner,
 }
 
 impl Kit {
@@ -46,8 +43,8 @@ impl Kit {
             run: Interpreter::new(&split.run, 1, Level::Baseline),
             member: Interpreter::new(&split.member, runner.lanes(), level),
             lone: Interpreter::new(&split.member, 1, Level::Baseline),
-            step: Interpreter::new(&split.step, STEPS_AT_ONCE as usize, level),
-            moment: Interpreter::new(&split.step, 1, Level::Baseline),
+            step: Runner::long(&split.step, level, STEPS_AT_ONCE as usize),
+            moment: Runner::long(&split.step, Level::Baseline, 1),
             runner,
         })
     }
@@ -56,32 +53,53 @@ impl Kit {
 impl Stage {
     /// Of a tape that was cut.
     pub fn new(split: Split) -> Stage {
-        Stage { split, kits: Default::default(), long: Mutex::default() }
+        Stage { split, kits: Mutex::default(), long: Mutex::default() }
     }
 
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
         let split = &self.split;
-        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum()
+        [&split.run, &split.member, &split.step, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
     }
 
-    /// What makes its steps at a width.
-    pub fn kit(&self, level: Level, width: Width) -> &Arc<Kit> {
-        let make = || Kit::new(&self.split, level, Runner::new(&self.split.body, level, width));
-        self.kits[level as usize][width as usize].get_or_init(make)
+    /// What makes its steps in a run of so many members.
+    pub fn kit(&self, level: Level, members: usize) -> Arc<Kit> {
+        // Some more or fewer of many members are no reason for another tile.
+        let members = if members > MANY { usize::MAX } else { members };
+        self.kept(&self.kits, level, members, |body| Runner::new(body, level, members))
     }
 
     /// What makes its steps over rows of so many lanes.
     pub fn kit_of(&self, level: Level, lanes: usize) -> Arc<Kit> {
-        let mut long = self.long.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, _, known)) = long.iter().find(|(at, wide, _)| (*at, *wide) == (level, lanes)) {
+        self.kept(&self.long, level, lanes, |body| Runner::long(body, level, lanes))
+    }
+
+    /// What was made before for such a number, or what is made now.
+    fn kept(
+        &self,
+        kits: &Mutex<Vec<(Level, usize, Arc<Kit>)>>,
+        level: Level,
+        number: usize,
+        make: impl Fn(&Body) -> Runner,
+    ) -> Arc<Kit> {
+        // A thread that panicked while it held the lock has left a list that is whole: entries are made before they are put in.
+        let mut kits = kits.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, _, known)) = kits.iter().find(|(at, known, _)| (*at, *known) == (level, number)) {
             return Arc::clone(known);
         }
-        let made = Kit::new(&self.split, level, Runner::long(&self.split.body, level, lanes));
-        long.push((level, lanes, Arc::clone(&made)));
+        let made = Kit::new(&self.split, level, make(&self.split.body));
+        if kits.len() == MOST_KITS {
+            kits.remove(0);
+        }
+        kits.push((level, number, Arc::clone(&made)));
         made
     }
 }
+
+/// Members above which their number says nothing about the best tile: it holds some hundreds.
+const MANY: usize = 1024;
+/// Kernels of different lengths that are kept for a stage.
+const MOST_KITS: usize = 16;
 
 /// Time and step: t = `t0` + k·`h` at step k, never accumulated.
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +126,9 @@ pub struct Loaded {
     kit: Arc<Kit>,
     /// What is the same for all members, in the order of [`Split::given`].
     given: Vec<f64>,
+    /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
+    given_pool: Vec<f64>,
+    given_for: Option<bool>,
     /// The uniforms of the hot loop.
     uniforms: Vec<f64>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
@@ -121,7 +142,12 @@ pub struct Loaded {
     common: Vec<Vec<f64>>,
     /// Tables of steps, by their first step.
     tables: Vec<(i64, Vec<u64>)>,
-    /// The entries of one time, and the values that they are made of.
+    /// How many of them are kept at most, and which makes place next.
+    most_tables: usize,
+    oldest: usize,
+    /// The times of the steps of a table.
+    times: Vec<f64>,
+    /// The entries of one time, and the values that entries are made of.
     moment: Vec<u64>,
     values: Vec<f64>,
     raw: Vec<f64>,
@@ -129,9 +155,9 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// For tiles of so many lanes as the width says. `budget` is the most attempts of a member, for those.
-    pub fn new(stage: &Stage, spec: &Spec, level: Level, width: Width, clock: &Clock, budget: f64) -> Loaded {
-        Loaded::with(stage, Arc::clone(stage.kit(level, width)), spec, clock, budget)
+    /// For a run of so many members. `budget` is the most attempts of a member, for those.
+    pub fn new(stage: &Stage, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> Loaded {
+        Loaded::with(stage, stage.kit(level, members), spec, clock, budget)
     }
 
     /// With a kernel that was chosen already.
@@ -157,6 +183,8 @@ impl Loaded {
         let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
         Loaded {
             given,
+            given_pool: Vec::new(),
+            given_for: None,
             uniforms,
             pool: Aligned::new(0),
             pool_for: None,
@@ -165,6 +193,9 @@ impl Loaded {
             inputs: Vec::new(),
             common,
             tables: Vec::new(),
+            most_tables: (MOST_ENTRIES / (STEPS_AT_ONCE as usize * split.entries.len()).max(1)).max(1),
+            oldest: 0,
+            times: Vec::new(),
             moment: Vec::new(),
             values: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
@@ -226,6 +257,12 @@ impl Loaded {
         }
     }
 
+    /// Writes now what would be written when it pays, and keeps no more than a loop needs that goes on and on.
+    pub fn settle(&mut self) {
+        self.kit.runner.write();
+        self.most_tables = 1;
+    }
+
     /// So many steps of a state from step `k`.
     pub fn advance(&mut self, stage: &Stage, clock: &Clock, k: i64, n: usize, state: &mut [f64]) {
         if stage.split.entries.is_empty() {
@@ -274,24 +311,36 @@ impl Loaded {
         if let Some(at) = self.tables.iter().position(|(from, _)| *from == first) {
             return at;
         }
-        let numbers = stage.split.entries.len() * STEPS_AT_ONCE as usize;
-        if self.tables.iter().map(|(_, table)| table.len()).sum::<usize>() + numbers > MOST_ENTRIES {
-            self.tables.clear();
-        }
-        let times: Vec<f64> = (first..first + STEPS_AT_ONCE).map(|k| clock.at(k)).collect();
-        let (kit, mut table) = (Arc::clone(&self.kit), Vec::new());
+        let at = if self.tables.len() < self.most_tables {
+            self.tables.push((first, Vec::new()));
+            self.tables.len() - 1
+        } else {
+            self.oldest = (self.oldest + 1) % self.most_tables;
+            self.tables[self.oldest].0 = first;
+            self.oldest
+        };
+        // What is there already is filled anew: a step of a world allocates nothing.
+        let (mut times, mut table) = (std::mem::take(&mut self.times), std::mem::take(&mut self.tables[at].1));
+        times.clear();
+        times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        let kit = Arc::clone(&self.kit);
         self.fill(stage, &kit.step, &times, &mut table);
-        self.tables.push((first, table));
-        self.tables.len() - 1
+        (self.times, self.tables[at].1) = (times, table);
+        at
     }
 
     /// The entries of steps at these times, as many as the interpreter has lanes.
-    fn fill(&mut self, stage: &Stage, step: &Interpreter, times: &[f64], table: &mut Vec<u64>) {
+    fn fill(&mut self, stage: &Stage, step: &Runner, times: &[f64], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
         self.values.clear();
         self.values.resize(entries.len() * steps, 0.0);
-        let tile = &mut Tile { state: &mut self.values, rows: times, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        step.run(tile, &mut self.scratch);
+        let (kernel, written) = step.kernel(1);
+        if self.given_for != Some(written) {
+            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(written));
+        }
+        let (values, pool) = (&mut self.values, &self.given_pool);
+        let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };
+        kernel.run(tile, &mut self.scratch);
         table.clear();
         table.resize(steps * entries.len(), 0);
         for (e, entry) in entries.iter().enumerate() {

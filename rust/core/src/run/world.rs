@@ -51,10 +51,11 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let width = model.width(&traced, machine, members - first, MANY)?;
-            let mut group = model.group(&traced, machine, width, &clock, MANY)?;
+            let whole = members - first >= model.lanes(&traced, machine, members, MANY)?;
+            let mut group = model.group(&traced, machine, if whole { members } else { members - first }, &clock, MANY)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
+            group.settle();
             shares.push(Share { group, first, count });
             first += count;
         }

@@ -220,7 +220,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         Rank::Member => Some(Op::Row(number(&mut rows, id))),
         Rank::Step => Some(Op::PerStep(number(&mut entries, id))),
         Rank::Lane => match tape.op(id) {
-            Op::Sample(input, t) if rank(t) < Rank::Lane => {
+            Op::Sample(input, t) => {
                 let sample = samples.iter().position(|s| *s == (input, t)).unwrap_or_else(|| {
                     samples.push((input, t));
                     samples.len() - 1
@@ -321,7 +321,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
     tape.keep(Op::Select(below, at, last))
 }
 
-/// Where members are at times of their own, each looks up its sample by itself.
+/// Where members ask for samples at times of their own, each looks up its sample by itself.
 fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let old = std::mem::take(tape);
@@ -329,7 +329,7 @@ fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool)
     for op in old.ops() {
         let moved = op.with(|operand| place[operand as usize]);
         place.push(match (*op, moved) {
-            (Op::Sample(_, t), Op::Sample(input, now)) if ranks[t as usize] == Rank::Lane => {
+            (Op::Sample(_, t), Op::Sample(input, now)) if matches!(ranks[t as usize], Rank::Member | Rank::Lane) => {
                 let number = sample_number(tape, input, now);
                 let (lanes, first) = (tape.keep(fact(Given::Lanes)), tape.keep(fact(Given::First(input))));
                 let row = tape.keep(Op::Mul(number, lanes));

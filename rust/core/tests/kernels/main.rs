@@ -94,7 +94,7 @@ fn one_case(seed: u64, read_code: bool) -> usize {
     let (level, width) = random.one_of(&widths());
     let shape = if random.once_in(8) {
         let members = random.one_of(&[1, 2, 4, 5, 8, 9, 60, 1000]);
-        choose(&body, level, members)
+        choose(&body, level, members).unwrap()
     } else {
         shape(random, level, width)
     };

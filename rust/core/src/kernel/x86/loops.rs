@@ -10,7 +10,7 @@ use crate::{
     isa::Level,
     kernel::{
         pages::place,
-        registers::{NONE, Registers, Uses},
+        registers::{Registers, Uses},
     },
 };
 

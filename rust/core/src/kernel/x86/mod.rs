@@ -41,12 +41,6 @@ impl Shape {
         self.width * self.abreast * self.blocks
     }
 
-    /// What a step of the tile costs, in steps of a vector of lanes: vectors abreast wait for each other's operations anyway.
-    pub fn cost(&self) -> usize {
-        let side_by_side = if self.resident { self.abreast.min(2) } else { self.abreast };
-        side_by_side * self.blocks
-    }
-
     /// How often a number of the pool stands there: AVX-512 can take one for all lanes.
     fn pool_copies(&self) -> usize {
         match (self.level, self.width) {
@@ -71,10 +65,14 @@ impl Shape {
             && self.together > 0
             && self.blocks > 0
             && self.level.here()
+            && body.ops.len().saturating_mul(self.abreast) < MOST_OPERATIONS
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])
             && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.abreast])
     }
 }
+
+/// More operations than that are no kernel: jumps could not be named by 31 bits.
+const MOST_OPERATIONS: usize = 1 << 22;
 
 /// A kernel as machine code.
 #[derive(Debug)]
@@ -83,6 +81,7 @@ pub struct Written {
     shape: Shape,
     constants: Vec<f64>,
     uniforms: usize,
+    spills: usize,
 }
 
 /// Writes a kernel. None if this machine cannot run it, registers do not suffice, or the system does not let code be written.
@@ -100,7 +99,7 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     };
     let pages = Pages::new(&code, frame)?;
     let constants = plan.constants.iter().map(|bits| f64::from_bits(*bits)).collect();
-    Some(Written { pages, shape, constants, uniforms: body.uniforms })
+    Some(Written { pages, shape, constants, uniforms: body.uniforms, spills: slots })
 }
 
 impl Written {
@@ -132,5 +131,13 @@ impl Kernel for Written {
 
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
         self.pages.run(tile, scratch);
+    }
+
+    fn bytes(&self) -> usize {
+        self.code().len()
+    }
+
+    fn spills(&self) -> usize {
+        self.spills
     }
 }

@@ -186,7 +186,10 @@ impl Plan {
             Op::ShiftUp(_, n) => Doing::Shift(x::UP, n as u8),
             Op::ShiftDown(_, n) => Doing::Shift(x::DOWN, n as u8),
             Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => Doing::Compare(predicate(op)),
-            _ => Doing::Copy,
+            // Those that depend on their neighbours, and what is no operation, come here as what they are at least.
+            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
+            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
+            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
         }
     }
 

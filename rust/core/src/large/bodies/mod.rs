@@ -1,70 +1,26 @@
 //! Many bodies ([`crate::systems::nbody`]), eight of them side by side, the forces on as many threads as there are.
 
-mod along;
 mod quantities;
 mod share;
 
 use std::thread;
 
+use stepwell_base::{
+    along::{Distances, Kernel, Meeting, Round, Sums},
+    bodies::{LANES, Law, partners},
+};
+
 use self::{
-    along::{Along, Round, Sums},
     quantities::{Quantity, Record, kinetic, total},
     share::{Share, add, share},
 };
 use super::{Asked, Facts, Rates};
-use crate::{
-    isa::{Level, with_isa},
-    spec::Spec,
-    systems::nbody::{self, Law},
-};
+use crate::{isa::with_isa, spec::Spec, systems::nbody};
 
 /// Bodies that are taken side by side, and parts in which sums over bodies are kept.
-const SIDE: usize = nbody::LANES;
-/// Distances k from one to another, `SIDE` apart. Each chunk of bodies meets all of a group before the next does.
-type Distances = (usize, usize);
+const SIDE: usize = LANES;
 /// Bodies from which on threads pay, which are started anew for each force: that takes some hundredths of a millisecond.
 const THREADED: usize = 1024;
-
-/// The law of that number: kernels are made for numbers.
-const fn law(number: u8) -> Law {
-    match number {
-        LOGARITHMIC => Law::Logarithmic,
-        NEWTON => Law::Newton,
-        _ => Law::Printed,
-    }
-}
-const LOGARITHMIC: u8 = 0;
-const NEWTON: u8 = 1;
-const PRINTED: u8 = 2;
-
-/// Which kernel meets the bodies: chosen once, called for each force.
-#[derive(Clone, Copy)]
-struct Kernel {
-    law: u8,
-    dim: usize,
-    level: Level,
-}
-
-/// Runs a kernel for the law, the dimensions and the CPU level at hand.
-macro_rules! meet {
-    ($kernel:expr, $energy:expr, $fields:tt) => {
-        match ($kernel.dim, $kernel.law, $energy) {
-            (2, NEWTON, false) => meet!(@ $kernel, 2, NEWTON, false, $fields),
-            (2, _, false) => meet!(@ $kernel, 2, LOGARITHMIC, false, $fields),
-            (_, NEWTON, false) => meet!(@ $kernel, 3, NEWTON, false, $fields),
-            (_, _, false) => meet!(@ $kernel, 3, LOGARITHMIC, false, $fields),
-            (2, LOGARITHMIC, true) => meet!(@ $kernel, 2, LOGARITHMIC, true, $fields),
-            (2, NEWTON, true) => meet!(@ $kernel, 2, NEWTON, true, $fields),
-            (2, _, true) => meet!(@ $kernel, 2, PRINTED, true, $fields),
-            (_, LOGARITHMIC, true) => meet!(@ $kernel, 3, LOGARITHMIC, true, $fields),
-            (_, NEWTON, true) => meet!(@ $kernel, 3, NEWTON, true, $fields),
-            (_, _, true) => meet!(@ $kernel, 3, PRINTED, true, $fields),
-        }
-    };
-    (@ $kernel:expr, $dim:literal, $law:ident, $energy:literal, { $($field:tt)* }) => {
-        with_isa!($kernel.level, |isa| isa.run(Along::<$dim, { $law }, $energy> { $($field)* }))
-    };
-}
 
 /// The bodies of one member, scaled to the step.
 struct Bodies {
@@ -94,14 +50,9 @@ struct Bodies {
 /// The rates of many bodies.
 pub fn make(asked: &Asked) -> Box<dyn Rates> {
     let (n, dim, machine) = (asked.given.count("masses"), asked.given.whole("dim"), asked.machine);
-    let law = match nbody::law(asked.given) {
-        Some(Law::Newton) => NEWTON,
-        Some(Law::Printed) => PRINTED,
-        _ => LOGARITHMIC,
-    };
+    let law = nbody::law(asked.given).unwrap_or(Law::Logarithmic);
     let ends = |group: Vec<usize>| Some((*group.first()?, *group.last()?));
-    let slabs: Vec<Vec<Distances>> =
-        nbody::partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
+    let slabs: Vec<Vec<Distances>> = partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
     let round = Round::new(n, dim);
     let threads = match machine.threads {
         _ if n < THREADED => 1,
@@ -138,13 +89,13 @@ impl Bodies {
         let (n, kernel, round, potential) = (self.n, self.kernel, &self.round, &mut self.potential[..]);
         if let [sums] = &mut self.sums[..] {
             for (i, groups) in self.slabs.iter().enumerate() {
-                meet!(kernel, energy, { n, groups, round, sums, more: i > 0, potential, out });
+                kernel.meet(energy, Meeting { n, groups, round, sums, more: i > 0, potential, out });
             }
             return;
         }
         share(&self.slabs, &mut self.shares, &mut self.sums, |groups, share, sums| {
             let (potential, out) = (&mut share.potential[..], &mut share.force[..]);
-            meet!(kernel, energy, { n, groups, round, sums, more: false, potential, out });
+            kernel.meet(energy, Meeting { n, groups, round, sums, more: false, potential, out });
         });
         // Slab after slab, whichever was ready first.
         for (i, share) in self.shares.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use std::{sync::Mutex, thread};
 
-use super::{Distances, along::Sums};
+use stepwell_base::along::{Distances, Sums};
 
 /// What a slab brings.
 pub(super) struct Share {

@@ -1,9 +1,36 @@
-//! Run-time CPU dispatch, and the only `unsafe` of the project.
+//! Run-time CPU dispatch. The project's `unsafe` stands here and in the core's `kernel/pages.rs`.
 //!
-//! A wheel is built for the oldest CPU of its platform. Each hot loop is therefore compiled once per CPU level, and the best
-//! level that the machine has is chosen when a run begins. No level contracts to FMA or reorders, so all give the same bits.
+//! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
+//! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA or reorders, so all give
+//! the same bits.
 
-use crate::error::Error;
+use std::{ffi::OsString, fmt};
+
+/// What an environment variable asks for and this machine does not have, or nobody knows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownLevel {
+    /// Which variable.
+    pub variable: &'static str,
+    /// What was given.
+    pub given: String,
+    /// What the machine has.
+    pub known: String,
+}
+
+impl fmt::Display for UnknownLevel {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let UnknownLevel { variable, given, known } = self;
+        let wrong = if *variable == KERNELS { "names no kernels" } else { "is not a CPU level" };
+        write!(f, "{variable}={given:?} {wrong} of this machine; it has {known}")
+    }
+}
+
+impl std::error::Error for UnknownLevel {}
+
+/// Forces the kernels: `interpret`, or a level whose machine code is written.
+const KERNELS: &str = "STEPWELL_KERNELS";
+/// The older name for that, which takes the names of levels.
+const ISA: &str = "STEPWELL_ISA";
 
 /// What the hot loop may use, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -26,7 +53,7 @@ impl Level {
     /// Every level, ascending.
     pub const ALL: [Level; 3] = [Level::Baseline, Level::Avx2, Level::Avx512];
 
-    /// The name that `STEPWELL_ISA` takes.
+    /// Its name, which `STEPWELL_ISA` takes.
     pub fn name(self) -> &'static str {
         match self {
             Level::Baseline => "baseline",
@@ -62,18 +89,34 @@ impl Level {
         Level::ALL.into_iter().filter(|l| l.here()).collect()
     }
 
-    /// The level that `STEPWELL_ISA` forces, or else the best that this machine has.
-    pub fn choose() -> Result<Level, Error> {
+    /// What `STEPWELL_KERNELS` calls its kernels.
+    pub fn kernels(self) -> &'static str {
+        match self {
+            Level::Baseline => "interpret",
+            written => written.name(),
+        }
+    }
+
+    /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this machine.
+    pub fn choose() -> Result<Level, UnknownLevel> {
+        Level::asked(std::env::var_os(KERNELS), std::env::var_os(ISA))
+    }
+
+    /// As `choose`, with what the two variables hold; an empty one counts as none.
+    pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, UnknownLevel> {
         let available = Level::available();
-        let best = available.last().copied().unwrap_or(Level::Baseline);
-        let Some(given) = std::env::var_os("STEPWELL_ISA").filter(|v| !v.is_empty()) else {
-            return Ok(best);
+        let find = |given: &OsString, name: fn(Level) -> &'static str| {
+            let found = available.iter().copied().find(|level| *given == name(*level));
+            let known = || available.iter().map(|level| name(*level)).collect::<Vec<_>>().join(", ");
+            found.ok_or_else(|| (given.to_string_lossy().into_owned(), known()))
         };
-        let wanted = available.iter().copied().find(|l| given == l.name());
-        wanted.ok_or_else(|| Error::Isa {
-            given: given.to_string_lossy().into_owned(),
-            known: available.iter().map(|l| l.name()).collect::<Vec<_>>().join(", "),
-        })
+        if let Some(given) = kernels.filter(|given| !given.is_empty()) {
+            return find(&given, Level::kernels).map_err(|(given, known)| UnknownLevel { variable: KERNELS, given, known });
+        }
+        if let Some(given) = isa.filter(|given| !given.is_empty()) {
+            return find(&given, Level::name).map_err(|(given, known)| UnknownLevel { variable: ISA, given, known });
+        }
+        Ok(available.last().copied().unwrap_or(Level::Baseline))
     }
 }
 
@@ -164,9 +207,10 @@ pub use x86::{Avx2, Avx512};
 pub use {Baseline as Avx2, Baseline as Avx512};
 
 /// Makes something with the proof of a level: one expression for AVX-512 and one below it, or one for all.
+#[macro_export]
 macro_rules! with_isa {
     ($level:expr, |$isa:ident| $make:expr) => {
-        $crate::isa::with_isa!($level, |$isa| $make, $make)
+        $crate::with_isa!($level, |$isa| $make, $make)
     };
     ($level:expr, |$isa:ident| $wide:expr, $below:expr) => {{
         use $crate::isa::{Avx2, Avx512, Baseline, Isa, Level};
@@ -184,4 +228,4 @@ macro_rules! with_isa {
         }
     }};
 }
-pub(crate) use with_isa;
+pub use with_isa;

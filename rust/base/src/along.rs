@@ -2,8 +2,14 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
-use super::{Distances, SIDE, law};
-use crate::{isa::Task, run::aligned::Aligned, systems::nbody::meeting};
+use crate::{
+    aligned::Aligned,
+    bodies::{LANES as SIDE, Law, meeting},
+    isa::{Level, Task, with_isa},
+};
+
+/// Distances k from one to another, `LANES` apart. Each chunk of bodies meets all of a group before the next does.
+pub type Distances = (usize, usize);
 
 type Chunk = [f64; SIDE];
 
@@ -20,19 +26,20 @@ fn store(to: &mut [f64], at: usize, chunk: &Chunk) {
 }
 
 /// Where bodies are and what they weigh, along the bodies, for two rounds and more.
-pub(super) struct Round {
+pub struct Round {
     /// Places, one row as long as that of the partners for each direction.
     places: Aligned,
     /// h·G·m of partners.
-    pub(super) partners: Aligned,
+    partners: Aligned,
     /// h·G·m of bodies; zero for what fills the last chunk.
-    pub(super) bodies: Aligned,
-    pub(super) soft: f64,
+    bodies: Aligned,
+    /// ε²
+    pub soft: f64,
 }
 
 impl Round {
     /// For so many bodies: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
-    pub(super) fn new(n: usize, dim: usize) -> Self {
+    pub fn new(n: usize, dim: usize) -> Self {
         let rounds = (2 * n + 4 * SIDE).next_multiple_of(SIDE);
         Round {
             places: Aligned::new(dim * rounds),
@@ -43,7 +50,7 @@ impl Round {
     }
 
     /// Takes h·G·m of each body, and ε².
-    pub(super) fn take(&mut self, n: usize, strength: impl Fn(usize) -> f64, soft: f64) {
+    pub fn take(&mut self, n: usize, strength: impl Fn(usize) -> f64, soft: f64) {
         for i in 0..n {
             self.bodies[i] = strength(i);
         }
@@ -54,7 +61,7 @@ impl Round {
     }
 
     /// Takes the places of one round and repeats them.
-    pub(super) fn fill<const D: usize>(&mut self, y: &[f64]) {
+    pub fn fill<const D: usize>(&mut self, y: &[f64]) {
         let (bodies, _) = y.as_chunks::<D>();
         let n = bodies.len();
         let rounds = self.partners.len();
@@ -71,14 +78,15 @@ impl Round {
 }
 
 /// What bodies collect from the partners after them and before them, the latter over two rounds, and their potential.
-pub(super) struct Sums {
+pub struct Sums {
     after: Aligned,
     before: Aligned,
     potential: Aligned,
 }
 
 impl Sums {
-    pub(super) fn new(round: &Round) -> Self {
+    /// Room for the bodies of a round.
+    pub fn new(round: &Round) -> Self {
         let (width, stride) = (round.bodies.len(), round.partners.len());
         let dim = round.places.len() / stride;
         Sums { after: Aligned::new(dim * width), before: Aligned::new(dim * stride), potential: Aligned::new(width) }
@@ -86,15 +94,14 @@ impl Sums {
 }
 
 /// The bodies meet at the distances of one slab.
-pub(super) struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
-    pub(super) n: usize,
-    pub(super) groups: &'a [Distances],
-    pub(super) round: &'a Round,
-    pub(super) sums: &'a mut Sums,
-    /// Whether to add to what is there.
-    pub(super) more: bool,
-    pub(super) potential: &'a mut [f64],
-    pub(super) out: &'a mut [f64],
+struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
+    n: usize,
+    groups: &'a [Distances],
+    round: &'a Round,
+    sums: &'a mut Sums,
+    more: bool,
+    potential: &'a mut [f64],
+    out: &'a mut [f64],
 }
 
 /// A chunk of bodies, with what they collect.
@@ -304,5 +311,69 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Task for Along<'_, D, LA
     #[inline(always)]
     fn run(mut self) {
         self.meet();
+    }
+}
+
+/// The law of that number: kernels are made for numbers.
+const fn law(number: u8) -> Law {
+    match number {
+        LOGARITHMIC => Law::Logarithmic,
+        NEWTON => Law::Newton,
+        _ => Law::Printed,
+    }
+}
+const LOGARITHMIC: u8 = 0;
+const NEWTON: u8 = 1;
+const PRINTED: u8 = 2;
+
+/// Which kernel meets the bodies: chosen once, called for each force.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel {
+    /// The force.
+    pub law: Law,
+    /// 2 or 3.
+    pub dim: usize,
+    /// What it may use.
+    pub level: Level,
+}
+
+/// What a kernel works on: the bodies meet at the distances of one slab.
+pub struct Meeting<'a> {
+    /// How many bodies.
+    pub n: usize,
+    /// At which distances.
+    pub groups: &'a [Distances],
+    /// Where they are.
+    pub round: &'a Round,
+    /// Room for what they collect.
+    pub sums: &'a mut Sums,
+    /// Whether to add to what is there.
+    pub more: bool,
+    /// h times the potential of each body.
+    pub potential: &'a mut [f64],
+    /// h times the acceleration of each body.
+    pub out: &'a mut [f64],
+}
+
+impl Kernel {
+    /// The bodies meet; their potential is found beside the forces if `energy`.
+    pub fn meet(self, energy: bool, meeting: Meeting) {
+        match (self.dim, self.law, energy) {
+            (2, Law::Newton, false) => self.by::<2, NEWTON, false>(meeting),
+            (2, _, false) => self.by::<2, LOGARITHMIC, false>(meeting),
+            (_, Law::Newton, false) => self.by::<3, NEWTON, false>(meeting),
+            (_, _, false) => self.by::<3, LOGARITHMIC, false>(meeting),
+            (2, Law::Logarithmic, true) => self.by::<2, LOGARITHMIC, true>(meeting),
+            (2, Law::Newton, true) => self.by::<2, NEWTON, true>(meeting),
+            (2, Law::Printed, true) => self.by::<2, PRINTED, true>(meeting),
+            (_, Law::Logarithmic, true) => self.by::<3, LOGARITHMIC, true>(meeting),
+            (_, Law::Newton, true) => self.by::<3, NEWTON, true>(meeting),
+            (_, Law::Printed, true) => self.by::<3, PRINTED, true>(meeting),
+        }
+    }
+
+    fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, m: Meeting) {
+        let Meeting { n, groups, round, sums, more, potential, out } = m;
+        with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY> { n, groups, round, sums, more, potential, out }));
     }
 }

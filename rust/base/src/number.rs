@@ -1,0 +1,129 @@
+//! Numbers: what a step is written over.
+//!
+//! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with the core's symbols they write the
+//! tape.
+
+use std::{
+    fmt::Debug,
+    ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
+};
+
+/// A number, or what stands for one.
+///
+/// What is not here is not in a step: no `if` on a number, no operation that two machines might round differently.
+pub trait Number:
+    nalgebra::Scalar
+    + Copy
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+{
+    /// A truth about numbers.
+    type Truth: Copy + BitAnd<Output = Self::Truth> + BitOr<Output = Self::Truth> + Not<Output = Self::Truth>;
+
+    /// A number that is known beforehand.
+    fn of(x: f64) -> Self;
+    /// √x
+    #[must_use]
+    fn sqrt(self) -> Self;
+    /// The largest whole number not above x.
+    #[must_use]
+    fn floor(self) -> Self;
+    /// x < y
+    fn below(self, y: Self) -> Self::Truth;
+    /// x ≤ y
+    fn at_most(self, y: Self) -> Self::Truth;
+    /// One of two numbers.
+    fn choose(truth: Self::Truth, yes: Self, no: Self) -> Self;
+    /// Bits of the number and of the constant.
+    #[must_use]
+    fn and_bits(self, bits: u64) -> Self;
+    /// Bits of the number or of the constant.
+    #[must_use]
+    fn or_bits(self, bits: u64) -> Self;
+    /// Bits of one number and not of both.
+    #[must_use]
+    fn xor_bits(self, other: Self) -> Self;
+    /// Its bits as a whole number, and another added.
+    #[must_use]
+    fn add_bits(self, whole: u64) -> Self;
+    /// Its bits, moved up.
+    #[must_use]
+    fn shift_up(self, places: u32) -> Self;
+    /// Its bits, moved down.
+    #[must_use]
+    fn shift_down(self, places: u32) -> Self;
+
+    /// The larger of two; the second of a NaN.
+    #[must_use]
+    fn larger(self, y: Self) -> Self {
+        Self::choose(y.below(self), self, y)
+    }
+
+    /// Held between two constants; a NaN stays one.
+    #[must_use]
+    fn held(self, least: f64, most: f64) -> Self {
+        let (least, most) = (Self::of(least), Self::of(most));
+        let x = Self::choose(self.below(least), least, self);
+        Self::choose(most.below(x), most, x)
+    }
+}
+
+impl Number for f64 {
+    type Truth = bool;
+
+    #[inline(always)]
+    fn of(x: f64) -> f64 {
+        x
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn floor(self) -> f64 {
+        f64::floor(self)
+    }
+    #[inline(always)]
+    fn below(self, y: f64) -> bool {
+        self < y
+    }
+    #[inline(always)]
+    fn at_most(self, y: f64) -> bool {
+        self <= y
+    }
+    #[inline(always)]
+    fn choose(truth: bool, yes: f64, no: f64) -> f64 {
+        if truth { yes } else { no }
+    }
+    #[inline(always)]
+    fn and_bits(self, bits: u64) -> f64 {
+        f64::from_bits(self.to_bits() & bits)
+    }
+    #[inline(always)]
+    fn or_bits(self, bits: u64) -> f64 {
+        f64::from_bits(self.to_bits() | bits)
+    }
+    #[inline(always)]
+    fn xor_bits(self, other: f64) -> f64 {
+        f64::from_bits(self.to_bits() ^ other.to_bits())
+    }
+    #[inline(always)]
+    fn add_bits(self, whole: u64) -> f64 {
+        f64::from_bits(self.to_bits().wrapping_add(whole))
+    }
+    #[inline(always)]
+    fn shift_up(self, places: u32) -> f64 {
+        f64::from_bits(self.to_bits() << places)
+    }
+    #[inline(always)]
+    fn shift_down(self, places: u32) -> f64 {
+        f64::from_bits(self.to_bits() >> places)
+    }
+}

@@ -1,0 +1,11 @@
+//! The tape: what it makes of expressions, as values and as text.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
+
+#[path = "tape/expressions.rs"]
+mod expressions;
+#[path = "kernels/random.rs"]
+#[allow(dead_code, reason = "bodies are for kernels")]
+mod random;
+#[path = "tape/rules.rs"]
+mod rules;
