@@ -3,6 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
 use crate::{
+    aligned::Aligned,
     bodies::{LANES as SIDE, Law, meeting},
     isa::{Level, Task, with_isa},
 };
@@ -26,12 +27,12 @@ fn store(to: &mut [f64], at: usize, chunk: &Chunk) {
 
 /// Where bodies are and what they weigh, along the bodies, for two rounds and more.
 pub struct Round {
-    /// Places, one row for each direction.
-    pub places: Vec<Vec<f64>>,
+    /// Places, one row as long as that of the partners for each direction.
+    places: Aligned,
     /// h·G·m of partners.
-    pub partners: Vec<f64>,
+    partners: Aligned,
     /// h·G·m of bodies; zero for what fills the last chunk.
-    pub bodies: Vec<f64>,
+    bodies: Aligned,
     /// ε²
     pub soft: f64,
 }
@@ -39,11 +40,11 @@ pub struct Round {
 impl Round {
     /// For so many bodies: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
     pub fn new(n: usize, dim: usize) -> Self {
-        let rounds = 2 * n + 4 * SIDE;
+        let rounds = (2 * n + 4 * SIDE).next_multiple_of(SIDE);
         Round {
-            places: vec![vec![0.0; rounds]; dim],
-            partners: vec![0.0; rounds],
-            bodies: vec![0.0; n.next_multiple_of(SIDE)],
+            places: Aligned::new(dim * rounds),
+            partners: Aligned::new(rounds),
+            bodies: Aligned::new(n.next_multiple_of(SIDE)),
             soft: 0.0,
         }
     }
@@ -63,7 +64,8 @@ impl Round {
     pub fn fill<const D: usize>(&mut self, y: &[f64]) {
         let (bodies, _) = y.as_chunks::<D>();
         let n = bodies.len();
-        for (c, row) in self.places.iter_mut().enumerate() {
+        let rounds = self.partners.len();
+        for (c, row) in self.places.chunks_exact_mut(rounds).enumerate() {
             let (low, high) = row.split_at_mut(n);
             for (place, body) in low.iter_mut().zip(bodies) {
                 *place = body[c];
@@ -77,16 +79,17 @@ impl Round {
 
 /// What bodies collect from the partners after them and before them, the latter over two rounds, and their potential.
 pub struct Sums {
-    after: Vec<f64>,
-    before: Vec<f64>,
-    potential: Vec<f64>,
+    after: Aligned,
+    before: Aligned,
+    potential: Aligned,
 }
 
 impl Sums {
     /// Room for the bodies of a round.
     pub fn new(round: &Round) -> Self {
-        let (width, stride, dim) = (round.bodies.len(), round.partners.len(), round.places.len());
-        Sums { after: vec![0.0; dim * width], before: vec![0.0; dim * stride], potential: vec![0.0; width] }
+        let (width, stride) = (round.bodies.len(), round.partners.len());
+        let dim = round.places.len() / stride;
+        Sums { after: Aligned::new(dim * width), before: Aligned::new(dim * stride), potential: Aligned::new(width) }
     }
 }
 
@@ -161,7 +164,18 @@ impl<const D: usize> Bodies<D> {
     }
 }
 
-impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY> {
+/// The slices that the hot loop goes through, taken once.
+struct Hot<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
+    places: &'a [f64],
+    partners: &'a [f64],
+    bodies: &'a [f64],
+    soft: f64,
+    after: &'a mut [f64],
+    before: &'a mut [f64],
+    wells: &'a mut [f64],
+}
+
+impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> {
     /// The chunks of bodies from `A` to `B`, of those that are held, meet the chunk of partners at `at`.
     #[inline(always)]
     fn partner<const A: usize, const B: usize, const U: usize>(
@@ -170,18 +184,18 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
         at: usize,
         met: Option<&[u64; SIDE]>,
     ) {
-        let stride = self.round.partners.len();
-        let strength = load(&self.round.partners, at);
+        let stride = self.partners.len();
+        let strength = load(self.partners, at);
         let mut p = Partners { place: [[0.0; SIDE]; D], strength, pull: [[0.0; SIDE]; D] };
         for c in 0..D {
-            p.place[c] = load(&self.round.places[c], at);
-            p.pull[c] = load(&self.sums.before, c * stride + at);
+            p.place[c] = load(self.places, c * stride + at);
+            p.pull[c] = load(self.before, c * stride + at);
         }
         for t in A..B {
-            held[t].meet::<LAW, ENERGY>(&mut p, self.round.soft, if t == U - 1 { met } else { None });
+            held[t].meet::<LAW, ENERGY>(&mut p, self.soft, if t == U - 1 { met } else { None });
         }
         for c in 0..D {
-            store(&mut self.sums.before, c * stride + at, &p.pull[c]);
+            store(self.before, c * stride + at, &p.pull[c]);
         }
     }
 
@@ -189,17 +203,17 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
     /// the first of two meets at one distance the second meets at the distance before.
     #[inline(always)]
     fn hold<const U: usize>(&mut self, start: usize, first: usize, many: usize, met: Option<&[u64; SIDE]>) {
-        let width = self.round.bodies.len();
+        let (width, stride) = (self.bodies.len(), self.partners.len());
         let mut held = [Bodies { place: [[0.0; SIDE]; D], strength: [0.0; SIDE], pull: [[0.0; SIDE]; D], well: [0.0; SIDE] }; U];
         for t in 0..U {
             let at = start + SIDE * t;
             for c in 0..D {
-                held[t].place[c] = load(&self.round.places[c], at);
-                held[t].pull[c] = load(&self.sums.after, c * width + at);
+                held[t].place[c] = load(self.places, c * stride + at);
+                held[t].pull[c] = load(self.after, c * width + at);
             }
-            held[t].strength = load(&self.round.bodies, at);
+            held[t].strength = load(self.bodies, at);
             if ENERGY {
-                held[t].well = load(&self.sums.potential, at);
+                held[t].well = load(self.wells, at);
             }
         }
         let from = start + first;
@@ -215,10 +229,10 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
         for t in 0..U {
             let at = start + SIDE * t;
             for c in 0..D {
-                store(&mut self.sums.after, c * width + at, &held[t].pull[c]);
+                store(self.after, c * width + at, &held[t].pull[c]);
             }
             if ENERGY {
-                store(&mut self.sums.potential, at, &held[t].well);
+                store(self.wells, at, &held[t].well);
             }
         }
     }
@@ -242,28 +256,41 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
             }
         }
     }
+}
 
+impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY> {
     #[inline(always)]
     fn meet(&mut self) {
-        let (n, width, stride) = (self.n, self.round.bodies.len(), self.round.partners.len());
-        self.sums.after.fill(0.0);
-        self.sums.before.fill(0.0);
+        let Along { n, round, sums, .. } = self;
+        let n = *n;
+        let (width, stride) = (round.bodies.len(), round.partners.len());
+        let Sums { after, before, potential } = &mut **sums;
+        let mut hot = Hot::<D, LAW, ENERGY> {
+            places: &round.places,
+            partners: &round.partners,
+            bodies: &round.bodies,
+            soft: round.soft,
+            after,
+            before,
+            wells: potential,
+        };
+        hot.after.fill(0.0);
+        hot.before.fill(0.0);
         if ENERGY {
-            self.sums.potential.fill(0.0);
+            hot.wells.fill(0.0);
         }
-        let groups = self.groups;
-        for &(first, last) in groups {
+        for &(first, last) in self.groups {
             let many = (last - first) / SIDE + 1;
             let count = meeting(n, last);
-            self.sweep(0, count, first, many);
+            hot.sweep(0, count, first, many);
             if count < n && many > 1 {
                 // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks.
-                self.sweep(count, n, first, many - 1);
+                hot.sweep(count, n, first, many - 1);
             }
         }
         let (out, _) = self.out.as_chunks_mut::<D>();
         for c in 0..D {
-            let (after, before) = (&self.sums.after[c * width..][..n], &self.sums.before[c * stride..][..2 * n]);
+            let (after, before) = (&hot.after[c * width..][..n], &hot.before[c * stride..][..2 * n]);
             let (low, high) = before.split_at(n);
             let sums = after.iter().zip(low).zip(high).map(|((after, low), high)| after + (low + high));
             if self.more {
@@ -273,7 +300,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
             }
         }
         if ENERGY {
-            for (out, well) in self.potential.iter_mut().zip(&self.sums.potential) {
+            for (out, well) in self.potential.iter_mut().zip(hot.wells.iter()) {
                 *out = if self.more { *out + well } else { *well };
             }
         }

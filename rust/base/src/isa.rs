@@ -64,6 +64,7 @@ impl Level {
 
     /// Whether this machine has it.
     #[cfg(target_arch = "x86_64")]
+    #[inline]
     pub fn here(self) -> bool {
         match self {
             Level::Baseline => true,
@@ -172,6 +173,7 @@ mod x86 {
     }
 
     impl Isa for Avx2 {
+        #[inline]
         fn detect() -> Option<Self> {
             Level::Avx2.here().then_some(Avx2(()))
         }
@@ -185,6 +187,7 @@ mod x86 {
     }
 
     impl Isa for Avx512 {
+        #[inline]
         fn detect() -> Option<Self> {
             Level::Avx512.here().then_some(Avx512(()))
         }

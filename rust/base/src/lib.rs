@@ -3,6 +3,7 @@
 //! What the core is built on and what seldom changes, apart so that a new method or system is built in seconds: numbers and functions of
 //! them, CPU levels, and the one kernel that is compiled ahead of time for each of them and takes a minute, the forces of many bodies.
 
+pub mod aligned;
 pub mod along;
 pub mod bodies;
 pub mod functions;

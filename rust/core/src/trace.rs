@@ -341,14 +341,18 @@ impl Traced {
 
     /// The rates as tapes of their own.
     pub fn rated(&self) -> Result<Arc<Rated>, Error> {
-        type RatesOf = Cache<(Given, Vec<String>), Rated>;
-        static CACHE: OnceLock<Mutex<RatesOf>> = OnceLock::new();
         let Scene { given, record, .. } = &self.scene;
-        Cache::find(CACHE.get_or_init(Mutex::default), &(given.clone(), record.clone()), || {
+        Cache::find(rated(), &(given.clone(), record.clone()), || {
             let rated = Rated::new(given, record)?;
             let size = rated.size();
             Ok((rated, size))
         })
+    }
+
+    /// Whether these tapes are there already.
+    pub fn is_rated(&self) -> bool {
+        let Scene { given, record, .. } = &self.scene;
+        rated().lock().unwrap_or_else(PoisonError::into_inner).known.contains_key(&(given.clone(), record.clone()))
     }
 
     /// How the method uses rates of which these facts are known.
@@ -390,6 +394,14 @@ impl Scene {
 /// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each vector
 /// that goes abreast, as machine code. When something new would pass it, what was there is forgotten.
 const MOST_OPERATIONS: usize = 200_000;
+
+/// Rates, by the system and what is recorded of it: methods have them in common.
+fn rated() -> &'static Mutex<RatedCache> {
+    static CACHE: OnceLock<Mutex<RatedCache>> = OnceLock::new();
+    CACHE.get_or_init(Mutex::default)
+}
+
+type RatedCache = Cache<(Given, Vec<String>), Rated>;
 
 struct Cache<K, V> {
     known: HashMap<K, Arc<V>>,

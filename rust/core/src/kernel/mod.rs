@@ -66,6 +66,7 @@ pub trait Kernel: Send + Sync {
 }
 
 /// Panics unless a tile holds what a body asks for. What is written as machine code relies on it.
+#[inline]
 pub fn check(body: &Body, lanes: usize, tile: &Tile) {
     assert!(tile.state.len() >= body.next.len() * lanes, "state");
     assert!(tile.rows.len() >= body.rows * lanes, "rows");

@@ -120,8 +120,8 @@ pub struct Asked<'a> {
 /// Rates of one member by a kernel that is written by hand.
 #[derive(Clone, Copy)]
 pub struct Long {
-    /// Operations of the rates from which on it is quicker than machine code for one number at a time.
-    pub from: usize,
+    /// Operations of the rates, or of a step, from which on it is quicker than machine code for one number at a time.
+    pub from: (usize, usize),
     /// Operations of the rates from which on members one by one are as quick as several side by side with tapes for the rates.
     pub beside: usize,
     /// Makes them, without control.

@@ -23,15 +23,16 @@ pub fn filled(rows: usize) -> usize {
 
 /// The sums of all rows that fill panels of `R`; what is left of entries and rows.
 #[inline(always)]
-fn panels<'a, const R: usize>(mut entries: &'a [f64], mut out: &'a mut [f64], parts: [&[f64]; 3]) -> (&'a [f64], &'a mut [f64]) {
-    let columns: usize = parts.iter().map(|part| part.len()).sum::<usize>();
-    while out.len() >= R {
-        let (now, later) = out.split_at_mut(R);
-        let (panel, rest) = entries.split_at(R * columns);
-        now.copy_from_slice(&sums::<R>(panel.as_chunks().0, parts));
-        (entries, out) = (rest, later);
+fn panels<'a, const R: usize>(entries: &'a [f64], out: &'a mut [f64], parts: [&[f64]; 3]) -> (&'a [f64], &'a mut [f64]) {
+    let size = R * parts.iter().map(|part| part.len()).sum::<usize>();
+    let (out, rest) = out.as_chunks_mut::<R>();
+    let mut left = entries;
+    for now in out {
+        let (panel, later) = left.split_at(size);
+        *now = sums(panel.as_chunks().0, parts);
+        left = later;
     }
-    (entries, out)
+    (left, rest)
 }
 
 /// The sums of `R` rows. The first product starts a sum: −0 is the number that changes nothing when added, not even a −0.

@@ -168,7 +168,11 @@ fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
 impl TapeRates {
     /// For so many members side by side.
     pub fn new(rated: Arc<Rated>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
-        let load = |stage: &Stage| Loaded::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
+        let load = |stage: &Stage| {
+            let kit = stage.kit_of(level, lanes);
+            kit.runner.write(); // who takes the trouble to trace rates is going to need them often
+            Loaded::with(stage, kit, spec, clock, f64::INFINITY)
+        };
         let aside = rated.record.as_ref().map_or(0, |(stage, _)| stage.split.body.next.len());
         TapeRates {
             lanes,

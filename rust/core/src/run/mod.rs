@@ -1,6 +1,6 @@
 //! The driver: many members, some threads, what to keep, and who diverged. It knows nothing of the systems that it steps.
 
-pub mod aligned;
+pub use stepwell_base::aligned;
 pub mod batch;
 pub mod chosen;
 pub mod compiled;
@@ -66,11 +66,12 @@ impl Model<'_> {
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
-        // Tapes of rates are traced and written before they are quicker.
-        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64;
+        // Tapes of rates are traced and written before they are quicker, unless they are there from before.
+        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64 || traced.is_rated();
+        let is_long = |long: Long| rates >= long.from.0 || step >= long.from.1;
         match long {
-            Some(long) if lone && rates >= long.from => Way::Long(long),
-            Some(long) if large && (rates >= long.beside || members <= ALONE && rates >= long.from || !pays()) => Way::Long(long),
+            Some(long) if lone && is_long(long) => Way::Long(long),
+            Some(long) if large && (rates >= long.beside || members <= ALONE && is_long(long) || !pays()) => Way::Long(long),
             _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
@@ -143,6 +144,6 @@ enum Way {
 const LONE_MAP: usize = 2 * 9 * 9;
 const MAP: usize = 2 * 24 * 24;
 /// Tapes of rates pay if rates are asked for so often for each of their operations, by all members together.
-const WORTH_A_TAPE: usize = 5;
+const WORTH_A_TAPE: usize = 1;
 /// So many members of a large system are as quick one by one as side by side.
 const ALONE: usize = 4;

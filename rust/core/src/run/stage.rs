@@ -282,6 +282,7 @@ impl Loaded {
     }
 
     /// One step of a state at a time.
+    #[inline]
     pub fn advance_at(&mut self, stage: &Stage, t: f64, state: &mut [f64]) {
         if stage.split.entries.is_empty() {
             self.steps(1, &[], state);
@@ -294,6 +295,7 @@ impl Loaded {
         self.moment = table;
     }
 
+    #[inline]
     fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [f64]) {
         let (kernel, written) = self.kit.runner.kernel(steps);
         if self.pool_for != Some(written) {

@@ -19,7 +19,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |given| (given.word("kind") != "acceleration").then_some("rates of another kind"),
     quantities: |_| Vec::new(),
     operations: |given| 2 * given.count("rows"),
-    long: Some(Long { from: 2 * 14 * 14, beside: 2 * 150 * 150, make: linear::make }),
+    long: Some(Long { from: (2 * 19 * 19, usize::MAX), beside: 2 * 150 * 150, make: linear::make }),
     numbers: make,
     symbols: make,
 };

@@ -28,7 +28,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |_| None,
     quantities,
     operations: |given| 11 * given.count("masses").pow(2),
-    long: Some(Long { from: 11 * 8 * 8, beside: 11 * 106 * 106, make: bodies::make }),
+    long: Some(Long { from: (11 * 10 * 10, usize::MAX), beside: 11 * 106 * 106, make: bodies::make }),
     numbers: make::<f64>,
     symbols: make,
 };

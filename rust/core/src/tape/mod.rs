@@ -8,9 +8,10 @@
 
 pub mod eval;
 pub mod print;
+pub mod quick;
 pub mod split;
 
-use std::collections::HashMap;
+use self::quick::QuickMap;
 
 /// A value on a tape, by the number of the operation that makes it.
 pub type Id = u32;
@@ -174,7 +175,7 @@ impl Counts {
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     ops: Vec<Op>,
-    seen: HashMap<Op, Id>,
+    seen: QuickMap<Op, Id>,
     /// Of each value: whether it is surely not −0.
     not_minus_zero: Vec<bool>,
     /// What was asked for, before equal operations were merged.

@@ -4,9 +4,9 @@
 //! of a drive that all have in common). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
 //! last of them is in the hot loop.
 
-use std::{collections::HashMap, hash::Hash};
+use std::hash::Hash;
 
-use super::{Id, Op, Tape};
+use super::{Id, Op, Tape, quick::QuickMap};
 
 /// Operations over lanes: what an interpreter or a kernel writer takes.
 ///
@@ -57,7 +57,7 @@ impl Body {
             }
         }
         let mut place = vec![0; tape.ops().len()];
-        let mut known: HashMap<Op, Id> = HashMap::new();
+        let mut known: QuickMap<Op, Id> = QuickMap::default();
         let mut body = Body::default();
         for id in (0..tape.ops().len()).filter(|id| needed[*id]) {
             let op = leaves[id].unwrap_or_else(|| tape.ops()[id].with(|operand| place[operand as usize]));
@@ -68,6 +68,29 @@ impl Body {
         }
         body.next = roots.iter().map(|root| place[*root as usize]).collect();
         body
+    }
+
+    /// Numbers the leaves of a kind in the order in which they are read: memory is quickest so. `list` is what they are.
+    fn sort_leaves(&mut self, list: &mut Vec<Id>, is: impl Fn(Op) -> bool, leaf: impl Fn(u32) -> Op) {
+        let mut order: Vec<Id> = Vec::with_capacity(list.len());
+        let mut seen = vec![false; self.ops.len()];
+        for op in &self.ops {
+            let (operands, n) = op.operands();
+            for id in &operands[..n] {
+                if is(self.ops[*id as usize]) && !std::mem::replace(&mut seen[*id as usize], true) {
+                    order.push(*id);
+                }
+            }
+        }
+        // Those that nobody reads are next values themselves.
+        order.extend((0..self.ops.len() as Id).filter(|id| is(self.ops[*id as usize]) && !seen[*id as usize]));
+        let old = std::mem::take(list);
+        for id in order {
+            if let Op::Row(i) | Op::Uniform(i) = self.ops[id as usize] {
+                self.ops[id as usize] = leaf(list.len() as u32);
+                list.push(old[i as usize]);
+            }
+        }
     }
 
     /// Puts a copy in the place of a next value that is a leaf or that another number of the state has too.
@@ -210,19 +233,15 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         },
     });
     let behind = |place: u32| if place > u32::MAX / 2 { entries.len() as u32 + (u32::MAX - place) } else { place };
-    // Rows and uniforms stand in the order in which they are read: memory is quickest so.
-    let turned = |i: u32, list: &[Id]| list.len() as u32 - 1 - i;
     for op in &mut split.body.ops {
         *op = match *op {
-            Op::Row(i) => Op::Row(turned(i, &rows)),
-            Op::Uniform(i) => Op::Uniform(turned(i, &uniforms)),
             Op::PerStep(i) => Op::PerStep(behind(i)),
             Op::Held(i) => Op::Held(behind(i)),
             other => other,
         };
     }
-    rows.reverse();
-    uniforms.reverse();
+    split.body.sort_leaves(&mut rows, |op| matches!(op, Op::Row(_)), Op::Row);
+    split.body.sort_leaves(&mut uniforms, |op| matches!(op, Op::Uniform(_)), Op::Uniform);
     split.body = std::mem::take(&mut split.body).finished();
 
     // Numbers of samples are found like other values.
@@ -252,12 +271,12 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
 /// Things in the order in which they were asked for, each once.
 struct Places<T> {
     list: Vec<T>,
-    known: HashMap<T, u32>,
+    known: QuickMap<T, u32>,
 }
 
 impl<T> Default for Places<T> {
     fn default() -> Self {
-        Places { list: Vec::new(), known: HashMap::new() }
+        Places { list: Vec::new(), known: QuickMap::default() }
     }
 }
 
