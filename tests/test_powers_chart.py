@@ -61,11 +61,11 @@ def test_errors_are_those_of_exact_arithmetic(method: str) -> None:
 
 
 def test_a_power_costs_little_and_errs_like_steps() -> None:
-    """20 squarings for a million steps. Each rounds P by some 2⁻⁵³ of its size, and n of these add up: errors below 8·n·2⁻⁵³."""
-    chart = powers(steps=[10, 10**6])
+    """24 squarings for ten million steps. Each rounds P by some 2⁻⁵³ of its size, and n of these add up: errors below 8·n·2⁻⁵³."""
+    chart = powers(steps=[10, 10**7])
     assert (chart.errors["power"] < 8 * chart.steps * 2.0**-53).all()
     assert chart.errors["power"][1] > 0
-    # A coarse ratio: 30 when measured.
+    # A coarse ratio: 28 when measured. Of a million steps it is 3 to 10 since the matrix form is machine code, 3 ns a step.
     assert chart.seconds["matrix"][1] > 3 * chart.seconds["power"][1]
 
 
