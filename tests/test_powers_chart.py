@@ -61,7 +61,7 @@ def test_errors_are_those_of_exact_arithmetic(method: str) -> None:
 
 
 def test_a_power_costs_little_and_errs_like_steps() -> None:
-    """24 squarings for ten million steps. Each rounds P by some 2⁻⁵³ of its size, and n of these add up: errors below 8·n·2⁻⁵³."""
+    """24 squarings for ten million steps. Each rounds P by about 2⁻⁵³ of its size, n of them add up: errors below 8·n·2⁻⁵³."""
     chart = powers(steps=[10, 10**7])
     assert (chart.errors["power"] < 8 * chart.steps * 2.0**-53).all()
     assert chart.errors["power"][1] > 0
