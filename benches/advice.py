@@ -37,8 +37,8 @@ RATIO, POWER, LAST = 1.04, 5, 1e-15
 #: States of a run that are compared with the truth: a few are enough to refuse it, many to take it.
 SOME, ALL = 200, 50_000
 
-#: A run with a tolerance is asked for its state at so many even times, and in so many further runs at as many others, which are
-#: even in the path's length.
+#: A run with a tolerance is asked for its state at so many even times, and at so many times as many others, which are even in the
+#: path's length.
 ASKED, OTHERS = 10, 24
 
 #: The table of the true motion is as close to it as this, in the largest lengths.
@@ -83,7 +83,9 @@ class Brute:
         else:
             self.end = min(self.end, known.until)
         horizon = min(horizon, self.end)
-        self.given, self.frame, self.ratio = scene, frame, ratio
+        # Advice for less may know the motion for longer; it is asked for what is known here.
+        self.given = replace(scene, horizon=horizon) if horizon < scene.horizon else scene
+        self.frame, self.ratio = frame, ratio
         exact, last = known.exact, min(self.end, known.until)
         scales = replace(known, horizon=horizon).scales
         table = tabled(exact, last, scales, CLOSE)
@@ -92,8 +94,8 @@ class Brute:
         for a, b, scale in zip(table(times), exact(times), scales, strict=True):
             assert np.abs(a - b).max(initial=0.0) <= 10 * CLOSE * scale
         self._errors: dict[tuple[Any, ...], float] = {}
-        self._paced: dict[str, list[Try]] = {}
-        self._others: dict[tuple[str, float], list[float]] = {}
+        self._adaptive: dict[str, list[Try]] = {}
+        self._others: dict[tuple[str, float], float] = {}
 
     # ---- fixed steps
 
@@ -131,7 +133,7 @@ class Brute:
                 return Try(name, n, None, cost, self.error(name, dt, n))
         return None
 
-    # ---- steps of chosen length
+    # ---- adaptive steps
 
     def asked(self) -> Any:
         """When a run with a tolerance is asked for its state: at the frames, or at ten even times."""
@@ -139,31 +141,31 @@ class Brute:
             return self.frame * np.arange(1.0, self.frames + 1)
         return np.linspace(0.0, self.end, ASKED + 1)[1:]
 
-    def paced(self, method: str, tolerance: float) -> Try:
-        """A run with a tolerance, as wrong as the worst of it and of those that look between the times at which it is asked."""
+    def adaptive(self, method: str, tolerance: float) -> Try:
+        """A run with a tolerance, as wrong as it is anywhere."""
         return self.looked_between(self.judged(method, tolerance))
 
     def looked_between(self, judged: Try) -> Try:
-        """The run with the error of the worst of all that look between; one that is wrong altogether is left at that."""
+        """The run with the error of the worst of all times; one that is wrong altogether is left at that."""
         assert judged.tolerance is not None
         if judged.error > 1.0:
             return judged
-        return judged._replace(error=max(judged.error, *self.others(judged.method, judged.tolerance)))
+        return judged._replace(error=max(judged.error, self.between(judged.method, judged.tolerance)))
 
     def judged(self, method: str, tolerance: float) -> Try:
         """The run itself, as wrong as it is at the times at which it is asked."""
         run = self._integrated(method, tolerance, self.asked())
         assert run.paces is not None
-        tried = int(run.paces.accepted + run.paces.rejected)
+        tried = int(run.paces.evaluations) // sw.method(method).evaluations - 2 * (len(self.asked()) - 1) * (self.frame is None)
         error = math.inf if run.status else float(self.scene.state_error(run).max())
         return Try(method, tried, tolerance, tried * self.prices[f"{method}, tolerance"], error)
 
-    def others(self, method: str, tolerance: float) -> list[float]:
-        """The errors of runs that are asked at other times as well; each of these ends a step, so each is another run."""
+    def between(self, method: str, tolerance: float) -> float:
+        """The largest error of the run at the times between."""
         if (method, tolerance) not in self._others:
-            times = (np.union1d(self.asked(), self._between[i::OTHERS]) for i in range(OTHERS))
-            errors = [float(self.scene.state_error(self._integrated(method, tolerance, at)).max()) for at in times]
-            self._others[method, tolerance] = errors
+            self._others[method, tolerance] = float(
+                self.scene.state_error(self._integrated(method, tolerance, self._between)).max()
+            )
         return self._others[method, tolerance]
 
     @functools.cached_property
@@ -188,7 +190,7 @@ class Brute:
         for method in sw.methods():
             if method.error_order is None or self.scene.control is not None:
                 continue
-            kept = self._paced.setdefault(method.name, [])
+            kept = self._adaptive.setdefault(method.name, [])
             while not kept or kept[-1].cost <= most or kept[-1].error == math.inf:
                 following = self.ratio ** (-POWER * len(kept))
                 if following < LAST:
@@ -203,14 +205,14 @@ class Brute:
 
     def best(self, tolerance: float, most: float) -> Try | None:
         """The cheapest of all that costs no more than ``most``, or None."""
-        paced = self.chosen(tolerance, most)
-        return self.fixed(tolerance, most if paced is None else paced.cost) or paced
+        adaptive = self.chosen(tolerance, most)
+        return self.fixed(tolerance, most if adaptive is None else adaptive.cost) or adaptive
 
     def advised(self, row: Row) -> float:
         """The error of a row of advice, run in full."""
         if row.tolerance is None:
             return self.error(row.method.name, row.dt, row.steps)
-        return self.paced(row.method.name, row.tolerance).error
+        return self.adaptive(row.method.name, row.tolerance).error
 
     def _able(self, method: Method) -> bool:
         with warnings.catch_warnings():

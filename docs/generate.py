@@ -31,7 +31,7 @@ def or_dash(names: Iterable[str]) -> str:
 
 def methods() -> str:
     """What each method is, costs and stands."""
-    head = "name", "title", "standard name", "order", "rate evaluations", "stable for Φ below"
+    head = "name", "title", "standard name", "order", "function evaluations", "stable for Φ below"
     return table(
         head,
         (
@@ -108,7 +108,7 @@ def deviations() -> str:
 
 def operations() -> str:
     """What a step of the undamped oscillator takes."""
-    head = "method", "additions", "products", "quotients", "roots", "rate evaluations"
+    head = "method", "additions", "products", "quotients", "roots", "function evaluations"
     rows = []
     for c in sw.criteria():
         o = c.operations

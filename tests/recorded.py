@@ -89,9 +89,9 @@ def hashes(kept: Arrays) -> list[str]:
 
 
 def made(recorded: Recorded, backend: str = "rust") -> Arrays:
-    """The arrays; a warning of members that diverge or stop is no news here."""
+    """The arrays; a warning of members that diverge, stop or go astray is no news here."""
     with warnings.catch_warnings():
-        for kind in (sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning):
+        for kind in (sw.AccuracyWarning, sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning):
             warnings.simplefilter("ignore", kind)
         return recorded.make(backend)
 
@@ -224,7 +224,7 @@ def quantities() -> Iterator[Recorded]:
         )
 
 
-#: Systems for steps of chosen length.
+#: Systems for adaptive steps.
 PACED: dict[str, Callable[[Any, tuple[int, ...]], sw.System]] = {
     "oscillator": lambda r, b: sw.Oscillator(r.uniform(0.5, 2.0, b)),
     "oscillator, damped, physical": lambda r, b: sw.Oscillator(r.uniform(0.5, 2.0, b), 0.3, form="physical"),
@@ -251,7 +251,7 @@ def _decaying(rng: Any, n: int, scale: float = 0.5) -> Any:
 
 
 def paced() -> Iterator[Recorded]:
-    """Steps of chosen length, each member with a tolerance of its own."""
+    """Adaptive steps, each member with a tolerance of its own."""
     loose = np.array([1e-2, 1e-5, 1e-3, 1e-9, 1e-4, 1e-7, 1e-6])
     for i, (system, method) in enumerate(itertools.product(PACED, ABLE)):
         members = BATCHES[(i + i // len(ABLE)) % (5 if not system.startswith("thirty-five") else 3)]

@@ -1,4 +1,4 @@
-"""Steps of chosen length: the reference's bits, every member at its own pace, errors that follow the tolerance."""
+"""Adaptive steps: the reference's bits, every member at its own pace, errors that follow the tolerance."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_every_level_and_number_of_threads(monkeypatch: pytest.MonkeyPatch, leve
 
 @pytest.mark.parametrize("method", ABLE)
 def test_a_hard_member_changes_nobody(method: str) -> None:
-    """Alone, or beside an orbit that needs more than twice the steps: the same states, the same steps."""
+    """Alone, or beside an orbit that needs many more steps: the same states, the same steps."""
     e = np.where(np.arange(40) % 8 == 3, 0.995, 0.1)
     system, state = kepler(e)
     ask: dict[str, Any] = {"tolerance": 1e-7, "at": [3.0, 6.0]}
@@ -81,12 +81,14 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
         assert whole.paces is not None
         assert alone.paces.accepted == whole.paces.accepted[member]
         assert alone.paces.h == whole.paces.h[member]
-    assert whole.paces.evaluations[3] > 2 * whole.paces.evaluations[0]
-    assert np.array_equal(whole.paces.evaluations, sw.method(method).evaluations * (whole.paces.accepted + whole.paces.rejected))
+    assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
+    # For each asked time the step that passes it is made twice, and an extra one.
+    tried = whole.paces.accepted + whole.paces.rejected + 2 * 2
+    assert np.array_equal(whole.paces.evaluations, sw.method(method).evaluations * tried)
 
 
 @pytest.mark.parametrize("method", ABLE)
-@pytest.mark.parametrize(("orbit", "coarsest"), [("kepler", 4.0), ("arenstorf", 6.0)])
+@pytest.mark.parametrize(("orbit", "coarsest"), [("kepler", 5.0), ("arenstorf", 6.0)])
 def test_the_error_follows_the_tolerance(orbit: str, coarsest: float, method: str) -> None:
     """Over six decades, after one period.
 
@@ -105,27 +107,202 @@ def test_the_error_follows_the_tolerance(orbit: str, coarsest: float, method: st
     assert (np.abs(np.log10(errors) - np.polyval(line, np.log10(tolerances))) < 1.0).all(), errors
 
 
-def test_times_are_reached_exactly() -> None:
-    """However close they lie, and whatever the step: each state is that of its very time."""
+def test_each_state_is_that_of_its_time() -> None:
+    """However close they lie, and whatever the step."""
     times = np.array([0.0, 1e-9, 0.1, 0.1 + 1e-12, 0.3, 7.0, 7.0 + 2e-15 * 7])
     run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=1e-12, at=times)
     assert np.array_equal(run.t, times)
     assert run.y[0] == 1.0
     assert run.paces is not None
-    # A step adds tolerance·(1 + length) to a block at most, lengths are 1 at most, and an oscillator keeps errors as they are.
-    assert np.abs(run.y - np.cos(times)).max() < 1e-12 * 2 * np.sqrt(2) * float(run.paces.accepted)
-    assert run.paces.t == times[-1]
+    # A step adds the tolerance times 1, the longest that a block may be, to both at most, and an extra one as much; an
+    # oscillator keeps errors as they are.
+    assert np.abs(run.y - np.cos(times)).max() < 1e-12 * np.sqrt(2) * (float(run.paces.accepted) + 1)
+    assert run.paces.t <= times[-1] < run.paces.t + run.paces.h
 
 
-def test_asking_more_often_costs_steps_and_keeps_the_accuracy() -> None:
-    few, many = (
-        sw.integrate(sw.Oscillator(1.0), "fehlberg_5", v=0.0, y=1.0, tolerance=1e-8, at=np.linspace(0, 10, n)) for n in (2, 101)
-    )
-    assert few.paces is not None
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", ABLE)
+def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend: str) -> None:
+    """Alone, among many, at the very end of a step, or as the last: the same bits, and the same steps."""
+    system, state = kepler(np.array([0.3, 0.7, 0.0]))
+    times = np.sort(np.random.default_rng(3).uniform(0.0, 20.0, 40))
+    ask: dict[str, Any] = {"tolerance": np.array([1e-2, 1e-4, 1e-9]), "backend": backend} | state
+    many = sw.integrate(system, method, at=times, **ask)
+    for i in (0, 7, 21, 39):
+        alone = sw.integrate(system, method, at=times[[i]], **ask)
+        assert np.array_equal(alone.y[0], many.y[i])
+        assert np.array_equal(alone.v[0], many.v[i])
     assert many.paces is not None
-    assert few.paces.accepted < many.paces.accepted
-    for run in (few, many):
-        assert abs(run.y[-1] - np.cos(10.0)) < 1e-6
+    assert alone.paces is not None
+    for name in ("t", "h", "accepted", "rejected"):
+        assert np.array_equal(getattr(alone.paces, name), getattr(many.paces, name))
+    assert (alone.paces.evaluations < many.paces.evaluations).all()
+    # The step in which a run ends starts where the step before it ended: the state there is the one that is asked for there.
+    assert alone.stand is not None
+    for member, t in enumerate(alone.paces.t):
+        there = sw.integrate(system, method, at=[t], **ask)
+        assert np.array_equal(there.y[0][..., member], alone.stand.y[..., member])
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize(
+    "name", ["pendulum", "three bodies", "sampled x and a, physical", "chain of nineteen", "sixty-four bodies"]
+)
+def test_in_pieces(name: str, backend: str) -> None:
+    """A run that goes on is the run that was never interrupted, in all that it says; by either backend."""
+    method = ABLE[len(name) % len(ABLE)]
+    rng = np.random.default_rng(7)
+    if name == "sixty-four bodies":
+        system: sw.System = sw.NBody(np.ones(64) / 64, force="newton", softening=0.3, dim=2)
+        ask: dict[str, Any] = {"v": 0.1 * rng.normal(size=(64, 2)), "y": rng.normal(size=(64, 2)), "tolerance": 1e-4}
+    else:
+        system = SYSTEMS[name](rng, MEMBERS)
+        ask = start(system, rng) | {"tolerance": 10.0 ** rng.uniform(-7, -2, MEMBERS)}
+    times = [0.0, 0.05, 0.11, 0.3, 0.3 + 1e-9, 0.5]
+    whole = sw.integrate(system, method, at=times, backend=backend, **ask)
+    for cut in (1, 3, 5):
+        first = sw.integrate(system, method, at=times[:cut], **ask)
+        rest = sw.integrate(system, method, at=times[cut:], backend=backend, **first.resume)
+        assert np.array_equal(np.concatenate([first.y, rest.y]), whole.y)
+        assert np.array_equal(np.concatenate([first.v, rest.v]), whole.v)
+        for ours, theirs in zip(rest.paces, whole.paces, strict=True):  # type: ignore[arg-type]
+            assert np.array_equal(ours, theirs)
+
+
+def test_what_stopped_goes_on_with_more_steps() -> None:
+    system, state = kepler(np.array([0.1, 0.99]))
+    ask: dict[str, Any] = {"tolerance": 1e-6} | state
+    whole = sw.integrate(system, "merson", at=[1.0, 6.0], **ask)
+    with pytest.warns(sw.ToleranceWarning, match="out of max_steps"):
+        first = sw.integrate(system, "merson", at=[1.0], max_steps=40, **ask)
+    assert first.status.tolist() == [Status.OK, Status.BUDGET]
+    rest = sw.integrate(system, "merson", at=[6.0], **first.resume)
+    assert np.array_equal(rest.y[-1], whole.y[-1])
+    assert np.array_equal(rest.paces.accepted, whole.paces.accepted)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"tolerance": 1e-3}, "tolerance: given twice"),
+        ({"dt": 0.1}, "dt: the run that goes on has its next step already"),
+        ({"at": [0.5]}, "at: expected times that ascend from the last time of the run that goes on, 1, on"),
+        ({"method": "dop853"}, "carry: expected that of a run by merson"),
+        ({"v": np.zeros(2)}, "carry: expected that of a run of batch"),
+        ({"carry": 3.0}, "carry: with a tolerance expected that of run.resume, got float"),
+        ({"at": None, "dt": 0.1, "steps": 3}, "carry: it is that of a run with a tolerance"),
+    ],
+)
+def test_what_does_not_go_on(more: dict[str, Any], message: str) -> None:
+    run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0])
+    given: dict[str, Any] = {"method": "merson", "at": [2.0]} | run.resume | more
+    if "method" in more:
+        given["method"], message = "dop853", "carry: expected that of a run by dop853, got one by merson"
+    with pytest.raises(ArgumentError, match=message):
+        sw.integrate(sw.Oscillator(1.0), **given)
+
+
+# ---- amplitudes and units
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", ABLE)
+def test_a_linear_run_scales_with_its_start_to_the_bit(method: str, backend: str) -> None:
+    """Multiplied by 2^k, everything is multiplied by 2^k: sums, products with constants, lengths and their quotients all are.
+
+    Of squares of lengths times the square of a tolerance of 1e-6 the least here is 2^−160·1e-24 or so, far above 2^−1022.
+    """
+    chain = sw.Chain(3, stiffness=[1.0, 30.0, 2.0, 1.0])
+    times = np.linspace(0.0, 30.0, 8)[1:]
+    for v, y in (([0.0, 1.0, -0.3], [0.2, 0.0, 0.1]), ([0.0] * 3, [0.0, 1.0, 0.0]), ([0.1, 0.0, 0.0], [0.0] * 3)):
+        ask: dict[str, Any] = {"tolerance": 1e-6, "at": times, "backend": backend}
+        one = sw.integrate(chain, method, v=np.array(v), y=np.array(y), **ask)
+        for k in (-40, -3, 40):
+            other = sw.integrate(chain, method, v=2.0**k * np.array(v), y=2.0**k * np.array(y), **ask)
+            assert np.array_equal(other.y, 2.0**k * one.y)
+            assert np.array_equal(other.v, 2.0**k * one.v)
+            assert other.paces == one.paces
+
+
+def test_a_run_does_not_depend_on_the_units() -> None:
+    """An orbit in other lengths and times, powers of two: the same steps, and v and y as much larger, to the bit."""
+    system, state = kepler(0.6)
+    one = sw.integrate(system, "dop853", tolerance=1e-9, at=[1.0, 6.0], **state)
+    for length, time in ((2.0**37, 1.0), (1.0, 2.0**24), (2.0**-30, 2.0**-11)):
+        other = sw.NBody([1.0, 0.0], G=length**3 / time**2, force="newton")
+        ask: dict[str, Any] = {"v": state["v"] * (length / time), "y": state["y"] * length}
+        run = sw.integrate(other, "dop853", tolerance=1e-9, at=np.array([1.0, 6.0]) * time, **ask)
+        assert np.array_equal(run.y, one.y * length)
+        assert np.array_equal(run.v, one.v * (length / time))
+
+
+@pytest.mark.parametrize("method", ABLE)
+@pytest.mark.parametrize("amplitude", [1e-12, 1e-9, 1.0, 1e12])
+def test_errors_are_relative_to_the_motion(method: str, amplitude: float) -> None:
+    """From a start of any length, and from rest under a force of any strength.
+
+    A step errs by the tolerance of the longest in both blocks at most, which an oscillator keeps.
+    """
+    tolerance = 1e-4
+    run = sw.integrate(sw.Oscillator(1.0), method, v=0.0, y=amplitude, tolerance=tolerance, at=[100.0])
+    assert run.paces is not None
+    assert abs(run.y[-1] / amplitude - np.cos(100.0)) < np.sqrt(2) * tolerance * (run.paces.accepted + 1)
+    driven = sw.Oscillator(1.0, a=sw.Sinusoid(amplitude, 2.0), form="physical")
+    run = sw.integrate(driven, method, v=0.0, y=0.0, tolerance=tolerance, at=[20.0])
+    assert run.paces is not None
+    longest = 1.5  # (2·sin t − sin 2t)/3 is shorter than 1, and its rate than 4/3
+    assert (
+        abs(run.y[-1] / amplitude - (2 * np.sin(20.0) - np.sin(40.0)) / 3) < longest * tolerance * (run.paces.accepted + 1) * 1.5
+    )
+
+
+@pytest.mark.parametrize("method", ABLE)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("rest", [0.0, 0.25 / 0.49])
+def test_what_is_pushed_out_of_a_rest(rest: float, tolerance: float, method: str) -> None:
+    """At zero, or where forces cancel but for rounding: no length tells what error is small, and neither stops the run.
+
+    The push is seen though it comes late and is short, for no step passes over a sample. It is known to within a millionth of the
+    interval (see ``Sampled``), and a step that ends on each of its sides errs by the tolerance; an oscillator of ω = 0.7 makes at
+    most 1/0.7 of an error of v.
+    """
+    omega, load = 0.7, rest * 0.49
+    force = np.full(300, load)
+    force[250] += 1.0
+    system = sw.Oscillator(omega, a=sw.Sampled(force, 0.1), form="physical")
+    run = sw.integrate(system, method, v=0.0, y=rest * (1 + 3e-16), tolerance=tolerance, at=[20.0, 40.0])
+    assert run.status == Status.OK
+    assert abs(run.y[0] - rest) < 1e-14
+    pushed = (np.cos(omega * (40.0 - 25.1)) - np.cos(omega * (40.0 - 25.0))) / omega**2
+    assert run.paces is not None
+    longest = max(rest, 0.2)
+    assert abs(run.y[-1] - rest - pushed) < longest / omega * tolerance * (run.paces.accepted + 1) + 1e-6
+
+
+def test_an_absolute_tolerance_in_which_the_motion_is_lost_is_warned_of() -> None:
+    ask: dict[str, Any] = {"v": 0.0, "y": np.array([1.0, 1e-9, 0.0]), "at": [10.0]}
+    with pytest.warns(sw.ToleranceWarning, match=r"for 1 of 3 member\(s\) the absolute part lets a step err by more than 0.01"):
+        sw.integrate(sw.Oscillator(1.0), "merson", tolerance=(1e-3, 1e-3), **ask)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.integrate(sw.Oscillator(1.0), "merson", tolerance=(1e-9, 1e-6), **ask | {"y": 1.0})
+        sw.integrate(sw.Oscillator(1.0), "merson", tolerance=(1e-3, 1e-15), **ask)
+
+
+def test_lengths_whose_squares_overflow_are_not_let_pass() -> None:
+    with pytest.warns(sw.ToleranceWarning, match="gives finite numbers"):
+        run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1e160, tolerance=1e-3, at=[10.0])
+    assert run.status == Status.NOT_FINITE
+
+
+def test_the_first_step_is_that_of_the_start() -> None:
+    """A hundredth of the time in which the start changes: |v|/|v̇|, |y|/|ẏ|, √(|y|/|v̇|); a millionth where it is at rest."""
+    for v, y, first in ((0.0, 1.0, 0.005), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0025), (0.0, 0.0, 1e-6)):
+        run = sw.integrate(sw.Oscillator(2.0, form="physical"), "merson", v=v, y=y, tolerance=1e-3, at=[0.0])
+        assert run.paces is not None
+        if (v, y) == (1.0, 0.0):
+            first = 1e-6  # nothing pulls and nowhere is the measure
+        assert run.paces.h == pytest.approx(first, rel=1e-14)
 
 
 def test_out_of_steps() -> None:
@@ -165,7 +342,7 @@ def test_rates_that_are_not_finite() -> None:
 
 
 def test_fehlberg_pumps_and_merson_does_not() -> None:
-    """FACTS of the undamped oscillator, with steps chosen: Fehlberg's energy grows all the time, Merson's falls."""
+    """FACTS of the undamped oscillator, with adaptive steps: Fehlberg's energy grows all the time, Merson's falls."""
     energy = {}
     for method in ABLE:
         run = sw.integrate(sw.Oscillator(1.0), method, v=0.0, y=1.0, tolerance=1e-5, at=np.linspace(0, 2000, 5), record="energy")
@@ -179,9 +356,9 @@ def test_each_member_its_tolerance() -> None:
     run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=np.array([1e-4, 1e-8]), at=[10.0])
     assert run.paces is not None
     assert run.paces.accepted[1] > 4 * run.paces.accepted[0]
-    pair = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=(1e-4, np.array([1e-4, 1e-8])), at=[10.0])
+    pair = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=(1e-8, np.array([1e-4, 1e-8])), at=[10.0])
     assert pair.paces is not None
-    assert np.array_equal(pair.y[..., 0], run.y[..., 0])
+    assert pair.paces.accepted[1] > 4 * pair.paces.accepted[0]
 
 
 @pytest.mark.parametrize(
@@ -189,6 +366,7 @@ def test_each_member_its_tolerance() -> None:
     [
         ({"method": "rk4"}, UnsupportedError, "rk4 does not estimate its error.*merson"),
         ({"tolerance": None}, ArgumentError, "tolerance: expected too"),
+        ({"tolerance": (np.ones(2), np.ones(3))}, ArgumentError, "do not broadcast"),
         ({"at": None}, ArgumentError, "at: expected too"),
         ({"tolerance": 0.0}, ArgumentError, "tolerance: expected numbers above zero"),
         ({"tolerance": (1e-3, 1e-3, 1e-3)}, ArgumentError, "expected a number or a pair"),
@@ -214,8 +392,6 @@ def test_fixed_steps_need_dt_and_steps() -> None:
         sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0)
 
 
-def test_such_a_run_has_no_resume() -> None:
+def test_such_a_run_says_so() -> None:
     run = sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0])
-    with pytest.raises(UnsupportedError, match="resume"):
-        _ = run.resume
     assert "with a tolerance" in repr(run)

@@ -45,9 +45,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (tree / name).write_text(text, encoding="utf-8")
     for name, change in CHANGES.findall(page):
         (tree / name).write_text(changed((tree / name).read_text(encoding="utf-8"), change), encoding="utf-8")
-    # In the target folder of the project, where what the core is made of is compiled already; the copy's core is another package
-    # there. The library itself takes the place of the project's, until cargo is next asked for that.
-    target = os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))
+    # In a target folder of its own, which is kept: cargo takes the copy's core for the project's, and the lists of files that
+    # build.rs has made for the one would be found by the other.
+    target = str(Path(os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))) / "adding")
     build = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", "dist"]
     subprocess.run(build, cwd=tree, env=os.environ | {"CARGO_TARGET_DIR": target}, check=True)
     (wheel,) = (tree / "dist").glob("*.whl")

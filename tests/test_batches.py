@@ -194,7 +194,7 @@ def test_a_sample_is_not_missed_by_rounding() -> None:
 def test_a_run_says_what_it_is() -> None:
     run = sw.integrate(FREE, "false_euler", v=0.0, y=1.0, dt=0.3, steps=2)
     assert repr(run) == (
-        "<run of Oscillator(omega=1.0, form='canonical') by false_euler: 2 steps of 0.3 from t = 0.6, 1 kept, "
+        "<run of Oscillator(omega=1.0, form='canonical') by false_euler: 2 steps of 0.3 from t = 0.6, 1 saved, "
         "1 member(s), 0 diverged>"
     )
 
@@ -270,7 +270,7 @@ def test_collisions_say_who_met_whom_and_when() -> None:
 
 
 def test_a_warning_does_not_run_a_long_run_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["stepwell.integrate"], "QUICK", 0)  # the name alone is the function
+    monkeypatch.setattr(sys.modules["stepwell.integrate"], "MAX_RERUN", 0)  # the name alone is the function
     equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     with pytest.warns(sw.DivergenceWarning) as caught:
         run = sw.integrate(sw.NBody(), "rk4", v=0.0, y=equal, dt=0.01, steps=3)

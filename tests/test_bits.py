@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +141,9 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
     for path in files:
         code = path.read_text().split("#[cfg(test)]")[0]
         lines = [line.split("//")[0] for line in code.splitlines()]
-        found = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in forbidden if word in line]
+        # What a fused multiply-add is, is said in one place; only a tape that was fused has some.
+        wrong = [word for word in forbidden if (word, path.name) != ("mul_add", "eval.rs")]
+        found = [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) for word in wrong if word in line]
         if path.name not in ("isa.rs", "pages.rs"):
             found += [f"{path.name}:{i}: {line}" for i, line in enumerate(lines, 1) if "unsafe" in line]
         assert not found
@@ -148,11 +151,16 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
 
 def test_the_reference_sums_in_a_written_order() -> None:
     """NumPy's sum, dot and matmul reorder; ``**`` is not a product. The reference may use none of them."""
-    forbidden = (".sum(", ".dot(", " @ ", "einsum", "**", "np.sin", "np.cos", "math.sin", "math.cos", "fma")
+    forbidden = (".sum(", ".dot(", " @ ", "einsum", "np.sin", "np.cos", "math.sin", "math.cos", "fma")
     folder = Path(sw.__file__).parent / "reference"
     for path in sorted(folder.rglob("*.py")):
-        text = path.read_text()
-        assert not [word for word in forbidden if word in text], path.name
+        # The file on fused multiply-adds has one of its own, of exact sums and products. Constants may be powers of two.
+        wrong = [word for word in forbidden if (word, path.name) != ("fma", "fused.py")]
+        text = re.sub(r"2\.0\*\*-?\d+", "", path.read_text())
+        assert not [word for word in wrong if word in text], path.name
+        assert not re.search(r"[\w)\]] ?\*\*", text), (
+            path.name
+        )  # of a number: that of arguments stands after a comma or a bracket
 
 
 def test_every_variant_is_tried() -> None:

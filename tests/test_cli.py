@@ -114,7 +114,7 @@ def test_run_writes_the_kept_states(capsys, tmp_path):
     assert [float(row["state_error"]) for row in rows] == sw.scenes.clover().state_error(run).tolist()
 
 
-def test_run_draws_a_picture_or_a_film(capsys, tmp_path):
+def test_run_draws_a_picture_or_an_animation(capsys, tmp_path):
     starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF", "gif": b"GIF89a", "html": b"\n<link"}
     for ending, start in starts.items():
         path = tmp_path / f"run.{ending}"
@@ -124,6 +124,13 @@ def test_run_draws_a_picture_or_a_film(capsys, tmp_path):
         assert (code, err, report["written"]) == (0, "", str(path))
         assert report["kept"] == report["steps"] + 1  # all of them, for a smooth curve
         assert path.read_bytes().startswith(start)
+
+
+def test_run_takes_fused_multiply_adds(capsys):
+    words = ("run", "kepler", "--method", "rk4", "--dt", "0.1", "--steps", "50", "--json")
+    plain, fused = (json.loads(told(capsys, *words, *more)[1]) for more in ((), ("--fused",)))
+    run = sw.scenes.kepler().run("rk4", 0.1, steps=50, fused=True)
+    assert fused["last_y"] == run.y[-1].tolist() != plain["last_y"]
 
 
 def test_run_takes_a_control(capsys):
@@ -249,6 +256,47 @@ def test_criteria_writes_a_file(capsys, tmp_path):
         assert text == wanted if wanted else json.loads(text)[0]["method"] == "rk4"
 
 
+# ---- explain
+
+
+def test_explain_says_what_explain_says(capsys, tmp_path):
+    explained = sw.explain(sw.Oscillator(), "false_euler")
+    assert told(capsys, "explain", "oscillator", "false_euler") == (0, f"{explained}\n", "")
+    code, out, err = told(capsys, "explain", "Oscillator", "false_euler", "--json")
+    assert (code, json.loads(out), err) == (0, json.loads(json.dumps(explained.as_dict())), "")
+    for name, text in (("a.txt", str(explained)), ("a.html", explained._repr_html_())):
+        assert told(capsys, "explain", "oscillator", "false_euler", "-o", str(tmp_path / name))[0] == 0
+        assert (tmp_path / name).read_text(encoding="utf-8") == text + "\n"
+    assert told(capsys, "explain", "oscillator", "false_euler", "-o", str(tmp_path / "a.json"))[0] == 0
+    assert json.loads((tmp_path / "a.json").read_text(encoding="utf-8")) == json.loads(json.dumps(explained.as_dict()))
+
+
+def test_explain_takes_a_scene_with_its_control(capsys):
+    scene = sw.scenes.energy_control()
+    wanted = sw.explain(scene.system.sized(scene.v, scene.y), "rk4", members=8, control=scene.control, fused=True)
+    assert told(capsys, "explain", "energy_control", "rk4", "--members", "8", "--fused") == (0, f"{wanted}\n", "")
+    code, out, _ = told(capsys, "explain", "Pendulum", "merson", "--attempt")
+    assert code == 0
+    assert "an attempt at a step of Pendulum" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["oscilator", "rk4"], "system: there is no 'oscilator'; expected a scene, arenstorf, "),
+        (["Chain", "rk4"], "system: Chain needs arguments"),
+        (["System", "rk4"], "system: there is no 'System'"),
+        (["oscillator", "rk5"], "method: there is no 'rk5'"),
+        (["oscillator", "rk4", "--members", "0"], "members: expected 1 or more, got 0"),
+        (["oscillator", "rk4", "-o", "a.pdf"], "-o: expected a file ending in .json, .html or .txt"),
+    ],
+)
+def test_explain_says_what_is_wrong(capsys, words, said):
+    code, out, err = told(capsys, "explain", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
 # ---- stability
 
 
@@ -328,7 +376,7 @@ def test_figures_writes_a_picture_for_each_method(capsys, tmp_path):
         (["run", "clover", "--method", "rk4", "--dt", "-1"], "dt: expected numbers above zero"),
         (["run", "clover", "--method", "rk4", "--steps", "0"], "steps: expected 1 or more"),
         (["run", "clover", "--method", "rk4", "--every", "0"], "every: expected 1 or more"),
-        (["run", "clover", "--method", "rk4", "-o", "run.txt"], "-o: expected a file ending in one of .csv, .npz, .png"),
+        (["run", "clover", "--method", "rk4", "-o", "run.txt"], "-o: expected a file ending in .csv, .npz, .png"),
         (["run", "forced_oscillator", "--method", "verlet"], "verlet needs forces that do not depend on the velocity"),
         (
             ["run", "oscillator", "--method", "rk4", "--control", "1"],

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -132,7 +134,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(dt=None),
         E.ArgumentError,
-        "dt: expected with fixed steps; or give tolerance= and at= for steps of chosen length",
+        "dt: expected with fixed steps; or give tolerance= and at= for adaptive steps",
     ),
     (lambda: run(steps=0), E.ArgumentError, "steps: expected 1 or more, got 0"),
     (lambda: run(steps=-5), E.ArgumentError, "steps: expected 1 or more, got -5"),
@@ -305,12 +307,12 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(sw.Oscillator(np.ones((10**6, 1)), np.ones(10**6))),
         E.TooLargeError,
-        "the kept states of 1000000000000 members need 2.98e+04 GiB, but this machine has",
+        "the saved states of 1000000000000 members need 1.04e+05 GiB, but ",
     ),
     (
         lambda: run(y=np.ones(1000), steps=10**12, every=1),
         E.TooLargeError,
-        "GiB; keep less with every= or split the batch",
+        " are available (memory of this machine); keep less with every= or split the batch",
     ),
     (
         lambda: run(y=[1.0, np.nan], first_bad_step=[-1, -1]),
@@ -321,6 +323,33 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: run(first_bad_step=[3]),
         E.ShapeError,
         "first_bad_step: expected whole numbers of shape (), got int64 of shape (1,)",
+    ),
+    # what is no number, and what is one
+    (lambda: run(record=3), E.DTypeError, "record: expected a list of quantities, got 3 (int)"),
+    (lambda: run(record=["energy", 3]), E.UnknownNameError, "record: there is no 3. Known: energy."),
+    (lambda: run(progress="no"), E.DTypeError, "progress: expected True or False, got 'no' (str)"),
+    (lambda: run(y=10**400), E.NotFiniteError, "y: expected numbers of at most 1.8e+308, got a larger one"),
+    (lambda: run(y=np.array([1.0, None])), E.DTypeError, "y: expected real numbers, got an array of dtype object"),
+    (lambda: run(y=np.ones((1,) * 30)), E.ShapeError, "y: expected at most 24 batch axes, got 30"),
+    (lambda: run(steps=10**5000), E.ArgumentError, "up to 9007199254740992, got int too long to print"),
+    (
+        lambda: run(sw.NBody(), y=[[1.0], [1.0, 2.0]]),
+        E.ShapeError,
+        "y: expected a number or a regular array, got list",
+    ),
+    (lambda: sw.Chain(10**14), E.TooLargeError, "n: stiffnesses and masses of 1 members need 1.49e+06 GiB"),
+    (lambda: sw.scenes.clover().run("rk4", v=0.0), E.ArgumentError, "v: expected the scene's own, which need not be given"),
+    (lambda: sw.scenes.scene(3), E.DTypeError, "scene: expected a Scene or its name, got int"),
+    (lambda: sw.advise("clover", methods=4), E.DTypeError, "methods: expected a list of names, got 4 (int)"),
+    (
+        lambda: sw.charts.work_precision("clover", peers=["x"]),
+        E.DTypeError,
+        "peers: expected a Peer, such as peers.scipy(), or a function, got 'x'",
+    ),
+    (
+        lambda: sw.charts.work_precision("clover", progress=True),
+        E.DTypeError,
+        "progress: expected a function or None, got True (bool)",
     ),
     # in place
     (lambda: world(v=[0.0] * 3), E.DTypeError, "v: expected a NumPy array to step in place, got list"),
@@ -350,7 +379,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         "v and y: the system's batch (2, 1) does not broadcast to theirs, (3,)",
     ),
     (lambda: world(dt=0.0), E.ArgumentError, "dt: expected numbers above zero"),
-    (lambda: world().step(-1), E.ArgumentError, "n must be a number of steps, zero or more; got -1"),
+    (lambda: world().step(-1), E.ArgumentError, "n: expected 0 or more, got -1"),
 ]
 
 
@@ -359,6 +388,34 @@ def test_a_clear_error(call: Callable[[], Any], error: type[Exception], text: st
     with pytest.raises(error, match=re.escape(text)) as caught:
         call()
     assert isinstance(caught.value, sw.StepwellError)
+
+
+def test_numbers_in_other_clothes() -> None:
+    """Whole numbers of any size, fractions, and arrays however they lie in memory are the same numbers."""
+    plain = np.array([1.0, 2.0, 3.0])
+    shifted = np.frombuffer(b"x" + plain.tobytes(), np.float64, offset=1)
+    assert not shifted.flags.aligned
+    want = run(sw.Oscillator(plain), y=plain).y
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        matrix = np.asmatrix(plain)
+    for given in (
+        shifted,
+        plain.astype(">f8"),
+        plain[::-1].copy()[::-1],
+        np.repeat(plain, 2)[::2],
+        plain.astype(np.float16),
+        plain.astype(np.longdouble),
+        [1, 2, 3],
+        (Fraction(1), 2, 3.0),
+        plain.astype(object),
+        matrix.A1,
+        np.ma.masked_array(plain, False),
+        range(1, 4),
+    ):
+        np.testing.assert_array_equal(run(sw.Oscillator(given), y=given).y, want)
+    assert run(y=matrix).y.shape == (1, 1, 3)
+    np.testing.assert_array_equal(run(y=2**70).y, run(y=2.0**70).y)
 
 
 def test_aliased_arrays() -> None:

@@ -13,8 +13,8 @@ import pytest
 import stepwell as sw
 from cases import SYSTEMS
 from stepwell import _core, engine
+from stepwell.reference.traced import Tracer
 from test_tracing import ABLE, CONTROLS, METHODS, fits, made
-from tracing import Tracer
 
 #: Bodies whose graphs are compared with one method of each kind alone: they have tens of thousands of operations.
 MANY = 100

@@ -21,6 +21,9 @@ RUNS = {
     "a matrix": "sw.integrate(sw.Oscillator(np.ones(10**4)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, form='matrix')",
     "a world": "sw.World(sw.Oscillator(1.0), 'rk4', v=np.zeros(1), y=np.ones(1), dt=0.1).step(10**11)",
     "with a bar": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**11, progress=True)",
+    "a limit of many states": "sw.stability_limit(sw.LinearSystem(np.random.rand(90, 90) - 60 * np.eye(90)), 'false_euler')",
+    "limits of many members": "sw.stability_limit(sw.Oscillator(np.ones(10**6), 0.1), 'rk4')",
+    "many digits": "sw.stability_limit(sw.LinearSystem(np.eye(30, k=1) - np.eye(30) + np.diag([1e-9], -29)), 'false_heun')",
     "the reference": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, backend='numpy')",
 }
 
@@ -59,3 +62,75 @@ def test_ctrl_c(what: str) -> None:
     assert float(wait) < 0.1
     here = sw.integrate(sw.Oscillator(1.0), "false_euler", v=0.0, y=1.0, dt=0.3, steps=7)
     assert float.fromhex(after) == here.y[-1]
+
+
+#: Where a single step, or the forces of one, take long: worlds and runs. All of them begin with ``made``, outside the clock.
+WITHIN_A_STEP = {
+    "dop853 of 2000 bodies, a world": (
+        "w = world(2000, 'dop853')",
+        "w.step(20)",
+    ),
+    "leapfrog of 20 000 bodies, a world": (
+        "w = world(20_000, 'leapfrog')",
+        "w.step()",
+    ),
+    "leapfrog of 20 000 bodies, a run": (
+        "y = places(20_000)",
+        "sw.integrate(sw.NBody(np.ones(len(y))), 'leapfrog', v=0.0, y=y, dt=1e-6, steps=10, threads=1)",
+    ),
+    "rk4 of 20 000 bodies, a run on two threads": (
+        "y = places(20_000)",
+        "sw.integrate(sw.NBody(np.ones(len(y))), 'rk4', v=0.0, y=y, dt=1e-6, steps=10, threads=2)",
+    ),
+    "dop853 of 20 000 bodies with a tolerance": (
+        "y = places(20_000)",
+        "sw.integrate(sw.NBody(np.ones(len(y))), 'dop853', v=0.0, y=y, at=[1.0], tolerance=1e-6)",
+    ),
+    "many members, a world": (
+        "y = np.ones(10**6); w = sw.World(sw.Pendulum(), 'rk4', v=np.zeros(10**6), y=y, dt=0.1)",
+        "w.step(10**4)",
+    ),
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("what", WITHIN_A_STEP)
+def test_ctrl_c_within_a_step(what: str) -> None:
+    """A tenth of a second too; and a world stays where its last whole step left it, as if nobody had asked for more."""
+    made, run = WITHIN_A_STEP[what]
+    code = f"""
+        import os, signal, threading, time
+        import numpy as np, stepwell as sw
+        def places(n):
+            return np.random.default_rng(1).random((n, 2))
+        def world(n, method):
+            y = places(n)
+            return sw.World(sw.NBody(np.ones(n)), method, v=np.zeros_like(y), y=y, dt=1e-6)
+        sent, w = [], None
+        def interrupt():
+            time.sleep(0.3)
+            sent.append(time.perf_counter())
+            os.kill(os.getpid(), signal.SIGINT)
+        {made}
+        start = None if w is None else w.resume
+        waits = []
+        for _ in range(3):
+            threading.Thread(target=interrupt).start()
+            try:
+                {run}
+            except KeyboardInterrupt:
+                waits.append(time.perf_counter() - sent[-1])
+            else:
+                raise SystemExit("not interrupted")
+        if w is not None:
+            again = sw.World(w.system, w.method, dt=w.dt, **start)
+            again.step(w.step_number)
+            assert w.t == again.t, (w.t, again.t)
+            assert np.array_equal(w.v, again.v) and np.array_equal(w.y, again.y), w.step_number
+        print(min(waits))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=100, env=dict(os.environ)
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.1

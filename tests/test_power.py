@@ -46,7 +46,7 @@ def forced(method: sw.Method) -> list[sw.System]:
 @pytest.mark.parametrize("driven", [False, True])
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
 def test_power_and_direct_agree(method: sw.Method, driven: bool, backend: str) -> None:
-    """Free, damped, pushed by constants and by sinusoids, at kept states and at an odd end."""
+    """Free, damped, pushed by constants and by sinusoids, at saved states and at an odd end."""
     # Φ = 0.5 or less where the method is stable: κ < 1.3, Verlet's 2/Φ = 8 over ω₀ = 0.5; 0.05 where it grows, then by e^(NΦ²/2)
     # < 3.5 at most. Inputs add the response to one of size 1, which is below 6 off resonance.
     dt = 0.5 if method.limit else 0.05

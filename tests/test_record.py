@@ -88,7 +88,7 @@ def test_they_are_what_they_are_called(dim: int) -> None:
 
 
 def test_a_diverged_member_keeps_to_itself() -> None:
-    """Its numbers are not finite from some kept state on; those of its neighbours, and what their control did, are as alone."""
+    """Its numbers are not finite from some saved state on; those of its neighbours, and what their control did, are as alone."""
     system = sw.NBody([1.0, 1.0, 1.0, 1.0], force="newton")
     y = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])[..., np.newaxis] * np.ones(9)
     y[1, :, 4] = y[0, :, 4]  # two bodies in one place

@@ -1,4 +1,4 @@
-"""Pictures and films of runs: what is in them, and that nothing is cut off or covered."""
+"""Pictures and animations of runs: what is in them, and that nothing is cut off or covered."""
 
 import csv
 import dataclasses
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from PIL import Image
-from stepwell.charts import runs_film, runs_picture
+from stepwell.charts import runs_animation, runs_picture
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 
 
@@ -116,7 +116,7 @@ def test_files_hold_the_kept_states(tmp_path, pictures):
         (lambda s: ("clovr", s.run("rk4", every=1)), UnknownNameError, "did you mean 'clover'"),
         (lambda s: (3, s.run("rk4", every=1)), DTypeError, "scene: expected a Scene or its name, got int"),
         (lambda s: (s, 3), DTypeError, "run: expected what scene.run returns, got int"),
-        (lambda s: (s, s.run("rk4")), ArgumentError, "run: expected two kept states or more, got 1; run with every="),
+        (lambda s: (s, s.run("rk4")), ArgumentError, "run: expected two saved states or more, got 1; run with every="),
         (lambda s: ("plummer", s.run("rk4", every=1)), ShapeError, r"run: expected one member with states of shape \(64, 3\)"),
         (lambda s: ("figure_eight", s.run("rk4", every=1)), ArgumentError, "got another start or system"),
         (
@@ -221,7 +221,7 @@ def test_bodies_are_told_apart_in_grey():
 
 
 def test_a_long_run_does_not_hide_the_exact_orbit():
-    chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=runs_picture.LONG + 1)
+    chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=runs_picture.LONG_CURVE + 1)
     lines = chart.plot().axes[0].lines
     paths = [line.get_zorder() for line in lines if len(line.get_xdata()) == len(chart.run.t)]
     exact = [line.get_zorder() for line in lines if line.get_linestyle() == "--"]
@@ -269,26 +269,26 @@ def test_pictures_can_be_drawings(pictures, ending, tmp_path):
     assert path.read_bytes()[:5] in (b"<?xml", b"%PDF-")
 
 
-# ---- the film
+# ---- the animation
 
 
 @every_kind
-def test_a_film_shows_the_states(pictures, kind, tmp_path):
+def test_an_animation_shows_the_states(pictures, kind, tmp_path):
     chart = pictures[kind]
     chart.animate(tmp_path / "run.gif", seconds=0.4, fps=10)
     frames = []
-    with Image.open(tmp_path / "run.gif") as film:
-        assert (film.size, film.n_frames, film.info["duration"]) == ((1000, 562), 4, 100)
+    with Image.open(tmp_path / "run.gif") as animation:
+        assert (animation.size, animation.n_frames, animation.info["duration"]) == ((1000, 562), 4, 100)
         for i in range(4):
-            film.seek(i)
-            frames.append(np.asarray(film.convert("L"), dtype=int))
+            animation.seek(i)
+            frames.append(np.asarray(animation.convert("L"), dtype=int))
     for one, other in pairwise(frames):
         assert (np.abs(one - other) > 60).sum() > 30  # the bodies moved, and the clock went on
 
 
 @every_kind
-def test_nothing_in_a_film_is_cut_off_or_covered(pictures, kind):
-    figure, show = runs_film.stage(pictures[kind])
+def test_nothing_in_an_animation_is_cut_off_or_covered(pictures, kind):
+    figure, show = runs_animation.stage(pictures[kind])
     show(int(np.flatnonzero(pictures[kind].finite)[-1]))
     page = figure.bbox
     boxes = [axes.get_tightbbox() for axes in figure.axes]
@@ -301,7 +301,7 @@ def test_nothing_in_a_film_is_cut_off_or_covered(pictures, kind):
 
 def test_a_frame_is_the_state_of_its_time(pictures):
     chart = pictures["orbits"]
-    figure, show = runs_film.stage(chart)
+    figure, show = runs_animation.stage(chart)
     show(70)
     assert f"t = {chart.run.t[70]:6.3f}" in [text.get_text() for text in figure.texts]
     marks = [line.get_xydata().tolist() for line in figure.axes[0].lines if len(line.get_xdata()) == 1]
@@ -313,14 +313,14 @@ def test_a_frame_is_the_state_of_its_time(pictures):
     assert len(trails) == 3
 
     chart = pictures["rows"]
-    figure, show = runs_film.stage(chart)
+    figure, show = runs_animation.stage(chart)
     show(33)
     exact, mark = figure.axes[0].lines[1:3]
     assert np.array_equal(mark.get_ydata(), chart.run.y[33])
     assert np.array_equal(exact.get_ydata(), chart.scene.exact(chart.run.t[33:34])[1][0])
 
     chart = pictures["swing"]
-    figure, show = runs_film.stage(chart)
+    figure, show = runs_animation.stage(chart)
     show(33)
     show(20)
     grown = next(line for line in figure.axes[0].lines if line.get_zorder() == 3)
@@ -328,14 +328,14 @@ def test_a_frame_is_the_state_of_its_time(pictures):
 
 
 def test_no_frame_is_made_up(tmp_path):
-    """Six states are six frames, and the film is as long as was asked."""
+    """Six states are six frames, and the animation is as long as was asked."""
     chart = looked_at(sw.scenes.clover(), every=20)
     chart.animate(tmp_path / "run.gif", seconds=3, fps=25)
-    with Image.open(tmp_path / "run.gif") as film:
-        assert (film.n_frames, film.info["duration"]) == (6, 500)
+    with Image.open(tmp_path / "run.gif") as animation:
+        assert (animation.n_frames, animation.info["duration"]) == (6, 500)
 
 
-def test_a_film_can_be_a_page(tmp_path):
+def test_an_animation_can_be_a_page(tmp_path):
     chart = looked_at(sw.scenes.clover(), every=50)
     chart.animate(tmp_path / "run.html", seconds=1, fps=2)
     page = (tmp_path / "run.html").read_text(encoding="utf-8")
@@ -365,13 +365,13 @@ def test_with_ffmpeg_an_mp4_is_written(tmp_path):
 @pytest.mark.parametrize(
     ("path", "options", "message"),
     [
-        ("run.avi", {}, r"path: expected an ending of a film, one of \.gif, \.mp4, \.html, got"),
+        ("run.avi", {}, r"path: expected an ending of an animation, one of \.gif, \.mp4, \.html, got"),
         ("run.gif", {"seconds": 0}, "seconds: expected numbers above zero"),
         ("run.gif", {"fps": math.inf}, "fps"),
         ("run.gif", {"seconds": 1e6, "fps": 1e3}, "expected 20000 or fewer"),
     ],
 )
-def test_a_film_that_cannot_be_is_refused(path, options, message, tmp_path):
+def test_an_animation_that_cannot_be_is_refused(path, options, message, tmp_path):
     chart = looked_at(sw.scenes.clover())
     with pytest.raises(ArgumentError, match=message):
         chart.animate(tmp_path / path, **options)

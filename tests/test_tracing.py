@@ -10,9 +10,9 @@ import pytest
 import stepwell as sw
 from cases import SYSTEMS
 from stepwell.reference import adaptive
+from stepwell.reference.traced import Tracer
 from stepwell.systems.base import flat
 from symbols import Symbol, Tape, evaluate
-from tracing import Tracer
 
 METHODS = sw.methods()
 ABLE = [m for m in METHODS if m.error_order is not None]
@@ -105,7 +105,7 @@ def test_every_control_with_every_method(name: str, control: str) -> None:
             symbols = Tracer(system, tape).step(method)
             s = system.scaled(H, system.batch)
             before = s.work = np.linspace(-1.0, 1.0, MEMBERS)
-            after = s.settle(*method.steps.step(s, T, H, v, y))
+            after = s.project(*method.steps.step(s, T, H, v, y))
             assert_computes(numbers(system, tape, symbols, v, y, before), *after, s.work)
 
 
@@ -122,29 +122,41 @@ def test_every_quantity(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in SYSTEMS if not name.startswith("thirty-five")])
 def test_every_attempt(name: str) -> None:
-    """Steps that are accepted, rejected, cut at the target, and none at all."""
+    """Steps that are accepted, rejected, held because they pass the target, extra, and none at all."""
     system, v, y = made(name)
     row: Callable[..., Any] = lambda *values: np.array(values)  # noqa: E731
+    none = np.zeros(MEMBERS)
     pace = adaptive.Pace(
         t=row(T, T, T),
         h=row(0.3, 1e-3, 0.3),
-        target=row(0.4, 2.0, T),
+        target=row(T + 0.1, 2.0, T),
+        extra=none,
+        held=none,
         relative=row(1e-3, 1e-2, 1e-3),
-        absolute=row(1e-9, 1e-2, 1e-3),
+        absolute=row(0.0, 1e-2, 0.0),
+        lasts=row(1.0, 0.0, 1.0),
+        longest_v=row(0.7, 0.2, 0.0),
+        longest_y=row(0.4, 0.3, 0.0),
+        begin=row(T - 2.0, T, T - 1.0),
+        interval=row(np.inf, 1e-3, 0.1),
+        until=row(-np.inf, T + 1.0, T + 1.0),
         before=row(0.9, 0.6, 1.0),
         most=row(5.0, 1.0, 5.0),
         accepted=row(0.0, 3.0, 7.0),
         rejected=row(1.0, 0.0, 2.0),
+        extra_steps=row(0.0, 2.0, 4.0),
         error=row(0.0, 2.0, 0.5),
     )
+    paces = [pace, pace._replace(target=row(9.0, T, 9.0), relative=row(9.0, 1.0, 9.0)), pace._replace(extra=row(0.01, 0.0, 0.02))]
     axes = len(system.v_shape), len(system.y_shape)
     for method in ABLE:
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
         s, steps = system.scaled(1.0, system.batch), method.steps
         with np.errstate(all="ignore"):
-            after, v1, y1 = adaptive.attempt(steps, s, method.error_order, axes, pace, 9.0, v, y)  # type: ignore[arg-type]
-        assert_computes(numbers(system, tape, symbols, v, y, *pace, budget=9.0), v1, y1, *after)
+            outcomes = [adaptive.attempt(steps, s, method.error_order, axes, each, 9.0, v, y) for each in paces]  # type: ignore[arg-type]
+        for each, (after, v1, y1) in zip(paces, outcomes, strict=True):
+            assert_computes(numbers(system, tape, symbols, v, y, *each, budget=9.0), v1, y1, *after)
 
 
 def test_the_matrix_form() -> None:

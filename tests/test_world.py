@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import sys
+import threading
+import time
+from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS, cases
+from stepwell.errors import FixedError
 
 DIRECT = [c for c in cases() if c.form == "direct"]
 
@@ -97,3 +103,147 @@ def test_any_shape_of_batch(shape: tuple[int, ...]) -> None:
     expected = sw.integrate(sw.Oscillator(1.3), "verlet", v=0.0, y=np.ones(shape), dt=0.1, steps=3)
     np.testing.assert_array_equal(y, expected.y[-1])
     np.testing.assert_array_equal(v, expected.v[-1])
+
+
+@pytest.mark.parametrize("name", ["dt", "t", "method", "system", "v", "y", "step", "step_number", "anything"])
+def test_nothing_is_assigned(name: str) -> None:
+    w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(3), y=np.ones(3), dt=0.1)
+    with pytest.raises(FixedError, match=rf"^{name}: a world's {name} cannot be assigned; .* World\(system, method, dt=dt, "):
+        setattr(w, name, 0.2)
+    assert (w.dt, w.t, w.method.name) == (0.1, 0.0, "verlet")
+
+
+COPIES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda w: pickle.loads(pickle.dumps(w)),
+    "resume": lambda w: sw.World(w.system, w.method, dt=w.dt, **w.resume),
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("steps", [0, 7])
+@pytest.mark.parametrize("members", [3, 500])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+def test_a_copy_goes_on_by_itself(method: str, members: int, steps: int, how: str) -> None:
+    """To the bit, also of what is carried; and neither sees what becomes of the other."""
+    y = np.linspace(0.5, 1.5, members)
+    w = sw.World(sw.Pendulum(), method, v=np.full(members, 0.1), y=y, dt=0.1, t0=0.3, start_step=4)
+    w.step(steps)
+    again = COPIES[how](w)
+    before = w.v.copy(), w.y.copy()
+    again.step(20)
+    np.testing.assert_array_equal((w.v, w.y), before)
+    assert (w.step_number, again.step_number) == (4 + steps, 24 + steps)
+    w.step(20)
+    np.testing.assert_array_equal((again.v, again.y), (w.v, w.y))
+    assert again.t == w.t
+    again.v[0] += 1.0
+    assert w.v[0] != again.v[0]
+
+
+@pytest.mark.parametrize("method", ["verlet", "leapfrog", "rk4"])
+def test_a_world_goes_on_from_a_run_and_a_run_from_a_world(method: str) -> None:
+    system, options = sw.Oscillator(np.array([1.0, 1.3])), {"dt": 0.1}
+    whole = sw.integrate(system, method, v=0.2, y=1.0, steps=60, **options)
+    half = sw.integrate(system, method, v=0.2, y=1.0, steps=25, **options)
+    w = sw.World(system, method, **options, **half.resume)
+    w.step(15)
+    rest = sw.integrate(system, method, steps=20, **options, **w.resume)
+    np.testing.assert_array_equal((rest.v, rest.y), (whole.v, whole.y))
+
+
+def test_a_copy_after_a_kick_starts_from_it() -> None:
+    w = sw.World(sw.Oscillator(1.0), "verlet", v=np.zeros(1), y=np.ones(1), dt=0.1)
+    w.step(3)
+    w.v[0] += 0.5
+    assert "carry" not in w.resume
+    again = copy.copy(w)
+    again.step(5)
+    w.step(5)
+    np.testing.assert_array_equal((again.v, again.y), (w.v, w.y))
+
+
+def test_a_controlled_world_keeps_its_energy_when_it_goes_on() -> None:
+    """Its target is that of the start, not of where it was copied."""
+    rng = np.random.default_rng(2)
+    v, y = rng.normal(size=(2, 3, 2))
+    for control in (sw.EnergyControl(0.3), sw.Projection()):
+        w = sw.World(sw.NBody(), "false_euler", v=v.copy(), y=y.copy(), dt=0.01, control=control)
+        w.step(9)
+        again = pickle.loads(pickle.dumps(w))
+        w.step(30)
+        again.step(30)
+        np.testing.assert_array_equal((again.v, again.y), (w.v, w.y))
+
+
+def test_a_parameter_that_is_changed_later_changes_nothing() -> None:
+    """The world has taken its numbers, and what it shows of them cannot be written to."""
+    omega, samples = np.ones(3), np.zeros(5)
+    w = sw.World(sw.Oscillator(omega, a=sw.Sampled(samples, 0.1)), "rk4", v=np.zeros(3), y=np.ones(3), dt=0.1, control=None)
+    again = copy.copy(w)
+    omega[:], samples[:] = 2.0, 9.0
+    assert (w.system.omega == 1.0).all()  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match="read-only"):
+        w.system.omega[0] = 2.0  # type: ignore[attr-defined]
+    w.step(5)
+    again.step(5)
+    np.testing.assert_array_equal(w.y, again.y)
+    np.testing.assert_array_equal(copy.copy(w).system.omega, 1.0)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("n", "error", "message"),
+    [
+        (1.5, sw.errors.DTypeError, "n: expected a whole number, got 1.5 (float)"),
+        ("3", sw.errors.DTypeError, "n: expected a whole number, got '3' (str)"),
+        (None, None, ""),
+        (True, sw.errors.DTypeError, "n: expected a whole number, got True (bool)"),
+        (2**63, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 9223372036854775808"),
+        (2**70, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 1180591620717411303424"),
+        (2**53, sw.errors.ArgumentError, "n: expected 0 or more, up to 9007199254740990, got 9007199254740992"),
+        (-1, sw.errors.ArgumentError, "n: expected 0 or more, got -1"),
+        (np.int64(3), None, ""),
+        (np.array(3), None, ""),
+    ],
+)
+def test_how_many_steps(n: Any, error: Any, message: str) -> None:
+    w = sw.World(sw.Oscillator(1.0), "rk4", v=np.zeros(3), y=np.ones(3), dt=0.1, start_step=2)
+    if error is None:
+        w.step(n)
+        assert w.step_number == 2 + (1 if n is None else int(n))
+        return
+    with pytest.raises(error) as caught:
+        w.step(n)
+    assert str(caught.value) == message
+    assert w.step_number == 2
+    np.testing.assert_array_equal(w.y, 1.0)
+
+
+def test_steps_are_counted_up_to_what_is_exact() -> None:
+    w = sw.World(sw.Oscillator(1.0), "rk4", v=np.zeros(3), y=np.ones(3), dt=1e-9, start_step=2**53 - 2)
+    w.step(2)
+    with pytest.raises(sw.errors.ArgumentError, match="n: expected 0 or more, up to 0, got 1"):
+        w.step()
+    assert w.step_number == 2**53
+
+
+def test_the_time_can_be_asked_for_while_it_is_stepped() -> None:
+    """And who wants to step it meanwhile hears why not."""
+    w = sw.World(sw.Pendulum(), "rk4", v=np.zeros(1000), y=np.ones(1000), dt=1e-3)
+    thread = threading.Thread(target=w.step, args=(100_000,))
+    thread.start()
+    seen, busy = [], 0
+    while thread.is_alive():
+        seen.append((w.step_number, w.t))
+        try:
+            w.step(0)
+        except sw.errors.BusyError as error:
+            busy += "another thread" in str(error)
+        time.sleep(1e-4)
+    thread.join()
+    assert busy
+    assert seen == sorted(seen)
+    assert len({k for k, _ in seen}) > 2
+    assert all(t == k * 1e-3 for k, t in seen)
+    assert w.step_number == 100_000

@@ -202,7 +202,7 @@ def test_angles_may_be_given():
     ("arguments", "error", "message"),
     [
         ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
-        ({"methods": "rk4"}, DTypeError, "methods: expected a list of names, got the text 'rk4'"),
+        ({"methods": "rk4"}, DTypeError, "methods: expected a list of names, got 'rk4'"),
         ({"methods": []}, ArgumentError, "methods: expected at least one, got none"),
         ({"phi": [0.0, 1.0]}, ArgumentError, "phi: expected numbers above zero in rad"),
         ({"phi": 1.0}, ShapeError, "phi: expected a list of angles in rad"),

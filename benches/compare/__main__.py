@@ -19,9 +19,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
     parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
     parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
-    about = "only the works whose names begin so, with commas between; chosen for steps of chosen length"
+    about = "only the works whose names begin so, with commas between; chosen for adaptive steps"
     parser.add_argument("--only", default="", metavar="W4", help=about)
-    parser.add_argument("--members", type=int, default=10_000, help="orbits with steps of chosen length (default: 10 000)")
+    parser.add_argument("--members", type=int, default=10_000, help="orbits with adaptive steps (default: 10 000)")
     given = parser.parse_args()
     repeats, only = 3 if given.quick else given.repeats, tuple(given.only.split(","))
     warnings.simplefilter("error")
@@ -40,7 +40,7 @@ def main() -> None:
         report.show(*made)
         parts += [report.markdown(*made), report.threads(rows)]
     if "chosen".startswith(only):
-        parts.append("## Steps of chosen length\n\n" + tables.READING.format(repeats=repeats))
+        parts.append("## Adaptive steps\n\n" + tables.READING.format(repeats=repeats))
         for made in tables.tables(repeats, given.quick, given.members):
             report.show(*made)
             parts.append(report.markdown(*made))

@@ -1,8 +1,9 @@
 """Simple integration algorithms at the machine's speed.
 
 ``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
-there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system; ``scenes`` and
-``charts`` show what each method costs, how wrong it is and where it blows up, and ``advise`` says which to take.
+there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system, ``explain`` what
+a step computes; ``scenes`` and ``charts`` show what each method costs, how wrong it is and where it blows up, and ``advise`` says
+which to take.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
 from .control import EnergyControl, Projection
-from .errors import ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
+from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
@@ -19,17 +20,21 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, scenes, stability
+    from . import advice, charts, explanation, scenes, stability
     from .advice import advise
+    from .explanation import Explanation, explain
+    from .scenes import Scene
     from .stability import analyse, criteria, stability_limit
 
 __version__: str = _core.__version__
 
 __all__ = [
+    "AccuracyWarning",
     "Chain",
     "ControlWarning",
     "DivergenceWarning",
     "EnergyControl",
+    "Explanation",
     "LinearSystem",
     "Method",
     "NBody",
@@ -39,6 +44,7 @@ __all__ = [
     "RestrictedThreeBody",
     "Run",
     "Sampled",
+    "Scene",
     "Sinusoid",
     "Status",
     "StepwellError",
@@ -51,6 +57,8 @@ __all__ = [
     "charts",
     "criteria",
     "errors",
+    "explain",
+    "explanation",
     "integrate",
     "isa",
     "isa_levels",
@@ -78,8 +86,12 @@ def isa_levels() -> list[str]:
 #: What is imported when it is first used, so that importing stepwell stays quick, and where it is.
 _LATER = {
     "advice": "advice",
+    "Scene": "scenes.Scene",
     "advise": "advice.advise",
+    "Explanation": "explanation.Explanation",
     "charts": "charts",
+    "explain": "explanation.explain",
+    "explanation": "explanation",
     "scenes": "scenes",
     "stability": "stability",
     "analyse": "stability.analyse",

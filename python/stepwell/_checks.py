@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import operator
 import os
-from collections.abc import Iterable
-from functools import cache
+import sys
+from collections.abc import Iterable, Iterator
+from errno import EISDIR
 from math import isfinite
-from typing import Any
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,22 +17,35 @@ from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLa
 from .reference.types import Array as Array
 from .reference.types import Whole
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 Shape = tuple[int, ...]
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
 
+#: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
+MOST_AXES = 24
+
+#: So much of a path stands in a message.
+PATH = 1000
+
 
 def known(argument: str, name: object, names: Iterable[str]) -> str:
     """Return ``name`` if it is one of ``names``; otherwise say which is the nearest."""
-    names = tuple(names)
-    if isinstance(name, str) and name in names:
+    if type(name) is str and type(names) is tuple and name in names:
         return name
+    names = tuple(names)
+    if isinstance(name, np.ndarray) and name.ndim == 0 and name.dtype.kind == "U":
+        name = name.item()  # a word that was read from a file of arrays
+    if isinstance(name, str) and name in names:
+        return str(name)
     import difflib  # a mistake may take its time; the import of stepwell may not
 
-    near = difflib.get_close_matches(str(name).lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(short(name).strip("'").lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else "."
-    raise UnknownNameError(f"{argument}: there is no {name!r}{hint} Known: {', '.join(names)}.")
+    raise UnknownNameError(f"{argument}: there is no {short(name)}{hint} Known: {', '.join(names)}.")
 
 
 def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
@@ -39,11 +54,19 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         return np.array(value)  # what is given most often: no more to look at
     try:
         array = np.asarray(value)
-    except ValueError as error:
+    except (ValueError, TypeError, RecursionError) as error:
         raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+    if type(value) is not np.ndarray and (masked := _masked(value)):
+        raise ArgumentError(f"{argument}: expected numbers{_in(unit)}, got a masked array in which {masked} are masked")
+    if array.dtype.kind == "O":
+        array = _exact(argument, array)
     if array.dtype.kind not in "iuf":
         raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
-    array = np.asarray(array, dtype=np.float64)
+    if array.dtype != np.float64 or not array.dtype.isnative:
+        with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused below
+            array = array.astype(np.float64)
+    if not array.flags.aligned:
+        array = array.copy()
     # One look at all; where it is wrong is asked only if it is.
     if finite and not np.isfinite(array).all():
         wrong = ~np.isfinite(array)
@@ -51,6 +74,32 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
+
+
+def _masked(value: Any) -> int:
+    """How many numbers of a masked array are masked; there is none before ``numpy.ma`` is imported, which takes its time."""
+    ma = sys.modules.get("numpy.ma")
+    return int(ma.getmaskarray(value).sum()) if ma is not None and isinstance(value, ma.MaskedArray) else 0
+
+
+def not_negative(argument: str, value: Any, what: str = "numbers") -> Array:
+    """Return ``value`` as float64, if it is zero or more."""
+    array = numbers(argument, value)
+    if (wrong := array < 0).any():
+        raise ArgumentError(f"{argument}: expected {what} of zero or more, got {array[wrong].min():g}")
+    return array
+
+
+def _exact(argument: str, array: Any) -> Any:
+    """An array of Python objects as floats if all are real numbers, such as an int of more than 64 bits; else as it is."""
+    if not all(isinstance(each, Real) and not isinstance(each, bool) for each in array.flat):
+        return array
+    try:
+        return array.astype(np.float64)
+    except OverflowError:
+        raise NotFiniteError(
+            f"{argument}: expected numbers of at most {np.finfo(np.float64).max:.3g}, got a larger one"
+        ) from None
 
 
 def number(argument: str, value: Any, *, positive: bool = False, unit: str = "") -> float:
@@ -68,12 +117,33 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     try:
         n = operator.index(value)
     except TypeError:
-        raise DTypeError(f"{argument}: expected a whole number, got {value!r} ({type(value).__name__})") from None
+        raise DTypeError(f"{argument}: expected a whole number, got {short(value)} ({type(value).__name__})") from None
     if isinstance(value, (bool, np.bool_)):
         raise DTypeError(f"{argument}: expected a whole number, got {value!r} (bool)")
     if not least <= n <= most:
-        raise ArgumentError(f"{argument}: expected {least} or more{'' if n < least else f', up to {most}'}, got {n}")
+        raise ArgumentError(f"{argument}: expected {least} or more{'' if n < least else f', up to {most}'}, got {short(n)}")
     return n
+
+
+def several(argument: str, value: Any, what: str) -> list[Any]:
+    """Return a list of what is given several of; a text is not the list of its letters."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
+        raise DTypeError(f"{argument}: expected a list of {what}, got {short(value)} ({type(value).__name__})")
+    return list(value)
+
+
+def callback(argument: str, value: Any) -> Any:
+    """Return ``value`` if it is a function or None."""
+    if value is not None and not callable(value):
+        raise DTypeError(f"{argument}: expected a function or None, got {short(value)} ({type(value).__name__})")
+    return value
+
+
+def flag(argument: str, value: Any) -> bool:
+    """Return ``value`` if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise DTypeError(f"{argument}: expected True or False, got {short(value)} ({type(value).__name__})")
+    return bool(value)
 
 
 def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = True) -> Array:
@@ -84,6 +154,11 @@ def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = 
     if array.shape[: len(shape)] != shape:
         raise ShapeError(f"{argument}: expected shape {_shape(shape, axes)}, got {array.shape}; batch axes come last")
     return array
+
+
+def shape_of(argument: str, value: Any) -> Shape:
+    """The shape of what is given for numbers."""
+    return value.shape if isinstance(value, np.ndarray) else numbers(argument, value, finite=False).shape
 
 
 def over(array: Array, shape: Shape) -> Array:
@@ -100,6 +175,8 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     different = set(shapes.values()) - {()}
     if not different:
         return ()
+    if longest := ", ".join(name for name, shape in shapes.items() if len(shape) > MOST_AXES):
+        raise ShapeError(f"{longest}: expected at most {MOST_AXES} batch axes, got {max(map(len, different))}")
     try:
         shape = different.pop() if len(different) == 1 else np.broadcast_shapes(*different)
     except ValueError:
@@ -111,13 +188,19 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     return shape
 
 
-def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape) -> Whole | None:
+def diverged_before(first_bad_step: Any, v: Array, y: Array, batch: Shape, start: int) -> Whole | None:
     """Return the first bad step of each member, −1 for none; only members that have one may hold what is not finite."""
     if first_bad_step is None:
         return None
+    shape = numbers("first_bad_step", first_bad_step, finite=False).shape
     steps = np.asarray(first_bad_step)
-    if steps.dtype.kind not in "iu" or steps.shape != batch:
-        raise ShapeError(f"first_bad_step: expected whole numbers of shape {batch}, got {steps.dtype} of shape {steps.shape}")
+    if steps.dtype.kind not in "iu" or shape != batch:
+        raise ShapeError(f"first_bad_step: expected whole numbers of shape {batch}, got {steps.dtype} of shape {shape}")
+    if (wrong := (steps < -1) | (steps > start)).any():
+        raise ArgumentError(
+            f"first_bad_step: expected steps before the run, up to start_step = {start}, or −1, "
+            f"got {steps[wrong][0]}{_where(wrong)}"
+        )
     for argument, array in (("v", v), ("y", y)):
         if (wrong := ~np.isfinite(array) & (steps < 0)).any():
             raise NotFiniteError(f"{argument}: expected finite numbers, got {array[wrong][0]}{_where(wrong)}")
@@ -131,22 +214,92 @@ def member(array: Array, index: Shape) -> Array:
     return np.asarray(array)
 
 
-def fits(what: str, rows: int, batch: Shape, remedy: str) -> None:
-    """Raise if ``rows`` numbers for each member of a batch do not fit in this machine's memory."""
+#: Bytes below which nobody asks whether they are there: to ask takes as long as to fill some hundred kilobytes.
+_FEW_BYTES = 1 << 24
+
+
+def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0.0) -> None:
+    """Raise if ``rows`` numbers for each member of a batch, and so many bytes beside, do not fit in what memory is available."""
     members = 1
     for n in batch:
         members *= int(n)
-    needed = 8.0 * rows * members
-    if needed > (memory := _memory()):
-        raise TooLargeError(
-            f"{what} of {members} members need {needed / 2**30:.3g} GiB, but this machine has {memory / 2**30:.3g} GiB; {remedy}"
+    needed = 8.0 * rows * members + beside
+    if needed <= _FEW_BYTES:
+        return
+    available, bound = available_memory()
+    if needed > available:
+        left = _bytes(max(available, 0.0))
+        raise TooLargeError(f"{what} of {members} members need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
+
+
+def _bytes(n: float) -> str:
+    return f"{n / 2**30:.3g} GiB" if n >= 2**30 else f"{n / 2**20:.3g} MiB"
+
+
+def available_memory() -> tuple[float, str]:
+    """How many bytes this process may still take, and what bounds them: the machine, its control groups or its address space."""
+    return min(_bounds(), default=(2.0**63, "nothing is known of this system's memory"))
+
+
+def _bounds() -> Iterator[tuple[float, str]]:
+    try:
+        import resource
+
+        most = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if most != resource.RLIM_INFINITY:
+            used = int(_read("/proc/self/statm").split()[0]) * resource.getpagesize()
+            yield float(most - used), "limit of the address space, ulimit -v"
+    except (ImportError, OSError, IndexError):  # not this kind of system
+        pass
+    try:
+        yield 1024.0 * _fields("/proc/meminfo")["MemAvailable:"], "memory of this machine"
+    except (OSError, KeyError):
+        if hasattr(os, "sysconf"):
+            yield float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")), "memory of this machine"
+    for folder, names in _control_groups():
+        try:
+            most, used = (int(_read(f"{folder}/{name}")) for name in names)
+        except (OSError, ValueError):  # there is no such group here, or "max", which is no limit
+            continue
+        try:
+            fields = _fields(f"{folder}/memory.stat")
+        except OSError:
+            fields = {}
+        # What is kept of files that nobody reads just now is given up when memory is asked for.
+        used -= fields.get("total_inactive_file", fields.get("inactive_file", 0))
+        yield float(most - used), "memory limit of the control group"
+
+
+def _control_groups() -> Iterator[tuple[str, tuple[str, str]]]:
+    """The folders of the control groups of this process and of those around them, and the names of limit and usage there."""
+    try:
+        lines = _read("/proc/self/cgroup").splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, path = line.split(":", 2)
+        if controllers and "memory" not in controllers.split(","):
+            continue
+        root, names = (
+            ("/sys/fs/cgroup/memory", ("memory.limit_in_bytes", "memory.usage_in_bytes"))
+            if controllers
+            else ("/sys/fs/cgroup", ("memory.max", "memory.current"))
         )
+        path = path.strip("/")
+        while path:
+            yield f"{root}/{path}", names
+            path = path.rpartition("/")[0]
+        yield root, names
 
 
-@cache
-def _memory() -> float:
-    """This machine's memory in bytes; no bound where it cannot be asked."""
-    return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 2.0**63
+def _read(path: str) -> str:
+    with open(path) as file:
+        return file.read()
+
+
+def _fields(path: str) -> dict[str, int]:
+    """A file of names and whole numbers, line by line."""
+    return {line[0]: int(line[1]) for line in map(str.split, _read(path).splitlines()) if len(line) > 1}
 
 
 def in_place(argument: str, array: Any, shape: Shape) -> Array:
@@ -165,12 +318,76 @@ def in_place(argument: str, array: Any, shape: Shape) -> Array:
     return array
 
 
+def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
+    """Return the path of a file if it has one of the endings and can be written; that is tried, and nothing is left of it."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise DTypeError(f"{argument}: expected the path of a file, got {short(path)} ({type(path).__name__})")
+    from pathlib import Path  # the import of stepwell does without
+
+    place = Path(os.fsdecode(path))
+    if endings and place.suffix not in endings:
+        *others, last = endings
+        known = f"{', '.join(others)} or {last}" if others else last
+        raise ArgumentError(f"{argument}: expected a file ending in {known}, got {short(str(path), PATH)}")
+    try:
+        if place.is_dir():
+            raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
+        if place.is_file():
+            with place.open("ab"):
+                pass
+        elif not place.exists() and not place.is_symlink():  # a pipe, or /dev/null, is not to be opened twice
+            with place.open("xb"):
+                pass
+            place.unlink()
+    except (OSError, ValueError) as error:
+        raise _unwritable(argument, "file", path, error) from None
+    return place
+
+
+def folder(argument: str, path: Any, names: Iterable[str] = ()) -> Path:
+    """Return the path of a folder if files can be written there, those of these names too; it need not be there yet."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise DTypeError(f"{argument}: expected the path of a folder, got {short(path)} ({type(path).__name__})")
+    from pathlib import Path  # the import of stepwell does without
+    from tempfile import TemporaryFile  # the import of stepwell may not take its time
+
+    place = Path(os.fsdecode(path))
+    try:
+        if "\0" in str(place):
+            raise ValueError("embedded null byte")
+        there = next(each for each in (place.absolute(), *place.absolute().parents) if each.exists())
+        with TemporaryFile(dir=there):
+            pass
+        if place.exists():
+            for name in names:
+                file(argument, place / name)
+    except (OSError, ValueError) as error:
+        if isinstance(error, ArgumentError):
+            raise
+        raise _unwritable(argument, "folder", path, error) from None
+    return place
+
+
+def _unwritable(argument: str, what: str, path: Any, error: Exception) -> ArgumentError:
+    why = getattr(error, "strerror", None) or error
+    return ArgumentError(f"{argument}: expected a {what} that can be written, got {short(str(path), PATH)}: {why}")
+
+
 def _in(unit: str) -> str:
     return f" in {unit}" if unit else ""
 
 
+def short(value: object, most: int = 80) -> str:
+    """A value in a message: its repr, cut where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # Python spells no whole number of thousands of digits
+        return f"{type(value).__name__} too long to print"
+    return text if len(text) <= most else f"{text[: most - 3]}…"
+
+
 def _kind(value: Any, array: np.ndarray[Any, Any]) -> str:
-    return repr(value) if array.ndim == 0 else f"an array of dtype {array.dtype}"
+    return short(value) if array.ndim == 0 else f"an array of dtype {array.dtype}"
 
 
 def _where(wrong: np.ndarray[Any, np.dtype[np.bool_]]) -> str:

@@ -9,7 +9,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import Arrays, PacedArrays, Pacing, Plan
+from .engine import AdaptiveArrays, Arrays, Pacing, Plan
 
 __all__ = [
     "ModelSpec",
@@ -19,9 +19,12 @@ __all__ = [
     "__version__",
     "adapt",
     "catalogue",
+    "check",
     "compiled",
+    "in_parts",
     "isa",
     "isa_levels",
+    "program",
     "run",
     "systems",
 ]
@@ -51,14 +54,23 @@ class ModelSpec:
         *,
         matrix: tuple[list[float], int] | None = None,
         record: list[str] = ...,
+        fused: bool = False,
     ) -> ModelSpec: ...
 
 @final
 class World:
     """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first`` and ``members``."""
 
-    def __new__(cls, model: ModelSpec, plan: Plan, v: NDArray[np.float64], y: NDArray[np.float64]) -> World: ...
+    def __new__(
+        cls,
+        model: ModelSpec,
+        plan: Plan,
+        v: NDArray[np.float64],
+        y: NDArray[np.float64],
+        carry: NDArray[np.float64] | None = None,
+    ) -> World: ...
     def step(self, n: int = 1) -> None: ...
+    def carry(self) -> NDArray[np.float64] | None: ...
     @property
     def t(self) -> float: ...
     @property
@@ -125,6 +137,18 @@ class Tape:
     def listing(self, of: Symbol) -> str:
         """The operations that a value is made of."""
 
+    def operations(self, of: list[Symbol]) -> tuple[list[tuple[str, list[int], int]], list[int]]:
+        """What these values are made of, in order: names, operands, what else is given; and the places of the values."""
+
+    def fused(self, of: list[Symbol]) -> tuple[Tape, list[Symbol]]:
+        """A tape with fused multiply-adds in what these values need, and the values on it."""
+
+    def written(self, of: list[Symbol]) -> dict[str, int]:
+        """How often each kind of operation was asked for in a step, if these values are its next state.
+
+        Of values that depend on the state before equal ones were merged; of inputs that change with the time after it.
+        """
+
     def __len__(self) -> int: ...
 
 def catalogue() -> list[dict[str, Any]]: ...
@@ -134,14 +158,42 @@ def isa_levels() -> list[str]: ...
 def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> None:
     """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``."""
 
-def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: PacedArrays) -> None:
+def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
     """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""
+
+def check(model: ModelSpec) -> None:
+    """Raise if it cannot be stepped so."""
 
 def compiled(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool = False) -> dict[str, Any] | None:
     """What a step becomes, traced and compiled anew for so many members; None if it is too long for one tape.
 
-    ``level``; ``written`` and ``computed``, numbers of operations by kind: as the document writes them, and as every member makes
-    them in every step; ``per_run``, ``per_member`` and ``per_step``, how many are made before; ``lanes``, how many members go
-    together; ``bytes`` of machine code, 0 where it is interpreted; ``spills``, how many values are kept beside the registers at
-    most; ``trace`` and ``compile``, how long both took, in seconds. ``attempts``: at steps of chosen length.
+    ``level``; ``written`` and ``computed``, numbers of operations by kind: before equal ones were merged, but for those that a
+    method does to blocks, and as every member makes them in every step; ``per_run``, ``per_member`` and ``per_step``, how many
+    are made before; ``lanes``, how many members go together; ``bytes`` of machine code, 0 where it is interpreted; ``spills``,
+    how many values are kept beside the registers at most; ``trace`` and ``compile``, how long both took, in seconds.
+    ``attempts``: at adaptive steps.
+
+    ``interpreted`` is None, and ``width`` (numbers in a vector), ``block_vectors`` (vectors in a turn of the loop), ``blocks``
+    (turns for a tile), ``resident`` (whether the state stays in registers over all steps) and ``registers`` (of vectors, that
+    there are) tell of the machine code; or it is "level" (none at this level), "pages" (the system lets no page be executed)
+    or "writer".
+
+    ``split`` holds the operations: "run", "member", "step" and "body", each what ``Tape.operations`` gives and the places of what
+    comes of it. What comes of the first three are, in order, the values "uniform", "row" and "of the step" of the body; "held"
+    are numbered with the last. Their own leaves are "uniform", the number of a pair in ``given``, and "row", of the step the
+    time and of the member the number of a parameter in ``params``. ``entries`` has a pair for each value of the step: "value",
+    or "sample" or "row" with the number of a table, of which the value is the number of a sample.
+    """
+
+def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool = False) -> tuple[str, int, int] | None:
+    """By what a step is made that is too long for one tape, about how many operations it has, how many members go together.
+
+    "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
+    """
+
+def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, list[int], float]], list[int]]:
+    """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
+
+    Names are "v", "y", "dv" and "dy" (with the time, as a share of the step; operands are v and y), "velocity", "add",
+    "subtract", and "scale" (with the factor).
     """

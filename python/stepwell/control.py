@@ -11,13 +11,14 @@ import numpy as np
 
 from . import _checks
 from ._checks import Array, Shape
-from .errors import ArgumentError, ControlWarning
+from ._value import Value
+from .errors import ArgumentError, ControlWarning, DTypeError
 from .reference import control as reference
 
 FORMS = ("limited", "printed")
 
 
-class EnergyControl:
+class EnergyControl(Value):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
 
     As the document prints it (Appendix D), the push is h·C·ΔE in a step, and overflows where h·C·K passes 1, K being the kinetic
@@ -39,8 +40,8 @@ class EnergyControl:
         if (gain is None) == (relative is None):
             raise ArgumentError("gain, relative: expected one of them, got " + ("neither" if gain is None else "both"))
         self.form = _checks.known("form", form, FORMS)
-        self.gain = None if gain is None else _not_negative("gain", gain)
-        self.relative = None if relative is None else _not_negative("relative", relative)
+        self.gain = None if gain is None else _checks.not_negative("gain", gain)
+        self.relative = None if relative is None else _checks.not_negative("relative", relative)
         self.target = None if target is None else _checks.numbers("target", target)
 
     @property
@@ -95,7 +96,7 @@ class EnergyControl:
 WAYS = ("scaling", "nacozy")
 
 
-class Projection:
+class Projection(Value):
     """Sets the state back onto the energy after every step.
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the least change of the state that
@@ -143,8 +144,8 @@ class Projection:
         return alone
 
 
-def _not_negative(argument: str, value: Any) -> Array:
-    array = _checks.numbers(argument, value)
-    if (array < 0).any():
-        raise ArgumentError(f"{argument}: expected numbers of zero or more, got {array.min():g}")
-    return array
+def a_control(value: Any) -> EnergyControl | Projection | None:
+    """Return the argument ``control`` if it is one, or None."""
+    if value is not None and not isinstance(value, (EnergyControl, Projection)):
+        raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(value).__name__}")
+    return value

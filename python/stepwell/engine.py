@@ -7,9 +7,10 @@ above this file speaks of states, everything below of slots.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import count
 from math import floor, prod
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,11 @@ from .reference.types import Blocks, Whole
 from .systems import Sampled, System
 from .systems.base import flat, rows
 
-Looped = tuple[Array, Array, list[Blocks], Whole]
+if TYPE_CHECKING:
+    from .reference.adaptive import Outcome as Adapted
+    from .reference.adaptive import Pace
+
+Looped = tuple[Array, Array, Blocks, Whole]
 
 
 class Plan(NamedTuple):
@@ -42,6 +47,7 @@ class Plan(NamedTuple):
     form: str = "direct"
     progress: Callable[[float], object] | None = None
     record: tuple[str, ...] = ()
+    fused: bool = False
 
     @property
     def saves(self) -> Whole:
@@ -52,6 +58,11 @@ class Plan(NamedTuple):
         kept = np.arange(0, self.steps + every, every, dtype=np.int64)  # an array, for there may be millions of them
         kept[-1] = self.steps
         return kept
+
+    @property
+    def kept(self) -> int:
+        """How many states are kept."""
+        return 1 if self.every is None else -(-self.steps // min(self.every, self.steps)) + 1
 
     @property
     def members(self) -> int:
@@ -118,20 +129,84 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
-    settle = getattr(s, "settle", None)  # only what keeps a system on its energy has it
+    project = getattr(s, "project", None)  # only what keeps a system on its energy has it
 
-    def step(t: float, v: Array, y: Array) -> Blocks:
+    def plain(t: float, v: Array, y: Array) -> Blocks:
         v, y = steps.step(s, t, plan.dt, v, y)
-        return settle(v, y) if settle else (v, y)
+        return project(v, y) if project else (v, y)
 
+    step = _fused_step(plan, s) if plan.fused else plain
     slot = v if carried else _start(plan, v, y)
-    slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes)
+    slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes, _velocity(plan))
     out = _finished(plan, slot, kept, first_bad)
     with np.errstate(all="ignore"):
-        states = list(zip(out.v, out.y, strict=True)) if plan.record else []
-        recorded = {name: np.stack([s.record(name, *state) for state in states]) for name in plan.record}
+        recorded = {
+            name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.kept)
+            for name in plan.record
+        }
     work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
     return out._replace(recorded=recorded, work=_per_step(plan, work))
+
+
+def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
+    """A method's "step" or "attempt", or how it goes from v to what it carries and back, of fused multiply-adds.
+
+    That is its tape, evaluated line by line: from the rows of a state, and the time, to the next ones.
+    """
+    from .reference.fused import Evaluated  # only such runs need it
+    from .reference.traced import Tracer
+
+    _core.check(model(plan))
+    tape = _core.Tape()
+    tracer = Tracer(plan.system, tape)
+    match what:
+        case "step":
+            symbols = tracer.step(plan.method)
+        case "attempt":
+            symbols = tracer.attempt(plan.method)
+        case _:
+            symbols = tracer.slot(plan.method, what, plan.choice)
+    numbers = dict(enumerate(tracer.numbers))
+    [(_, _, number_of_budget)], _ = tape.operations([tape.budget()])
+    evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables)
+
+    def made(state: list[Array], t: Any) -> Array:
+        out = np.empty((len(symbols), *plan.batch))
+        for i, each in enumerate(evaluated(state, t, plan.dt)):
+            out[i] = each
+        return out
+
+    return made
+
+
+def _rows(plan: Plan, v: Array, y: Array) -> list[Array]:
+    """The rows of a state."""
+    return [*v.reshape(-1, *plan.batch), *y.reshape(-1, *plan.batch)]
+
+
+def _blocks(v: Array, y: Array, made: Array) -> Blocks:
+    """Blocks of the same shapes, from rows."""
+    n_v, n_y = (a.size // max(1, made[0].size) for a in (v, y))
+    return made[:n_v].reshape(v.shape), made[n_v : n_v + n_y].reshape(y.shape)
+
+
+def _fused_step(plan: Plan, s: Any) -> reference.Step:
+    """A step; what a control of ``s`` adds up is added up there."""
+    made = _fused(plan, "step")
+
+    def step(t: float, v: Array, y: Array) -> Blocks:
+        if plan.system.control is None:
+            return _blocks(v, y, made(_rows(plan, v, y), t))
+        *_, s.work = out = made([*_rows(plan, v, y), s.work], t)
+        return _blocks(v, y, out)
+
+    return step
+
+
+def _fused_slot(plan: Plan, which: str) -> reference.Velocity:
+    """What a method carries from velocities, or back."""
+    made = _fused(plan, which)
+    return lambda t, v, y: _blocks(v, y, made(_rows(plan, v, y), t))[0]
 
 
 def _per_step(plan: Plan, work: Array | None) -> Array | None:
@@ -142,7 +217,34 @@ def _per_step(plan: Plan, work: Array | None) -> Array | None:
     return np.asarray(work / (evaluations * plan.dt))
 
 
-def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, block_axes: tuple[int, int]) -> Looped:
+def _stacked(states: Iterable[Array], count: int) -> Array:
+    """So many arrays of one shape as one, without a list of them."""
+    stack = np.empty(0)
+    for i, state in enumerate(states):
+        if i == 0:
+            stack = np.empty((count, *state.shape))
+        stack[i] = state
+    return stack
+
+
+def _velocity(plan: Plan) -> reference.Velocity | None:
+    """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
+    if plan.method.carry is None:
+        return None
+    if plan.fused:
+        return _fused_slot(plan, "finish")
+    return partial(plan.method.steps.finish, plan.system.scaled(plan.dt, plan.batch), plan.choice)
+
+
+def _loop(
+    plan: Plan,
+    step: reference.Step,
+    v: Array,
+    y: Array,
+    before: Whole,
+    block_axes: tuple[int, int],
+    velocity: reference.Velocity | None,
+) -> Looped:
     done, every = 0, max(1, plan.steps // 100)
 
     def told(t: float, v: Array, y: Array) -> Blocks:
@@ -152,43 +254,44 @@ def _loop(plan: Plan, step: reference.Step, v: Array, y: Array, before: Whole, b
             plan.progress(done / plan.steps)
         return step(t, v, y)
 
-    return reference.run(
-        told, v, y, before, block_axes, h=plan.dt, t0=plan.t0, first=plan.first, steps=plan.steps, saves=plan.saves.tolist()
-    )
+    counts: Any = {"h": plan.dt, "t0": plan.t0, "first": plan.first, "steps": plan.steps, "saves": plan.saves}
+    return reference.run(told, v, y, before, block_axes, velocity=velocity, **counts)
 
 
 def _start(plan: Plan, v: Array, y: Array) -> Array:
     """What the method carries at the first step."""
     if plan.method.carry is None:
         return v
-    s = plan.system.scaled(plan.dt, plan.batch)
+    t = plan.t0 + plan.first * plan.dt
     with np.errstate(all="ignore"):
-        return np.asarray(plan.method.steps.start(s, plan.choice, plan.t0 + plan.first * plan.dt, v, y))
+        if plan.fused:
+            return _fused_slot(plan, "start")(t, v, y)
+        return np.asarray(plan.method.steps.start(plan.system.scaled(plan.dt, plan.batch), plan.choice, t, v, y))
 
 
-def _finished(plan: Plan, slot: Array, kept: list[Blocks], first_bad: Any) -> Outcome:
-    """The states from the kept slots."""
-    v = [pair[0] for pair in kept]
-    y = [pair[1] for pair in kept]
-    if plan.method.carry is not None:
-        s = plan.system.scaled(plan.dt, plan.batch)
-        times = (plan.t0 + (plan.first + plan.saves) * plan.dt).tolist()
+def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
+    """The states from the kept slots, which are the caller's to spend."""
+    v, y = kept
+    if velocity := _velocity(plan):
+        if np.shares_memory(slot, v):
+            slot = slot.copy()
         with np.errstate(all="ignore"):
-            v = [plan.method.steps.finish(s, plan.choice, *state) for state in zip(times, v, y, strict=True)]
-    return Outcome(np.stack(v), np.stack(y), slot, np.asarray(first_bad, dtype=np.int64))
+            for i, step in enumerate(plan.saves):
+                v[i] = velocity(plan.t0 + (plan.first + int(step)) * plan.dt, v[i], y[i])
+    return Outcome(v, y, slot, np.asarray(first_bad, dtype=np.int64))
 
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     given = plan.system.parameters(plan.batch)
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record))
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
 
 
 def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
-    kept = len(plan.saves)
+    kept = plan.kept
     saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
     carry = np.empty(v.shape if carries else 0)
     shapes = {name: plan.system.quantities[name] for name in plan.record}
@@ -265,22 +368,73 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
 
+    linear = reference.linear_step(p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt)
+    finish = _velocity(plan)
+
+    def step(t: float, v: Array, y: Array) -> Blocks:
+        s = linear(t, np.concatenate([v, y]))
+        return s[:n_v], s[n_v:]
+
+    def velocity(t: float, v: Array, y: Array) -> Array:
+        return v if finish is None else np.reshape(finish(t, v.reshape(blocks[0]), y.reshape(blocks[1])), v.shape)
+
+    def by_reference(plan: Plan, v: Array, y: Array, before: Whole) -> Looped:
+        return _loop(plan, step, v, y, before, (1, 1), None if finish is None else velocity)
+
     if plan.backend == "numpy":
-        linear = reference.linear_step(p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt)
-
-        def step(t: float, v: Array, y: Array) -> Blocks:
-            s = linear(t, np.concatenate([v, y]))
-            return s[:n_v], s[n_v:]
-
-        flat_v, flat_y, kept, first_bad = _loop(plan, step, flat_v, flat_y, before, (1, 1))
+        flat_v, _, kept, first_bad = by_reference(plan, flat_v, flat_y, before)
     else:
         linear_map = {"n": n_v + n_y, "n_v": n_v, "p": p, "q": q, "inputs": [each.signal() for each in given.values()]}
         nodes = list(plan.method.nodes)
         spec = _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(nodes, n_v))
-        out = _rust(plan, spec, flat_v, flat_y, before, carried=True, carries=False)
-        flat_v, kept, first_bad = out.slot, list(zip(out.v, out.y, strict=True)), out.first_bad
-    shaped = [(a.reshape(blocks[0]), b.reshape(blocks[1])) for a, b in kept]
-    return _finished(plan, flat_v.reshape(blocks[0]), shaped, first_bad)
+
+        def by_core(plan: Plan, v: Array, y: Array, before: Whole) -> Outcome:
+            return _rust(plan, spec, v, y, before.copy(), carried=True, carries=False)
+
+        out = by_core(plan, flat_v, flat_y, before)
+        first_bad = out.first_bad if finish is None else _seen(plan, by_core, by_reference, flat_v, flat_y, before, out)
+        flat_v, kept = out.slot, (out.v, out.y)
+    v, y = (a.reshape(len(a), *block) for a, block in zip(kept, blocks, strict=True))
+    return _finished(plan, flat_v.reshape(blocks[0]), (v, y), first_bad)
+
+
+#: As the core's ``HUGE``.
+_HUGE = 2.0**960
+
+#: Steps of a piece at whose end it is asked whether one of its velocities may have overflowed.
+_PIECE = 1024
+
+
+def _seen(
+    plan: Plan,
+    by_core: Callable[[Plan, Array, Array, Whole], Outcome],
+    by_reference: Callable[[Plan, Array, Array, Whole], Looped],
+    v: Array,
+    y: Array,
+    before: Whole,
+    out: Outcome,
+) -> Whole:
+    """The first bad steps of a run in matrix form, whose velocities the core does not know.
+
+    Members that come near the end of the number range are stepped again from the last look before that, by the reference.
+    """
+    most = _HUGE * min(plan.dt, 1.0)
+
+    def is_near(v: Array, y: Array) -> Any:
+        return (before < 0) & ~((np.abs(v) < most).all(axis=-1 - before.ndim) & (np.abs(y) < most).all(axis=-1 - before.ndim))
+
+    near = np.logical_or.reduce(is_near(out.v, out.y), axis=0) | (out.first_bad > before)
+    if not near.any():
+        return out.first_bad
+    # Who is not finite in what is carried needs no more looks.
+    last = plan.steps if (near & (out.first_bad < 0)).any() else int(out.first_bad.max()) - plan.first
+    for done in range(0, last, _PIECE):
+        piece = plan._replace(first=plan.first + done, steps=min(_PIECE, last - done), every=None, progress=None)
+        ahead = by_core(piece, v, y, before)
+        if is_near(ahead.v[-1], ahead.y[-1]).any():
+            before = by_reference(piece, v, y, before)[3]
+        v, y = ahead.slot, ahead.y[-1]
+    return np.asarray(before)
 
 
 def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
@@ -304,82 +458,105 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in (transition(plan), pulses(plan, given)))
 
     drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt)
-    kept, saves = [], plan.saves.tolist()
+    kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=saves)
-        for i, s in enumerate(states, 1):
-            kept.append((s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)))
+        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=map(int, saves))
+        for i, s in enumerate(states):
+            kept[0][i], kept[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
             if plan.progress is not None:
-                plan.progress(i / len(saves))
-    return _finished(plan, kept[-1][0], kept, before)
+                plan.progress((i + 1) / len(saves))
+    out = _finished(plan, kept[0][-1], kept, before)
+    # Velocities are made of what is carried at saved states only, so a power cannot tell of those between.
+    first_bad = out.first_bad.reshape(-1)
+    for save, v in zip(plan.saves, out.v.reshape(plan.kept, n_v, members), strict=True):
+        bad, k = ~np.isfinite(v).all(axis=0), plan.first + int(save)
+        first_bad[bad & ((first_bad < 0) | (first_bad > k)) & (save > 0)] = k
+    return out
 
 
-# ---- steps of chosen length
+# ---- adaptive steps
 
 
 class Pacing(NamedTuple):
-    """Where to be when, and how exactly. ``first``, ``relative`` and ``absolute`` broadcast over the batch.
+    """When the state is asked for, ascending, and the most attempts of a member."""
 
-    For the core they are rows, of one number for each member or one for all.
-    """
-
-    at: list[float]
-    first: Array
-    relative: Array
-    absolute: Array
+    at: Array
     budget: int
 
 
-class PacedArrays(NamedTuple):
+class AdaptiveArrays(NamedTuple):
     """What a run with a tolerance begins with and what it fills, for the core.
 
     Attributes:
         v: rows of v, of one number for each member or one for all.
         y: rows of y, likewise.
+        paces: where members stand at the start, shape (numbers of a ``Pace``, members).
         saved_v: velocities at the asked times, shape (times, *block, *batch); NaN from where a member stopped.
         saved_y: coordinates, likewise.
-        reached: the time that each member reached, and the step that it would try next, shape (2, members).
-        counts: accepted and rejected attempts and the status, shape (3, members).
+        last_state: the state where members stand at the end, shape (numbers of v and y, members).
+        last_paces: where they stand, as ``paces``.
+        status: how they ended, shape (members,).
     """
 
     v: Array
     y: Array
+    paces: Array
     saved_v: Array
     saved_y: Array
-    reached: Array
-    counts: Whole
-
-
-class Adapted(NamedTuple):
-    """States at the asked times, and for each member the time it reached, its next step, its attempts and its status."""
-
-    v: Array
-    y: Array
-    t: Array
-    h: Array
-    accepted: Whole
-    rejected: Whole
+    last_state: Array
+    last_paces: Array
     status: Whole
 
 
-def adapt(plan: Plan, pacing: Pacing, v: Array, y: Array) -> Adapted:
-    """Make the run."""
-    asked = ("first", "relative", "absolute")
-    if plan.backend == "numpy":
-        from .reference import adaptive  # only such runs need it
+def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, absolute: Array | None) -> Pace:
+    """Where members stand at the start. Without ``absolute`` the relative error is one of the longest that a block has been."""
+    from .reference import adaptive  # only such runs need it
 
+    if first is None:
+        first = adaptive.first_step(plan.system.scaled(1.0, plan.batch), plan.t0, v, y, plan.block_axes)
+    first, relative, wide = (np.broadcast_to(a, plan.batch) for a in (first, relative, 0.0 if absolute is None else absolute))
+    tolerance = relative, wide, 1.0 if absolute is None else 0.0
+    return adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+
+
+def pace_of(numbers: Array) -> Pace:
+    """Where members stand, from its numbers."""
+    from .reference import adaptive
+
+    return adaptive.Pace(*numbers)
+
+
+def _fused_attempt(plan: Plan, budget: int) -> Any:
+    """An attempt at an adaptive step."""
+    made = _fused(plan, "attempt", budget)
+
+    def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
+        out = made([*_rows(plan, v, y), *np.broadcast_arrays(*pace)], None)
+        return (pace_of(out[-len(pace) :]), *_blocks(v, y, out))
+
+    return attempt
+
+
+def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted:
+    """Go on from where members stand."""
+    from .reference import adaptive
+
+    if plan.backend == "numpy":
+        if plan.fused:
+            return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
         pair: Any = plan.method.steps
+        assert plan.method.error_order is not None
         s = plan.system.scaled(1.0, plan.batch)
-        wide: Any = {name: np.broadcast_to(getattr(pacing, name), plan.batch) for name in asked}
-        timing: Any = {"t0": plan.t0, "at": pacing.at, "budget": pacing.budget, "order": plan.method.error_order}
-        return Adapted(*adaptive.run(pair, s, v, y, plan.block_axes, **timing, **wide))
-    kept = len(pacing.at)
-    saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
-    reached, counts = np.empty((2, plan.members)), np.empty((3, plan.members), dtype=np.int64)
-    in_rows: Any = {name: rows(getattr(pacing, name), plan.batch) for name in asked}
-    arrays = PacedArrays(rows(v, plan.batch), rows(y, plan.batch), saved_v, saved_y, reached, counts)
-    _core.adapt(model(plan), plan, pacing._replace(**in_rows), arrays)
-    t, h = (row.reshape(plan.batch) for row in reached)
-    accepted, rejected, status = (row.reshape(plan.batch) for row in counts)
-    return Adapted(saved_v, saved_y, t, h, accepted, rejected, status)
+        attempt = partial(adaptive.attempt, pair, s, plan.method.error_order, plan.block_axes)
+        return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
+    saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
+    n_v, members = prod(plan.system.v_shape), plan.members
+    last = np.empty((n_v + prod(plan.system.y_shape), members))
+    paces = np.stack([np.broadcast_to(number, plan.batch).reshape(members) for number in pace])
+    last_paces, status = np.empty_like(paces), np.empty(members, dtype=np.int64)
+    arrays = AdaptiveArrays(rows(v, plan.batch), rows(y, plan.batch), paces, saved_v, saved_y, last, last_paces, status)
+    _core.adapt(model(plan), plan, pacing, arrays)
+    last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
+    ended = adaptive.Pace(*(row.reshape(plan.batch) for row in last_paces))
+    return adaptive.Outcome(saved_v, saved_y, last_v, last_y, ended, status.reshape(plan.batch))

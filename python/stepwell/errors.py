@@ -38,13 +38,28 @@ class UnsupportedError(StepwellError, ValueError):
     """A method cannot do what a system asks for."""
 
 
+class BusyError(StepwellError, RuntimeError):
+    """A ``World`` was asked to step by one thread while another one steps it."""
+
+
+class FixedError(StepwellError, AttributeError):
+    """What stands once and for all was assigned; the message says how to have another."""
+
+
 class DivergenceWarning(UserWarning):
     """Some members left the range of finite numbers. Their rows say when; their neighbours are not touched."""
 
 
 class ToleranceWarning(UserWarning):
-    """Some members stopped before the last asked time: out of steps, or their steps became too small to move the time."""
+    """Some members stopped before the last asked time: out of steps, or their steps became too small to move the time.
+
+    Or an absolute tolerance is so large that the motion is lost in it.
+    """
 
 
 class ControlWarning(UserWarning):
     """A control is so strong that it overshoots."""
+
+
+class AccuracyWarning(UserWarning):
+    """A run stayed finite, and yet it can be seen that its numbers mean nothing."""

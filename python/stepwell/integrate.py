@@ -13,21 +13,39 @@ import numpy as np
 
 from . import _checks, engine
 from ._checks import Array
-from .control import EnergyControl, Projection
-from .errors import ArgumentError, DivergenceWarning, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
+from .control import EnergyControl, Projection, a_control
+from .errors import (
+    AccuracyWarning,
+    ArgumentError,
+    DivergenceWarning,
+    DTypeError,
+    ShapeError,
+    ToleranceWarning,
+    UnsupportedError,
+)
 from .methods import Method
 from .methods import method as find_method
 from .methods import methods as every_method
 from .reference.types import Whole
-from .result import Collision, Paces, Run, Status
+from .result import AdaptiveState, Collision, Paces, Run, Status
 from .systems import NBody, Sampled, System
+from .systems.base import a_system
 
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
 
-#: A warning says which bodies met if the member can be run again in so many steps times numbers, a moment. Otherwise
-#: ``Run.collisions`` is there to ask.
-QUICK = 10_000_000
+#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, what the method carries,
+#: what is reported), and so many bytes for each saved time (its step number and the time).
+NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
+#: The most steps of a member of a run with a tolerance, unless told otherwise.
+MOST_STEPS = 1_000_000
+
+#: A warning names the bodies that collided if running the member again takes at most so many steps × numbers, which is a moment.
+#: Otherwise ``Run.collisions`` tells them when asked.
+MAX_RERUN = 10_000_000
+
+#: An absolute tolerance above this share of the largest length of a block so far is warned of.
+MAX_ABSOLUTE_SHARE = 0.01
 
 
 def integrate(
@@ -40,16 +58,19 @@ def integrate(
     steps: int | None = None,
     tolerance: Any = None,
     at: Any = None,
-    max_steps: int = 1_000_000,
+    max_steps: int | None = None,
     every: int | None = None,
-    record: Sequence[str] = (),
+    record: str | Sequence[str] | None = (),
     t0: float = 0.0,
     start_step: int = 0,
     start: str | None = None,
     carry: Any = None,
+    carried_by: str | None = None,
     first_bad_step: Any = None,
+    dt_before: float | None = None,
     control: EnergyControl | Projection | None = None,
     form: str = "direct",
+    fused: bool = False,
     threads: int | None = None,
     backend: str = "rust",
     progress: bool = False,
@@ -65,25 +86,37 @@ def integrate(
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero. With a tolerance, the step to try first; a thousandth of the time if None.
+        dt: the step, in units of time, above zero; that of before if None and the run goes on. With a tolerance, the step to try
+            first; if None, a hundredth of the time in which the start changes, and where it is at rest a millionth of the unit of
+            time.
         steps: how many steps, one or more.
         tolerance: in place of ``steps``: every member chooses its own steps so that the estimated error of each stays below this,
-            relative to the length of each block and beside it (error ≤ tolerance·(1 + length)); or a pair (relative,
-            absolute). Each broadcasts over the batch. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5,
+            in each block relative to the longest that the block has been so far, so that the units of v and y do not matter; or a
+            tuple (relative, absolute): below relative·length + absolute, the absolute part in the units of the state. Each is a
+            number or an array that broadcasts over the batch; a list is refused, for it might be meant as either. A run that goes
+            on by ``carry`` has its tolerance already. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5,
             dop853.
-        at: with a tolerance, the times at which to keep the state, ascending, from t0 on. They are reached exactly.
-        max_steps: with a tolerance, the most steps of a member, rejected ones counted.
+        at: with a tolerance, the times at which to keep the state, ascending, from t0 on. Steps do not depend on them: a state
+            within a step is made by one further step from its start.
+        max_steps: with a tolerance, the most steps of a member, rejected ones counted; a million if None.
         every: keep the state every so many steps, with the first and the last; None keeps the last alone.
-        record: quantities to record of every kept state, ``run.recorded``: "energy", and what else the system names in its
-            ``quantities``. Bodies find their energy beside the force of the next step, at little cost.
+        record: quantities to record of every saved state, ``run.recorded``: "energy", and what else the system names in its
+            ``quantities``; nothing if None. Bodies find their energy beside the force of the next step, at little cost.
         t0: time of step 0. Step k is at t0 + k·dt, computed so and never accumulated.
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how a method with a choice starts; see ``method(…).starts``.
-        carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used.
-        first_bad_step: members that diverged before, from ``run.resume``; only they may begin with NaN or infinities.
+        carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, where the
+            run stands.
+        carried_by: the method that carried it, from ``run.resume``. Another is then refused, since it would take it for something
+            else.
+        first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
+            they may begin with NaN or infinities.
+        dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
         control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
+        fused: compute each step with fused multiply-adds, a·b + c rounded once: the second exact arithmetic. The bits are others
+            than without, and the same on every machine and with either backend. For steps of up to some 4000 operations.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as pay.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
         progress: show a progress bar (needs rich).
@@ -98,44 +131,66 @@ def integrate(
 
     Warns:
         DivergenceWarning: how many members left the finite range, which first, and when. Nothing computed is lost.
+        ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
+            large that the motion is lost in it.
+        AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
+            sine; bodies whose energy is recorded ended with another that is of another size.
     """
-    if not isinstance(system, System):
-        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
-    system = system.sized(v, y)
+    system = a_system(system).sized(v, y)
     fits_together(system, how)
+    fused = _checks.flag("fused", fused)
     if tolerance is not None or at is not None:
         fixed = {
             "steps": steps,
             "every": every,
             "start": start,
-            "carry": carry,
+            "carried_by": carried_by,
             "first_bad_step": first_bad_step,
+            "dt_before": dt_before,
             "control": control,
         }
-        fixed |= {"start_step": start_step or None, "form": None if form == "direct" else form}
+        if not isinstance(form, str) or form != "direct":
+            fixed["form"] = form
+        if not isinstance(start_step, int) or start_step != 0:
+            fixed["start_step"] = start_step
         _only_fixed(fixed)
-        return _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, threads, backend, progress)
+        run = _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, carry, fused, threads, backend, progress)
+        _warn_of_nonsense(run)
+        return run
+    if max_steps is not None:
+        raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    dt = dt_before if dt is None else dt
     if dt is None or steps is None:
         missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)
-        raise ArgumentError(f"{missing}: expected with fixed steps; or give tolerance= and at= for steps of chosen length")
+        raise ArgumentError(f"{missing}: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
+    if fused and form != "direct":
+        raise UnsupportedError(f"fused: goes with form='direct' only, got form={form!r}")
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
-    if control is not None and not isinstance(control, (EnergyControl, Projection)):
-        raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
+    control = a_control(control)
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    goes_on_alike(how, dt, carried_by, dt_before)
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
-    system.check_time(max(abs(t0 + k * dt) for k in (start_step, start_step + steps)))
+    begin, end = (t0 + k * dt for k in (start_step, start_step + steps))
+    if not begin < end < np.inf:
+        raise ArgumentError(
+            f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
+            f"after {steps} steps of {dt:g}"
+        )
+    system.check_time(max(abs(begin), abs(end)))
     every = None if every is None else _checks.count("every", every, 1)
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     choice = how.start_choice(start)
+    if isinstance(carry, AdaptiveState):
+        raise ArgumentError("carry: it is that of a run with a tolerance, which goes on with at= and without dt= and steps=")
     if carry is not None and how.carry is None:
         raise ArgumentError(f"carry: {how.name} carries nothing but v between steps")
 
@@ -147,22 +202,31 @@ def integrate(
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     batch = _checks.batch_shape(batches if control is None else batches | {"control": control.batch})
     rows = prod(system.v_shape) + prod(system.y_shape)
-    kept = 1 if every is None else steps // every + 2
-    _checks.fits("the kept states", rows * (kept + 1), batch, "keep less with every= or split the batch")
+    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused)
+    # What the core does not record is computed from the saved states, with some of them in between.
+    recorded = sum(prod(system.quantities[name]) if name in system.quantities else 3 * rows for name in record)
+    _checks.fits(
+        "the saved states",
+        plan.kept * (rows + recorded) + NUMBERS_PER_STATE * (rows + 1),
+        batch,
+        "keep less with every= or split the batch",
+        beside=plan.kept * BYTES_PER_TIME,
+    )
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     if control is not None:
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
-    before = _checks.diverged_before(first_bad_step, v, y, batch)
+    before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
-    with _bar(f"{how.title}, {steps} steps") if progress else nullcontext(None) as told:
-        beside = tuple(name for name in record if name in system.quantities)
-        plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, told, beside)
+    with _bar(f"{how.title}, {steps} steps") if _checks.flag("progress", progress) else nullcontext(None) as told:
+        if record or control is not None or told is not None:
+            beside = tuple(name for name in record if name in system.quantities)
+            plan = plan._replace(system=system, progress=told, record=beside)
         out = engine.advance(plan, v, y, before, carried=carry is not None)
     if isinstance(system, NBody) and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
-        t=t0 + (start_step + plan.saves.astype(np.float64)) * dt,
+        t=_times(plan),
         v=out.v,
         y=out.y,
         status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
@@ -175,14 +239,42 @@ def integrate(
         start_step=start_step,
         steps=steps,
         start=how.starts[choice] if how.starts else None,
-        collision=partial(_collision, plan, v, y, carry is not None) if isinstance(system, NBody) else None,
+        fused=fused,
+        collision=partial(_collision, plan._replace(progress=None), v, y, carry is not None)
+        if isinstance(system, NBody)
+        else None,
         recorded=out.recorded,
         work=out.work,
     )
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     _warn(run, before)
+    _warn_of_nonsense(run)
     return run
+
+
+def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:
+    """Raise if what ``resume`` says of the run so far is of another method, whose carry means something else, or another step."""
+    anew = "to go on with another, start anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
+    if dt_before is not None and dt != (so_far := _checks.number("dt_before", dt_before, unit="units of time")):
+        raise ArgumentError(f"dt: expected the step of the run that goes on, dt_before = {so_far!r}, got {dt!r}; {anew}")
+    if carried_by is not None and _checks.known("carried_by", carried_by, [each.name for each in every_method()]) != method.name:
+        raise ArgumentError(
+            f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
+            f"{anew}"
+        )
+
+
+def _times(plan: engine.Plan) -> Array:
+    """t0 + k·dt of every saved state; in place, for there may be millions of them."""
+    if plan.every is None:
+        return np.array([plan.t0 + float(plan.first + plan.steps) * plan.dt])
+    t = np.arange(0.0, plan.steps + plan.every, plan.every)[: plan.kept]
+    t[-1] = plan.steps
+    t += plan.first
+    t *= plan.dt
+    t += plan.t0
+    return t
 
 
 def _only_fixed(given: dict[str, Any]) -> None:
@@ -200,8 +292,10 @@ def _adapt(
     tolerance: Any,
     at: Any,
     max_steps: Any,
-    record: Sequence[str],
+    record: Any,
     t0: Any,
+    carry: Any,
+    fused: bool,
     threads: int | None,
     backend: str,
     progress: bool,
@@ -210,46 +304,63 @@ def _adapt(
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if tolerance is None or at is None:
-        raise ArgumentError(f"{'tolerance' if tolerance is None else 'at'}: expected too, since the other was given")
+    if carry is not None and not isinstance(carry, AdaptiveState):
+        raise DTypeError(f"carry: with a tolerance expected that of run.resume, got {type(carry).__name__}")
+    if at is None or (tolerance is None) == (carry is None):
+        if at is not None and carry is not None:
+            raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
+        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
     t0 = _checks.number("t0", t0, unit="units of time")
     times = _checks.numbers("at", at, unit="units of time")
     if times.ndim != 1 or len(times) == 0:
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
-    if times[0] < t0 or (np.diff(times) <= 0).any():
-        raise ArgumentError(
-            f"at: expected times that ascend from t0 = {t0:g} on, got {times[:5].tolist()}{'…' * (len(times) > 5)}"
-        )
+    since = t0 if carry is None else carry.last
+    if times[0] < since or (np.diff(times) <= 0).any():
+        begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
+        raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
     system.check_time(max(abs(t0), abs(float(times[-1]))))
     backend = _checks.known("backend", backend, BACKENDS)
-    budget = _checks.count("max_steps", max_steps, 1)
-    pair = tolerance if isinstance(tolerance, tuple) else (tolerance, tolerance)
-    if len(pair) != 2:
-        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(pair)} of them")
-    relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in pair)
-    if dt is None:
-        dt = 1e-3 * (float(times[-1]) - t0) or 1.0
-    first = _checks.numbers("dt", dt, positive=True, unit="units of time")
+    budget = MOST_STEPS if max_steps is None else _checks.count("max_steps", max_steps, 1)
     v = _checks.block("v", v, system.v_shape, system.axes)
     y = _checks.block("y", y, system.y_shape, system.axes)
-    batch = _checks.batch_shape(
-        {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-        | {"tolerance": np.broadcast_shapes(relative.shape, absolute.shape), "dt": first.shape}
-    )
+    batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    if carry is None:
+        relative, absolute = _tolerances(tolerance)
+        first = None if dt is None else _checks.numbers("dt", dt, positive=True, unit="units of time")
+        shapes = (relative.shape, () if absolute is None else absolute.shape)
+        batches |= {"tolerance": _checks.batch_shape({"relative": shapes[0], "absolute": shapes[1]})}
+        batches |= {} if first is None else {"dt": first.shape}
+    else:
+        if dt is not None:
+            raise ArgumentError("dt: the run that goes on has its next step already")
+        if carry.method != how.name:
+            raise ArgumentError(f"carry: expected that of a run by {how.name}, got one by {carry.method}")
+        batches |= {"carry": carry.pace.shape[1:]}
+    batch = _checks.batch_shape(batches)
+    if carry is not None and carry.pace.shape[1:] != batch:
+        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.pace.shape[1:]}")
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     numbers = prod(system.v_shape) + prod(system.y_shape)
-    _checks.fits("the kept states", numbers * (len(times) + 1), batch, "ask for fewer times or split the batch")
+    _checks.fits(
+        "the saved states",
+        len(times) * numbers + NUMBERS_PER_STATE * (numbers + 1),
+        batch,
+        "ask for fewer times or split the batch",
+        beside=len(times) * BYTES_PER_TIME,
+    )
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
-    with _bar(f"{how.title} to t = {times[-1]:g}") if progress else nullcontext(None) as told:
-        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told)
-        out = engine.adapt(plan, engine.Pacing(times.tolist(), first, relative, absolute, budget), v, y)
+    with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
+        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
+        pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else engine.pace_of(carry.pace)
+        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
+    accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
     run = Run(
         t=times,
         v=out.v,
         y=out.y,
         status=out.status.astype(np.int8),
-        first_bad_step=np.where(out.status == 0, -1, out.accepted + 1),
+        first_bad_step=np.where(out.status == 0, -1, accepted + 1),
         carry=None,
         system=system,
         method=how,
@@ -258,18 +369,37 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.t, out.h, out.accepted, out.rejected, how.evaluations * (out.accepted + out.rejected)),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.evaluations * (accepted + rejected + extra_steps)),
+        stand=AdaptiveState(out.last_v, out.last_y, np.stack(out.pace), float(times[-1]), how.name),
+        fused=fused,
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
     _warn_of_stops(run)
+    _warn_of_lost(run, out.pace)
     return run
+
+
+def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
+    """The relative one, and the absolute one of a pair."""
+    if isinstance(tolerance, list):
+        raise DTypeError(
+            "tolerance: expected a number, an array over the batch, or a tuple (relative, absolute), got a list, which might be "
+            "meant as either; make it a NumPy array or a tuple"
+        )
+    if not isinstance(tolerance, tuple):
+        return _checks.numbers("tolerance", tolerance, positive=True), None
+    if len(tolerance) != 2:
+        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(tolerance)} of them")
+    relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in tolerance)
+    return relative, absolute
 
 
 #: Why a member of a run with a tolerance stopped, in words.
 _WHY = {
     Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time",
+    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
+    "by the errors that the tolerance allows",
     Status.NOT_FINITE: "no step, however small, gives finite numbers",
 }
 
@@ -279,14 +409,54 @@ def _warn_of_stops(run: Run) -> None:
         return
     stopped = run.status != 0
     time = float(run.paces.t[stopped].min())
-    first = tuple(int(i) for i in np.argwhere(stopped & (run.paces.t == time))[0])
-    who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
+    first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
     warnings.warn(
-        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {who} at t = {time:g}: "
-        f"{_WHY[Status(int(run.status[first]))]}",
+        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {_member(first)} "
+        f"at t = {time:g}: {_WHY[Status(int(run.status[first]))]}",
         ToleranceWarning,
         stacklevel=4,
     )
+
+
+def _warn_of_nonsense(run: Run) -> None:
+    """Warn of what is finite and yet means nothing, as far as it is seen without more work."""
+    told = [run.system.doubt(run.y)]
+    if isinstance(run.system, NBody) and run.system.keeps_energy and "energy" in run.recorded and len(run.t) > 1:
+        with np.errstate(all="ignore"):
+            first, last = run.recorded["energy"][[0, -1]]
+            moved = np.maximum(run.system.kinetic(run.v[0]), run.system.kinetic(run.v[-1]))
+            wrong = np.abs(last - first) > 0.5 * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+        wrong &= np.isfinite(last)  # who diverged was named before
+        if wrong.any():
+            index = tuple(np.argwhere(wrong)[0].tolist())
+            told.append(
+                f"{np.count_nonzero(wrong)} of {wrong.size} member(s) have another energy at the end: {_member(index)} has "
+                f"{last[index]:.3g} instead of {first[index]:.3g}, so {run.method.name} did not follow its orbit"
+            )
+    for text in told:
+        if text is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
+
+
+def _member(index: tuple[int, ...]) -> str:
+    """A member in words, by its place in the batch."""
+    return f"member {index if len(index) != 1 else index[0]}" if index else "the only member"
+
+
+def _warn_of_lost(run: Run, pace: Any) -> None:
+    """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
+    lost = np.zeros(run.status.shape, dtype=bool)
+    for square in (pace.longest_v, pace.longest_y):
+        longest = np.sqrt(square)
+        lost |= (longest > 0.0) & (pace.absolute > pace.relative * longest) & (pace.absolute > MAX_ABSOLUTE_SHARE * longest)
+    if lost.any():
+        warnings.warn(
+            f"tolerance: for {np.count_nonzero(lost)} of {lost.size} member(s) the absolute part lets a step err by more than "
+            f"{MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or a "
+            f"smaller absolute part",
+            ToleranceWarning,
+            stacklevel=4,
+        )
 
 
 def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
@@ -314,9 +484,11 @@ def fits_together(system: System, method: Method) -> None:
         )
 
 
-def _quantities(system: System, record: Sequence[str]) -> list[str]:
+def _quantities(system: System, record: Any) -> list[str]:
     """What to record, each once; raise if the system does not have it."""
-    given = [record] if isinstance(record, str) else list(record)
+    if type(record) is tuple and not record:
+        return []
+    given = [record] if isinstance(record, str) else [] if record is None else _checks.several("record", record, "quantities")
     known = list(dict.fromkeys(["energy", *system.quantities]))
     for name in given:
         _checks.known("record", name, known)
@@ -362,15 +534,14 @@ def _warn(run: Run, before: Whole | None) -> None:
     if not bad.any():
         return
     step = int(run.first_bad_step[bad].min())
-    first = tuple(int(i) for i in np.argwhere(bad & (run.first_bad_step == step))[0])
-    who = f"member {first if len(first) != 1 else first[0]}" if first else "the only member"
+    first = tuple(np.argwhere(bad & (run.first_bad_step == step))[0].tolist())
     met = ""
-    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= QUICK:
+    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= MAX_RERUN:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
     warnings.warn(
-        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {who} at step {step} "
+        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {_member(first)} at step {step} "
         f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",
         DivergenceWarning,
         stacklevel=3,

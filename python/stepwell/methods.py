@@ -66,6 +66,10 @@ class Method:
             setattr(self, key, tuple(value) if isinstance(value, list) else value)
         self.__doc__ = self._text()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """There is one of each: a copy is the same, and what is read from a file is that of the name."""
+        return method, (self.name,)
+
     @property
     def steps(self) -> Steps:
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
@@ -76,7 +80,7 @@ class Method:
         if start is None:
             return 0
         if not self.starts:
-            raise ArgumentError(f"start: {self.name} starts in one way only, got {start!r}")
+            raise ArgumentError(f"start: {self.name} starts in one way only, got {_checks.short(start)}")
         return self.starts.index(_checks.known("start", start, self.starts))
 
     def _text(self) -> str:
@@ -116,6 +120,18 @@ def _catalogue() -> dict[str, Method]:
 def methods() -> tuple[Method, ...]:
     """Every method, in the order of the document."""
     return tuple(_catalogue().values())
+
+
+def choice(methods: Any) -> list[Method]:
+    """The methods that are meant by an argument ``methods``, each once; all if None.
+
+    Raises:
+        ArgumentError: if they are no list of methods, or none.
+    """
+    chosen = list(_catalogue().values()) if methods is None else _checks.several("methods", methods, "names")
+    if not chosen:
+        raise ArgumentError("methods: expected at least one, got none")
+    return list(dict.fromkeys(map(method, chosen)))
 
 
 def method(name: str | Method) -> Method:

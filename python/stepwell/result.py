@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import _checks
 from ._checks import Array
+from ._value import Value, by_value
 from .errors import UnsupportedError
 from .methods import Method
 from .reference.types import Whole
@@ -45,15 +47,16 @@ class Collision(NamedTuple):
     distance: float
 
 
+@by_value
 class Paces(NamedTuple):
     """What a run with a tolerance did, per member, shape (*batch).
 
     Attributes:
-        t: the time that was reached.
+        t: where the member stands: the start of the step in which the last asked time is, or where it stopped.
         h: the step that would be tried next.
-        accepted: steps that the state went on with.
-        rejected: steps whose error was above the tolerance.
-        evaluations: rate evaluations of both.
+        accepted: steps that the state went on with, since the first piece of the run.
+        rejected: steps whose error was above the tolerance, likewise.
+        evaluations: function (rate) evaluations of both, and of the steps that were made for the asked times, likewise.
     """
 
     t: Array
@@ -63,16 +66,35 @@ class Paces(NamedTuple):
     evaluations: Whole
 
 
-class Run:
-    """A run, with what was asked for kept along the first axis.
+@by_value
+class AdaptiveState(NamedTuple):
+    """Where the members of a run with a tolerance stand, for ``integrate`` to go on from; its ``carry``.
 
     Attributes:
-        t: times of the kept states, shape (saved,).
+        v: velocities at the time of each, shape (*block, *batch).
+        y: coordinates, likewise.
+        pace: all that the choice of the next step depends on, shape (numbers, *batch).
+        last: the last time that was asked for.
+        method: name of the method, whose pace it is.
+    """
+
+    v: Array
+    y: Array
+    pace: Array
+    last: float
+    method: str
+
+
+class Run(Value):
+    """A run, with the states that were asked for saved along the first axis.
+
+    Attributes:
+        t: times of the saved states, shape (saved,).
         v: velocities, shape (saved, *block, *batch).
         y: coordinates, likewise.
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
-        first_bad_step: per member, the number of the first step that was not finite, or −1.
-        carry: what the method carries in the place of v (Verlet: ``y_prev``), or None.
+        first_bad_step: per member, the number of the first step that was not finite, or that a tolerance did not allow, or −1.
+        carry: what the method carries in the place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
         system: what was stepped.
         method: how.
         dt: the step.
@@ -82,6 +104,7 @@ class Run:
         start: how the method was started, or None.
         recorded: what was asked for by ``record=``, by name, shapes (saved, *shape of it, *batch).
         paces: what a run with a tolerance did, or None; ``dt`` and ``steps`` mean nothing then.
+        fused: whether steps were computed with fused multiply-adds.
         work: the energy that a control or a projection gave to each member in this run, or None, shape (*batch). Of a control it
             is the sum over the steps of ((1 − g)² − 1)·K, what its push −g·v alone would change, averaged over the evaluations.
     """
@@ -106,6 +129,8 @@ class Run:
         recorded: dict[str, Array] | None = None,
         work: Array | None = None,
         paces: Paces | None = None,
+        stand: AdaptiveState | None = None,
+        fused: bool = False,
     ) -> None:
         self.t = t
         self.v = v
@@ -125,24 +150,36 @@ class Run:
         self.recorded = recorded or {}
         self.work = work
         self.paces = paces
+        #: Where the members of a run with a tolerance stand, at ``paces.t``; None of other runs.
+        self.stand = stand
+        self.fused = fused
+
+    def _held(self) -> dict[str, Any]:
+        """Everything but how to find out who collided, which follows from it."""
+        return {name: each for name, each in vars(self).items() if name != "collision"}
 
     def quantity(self, name: str) -> Array:
-        """A quantity that could have been recorded, of every kept state, shape (saved, *shape of it, *batch)."""
+        """A quantity that could have been recorded, of every saved state, shape (saved, *shape of it, *batch).
+
+        Raises:
+            UnknownNameError: if the system has none of that name.
+        """
         v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
+        _checks.known("name", name, ("energy", *self.system.quantities))
         with np.errstate(all="ignore"):
             values = self.system.recordable(name, v, y, self.dt)
         return np.moveaxis(values, values.ndim - (v.ndim - len(self.system.v_shape)), 0)
 
     @property
     def energy(self) -> Array:
-        """Energy of every kept state, shape (saved, *batch): what was recorded, or computed now by the system's ``energy``."""
+        """Energy of every saved state, shape (saved, *batch): what was recorded, or computed now by the system's ``energy``."""
         if "energy" in self.recorded:
             return self.recorded["energy"]
         return self.quantity("energy")
 
     @property
     def z(self) -> Array:
-        """Auxiliary outputs of every kept state, shape (saved, outputs, *batch), computed now; see the system's ``auxiliary``.
+        """Auxiliary outputs of every saved state, shape (saved, outputs, *batch), computed now; see the system's ``auxiliary``.
 
         Raises:
             UnsupportedError: if the system has none.
@@ -167,31 +204,32 @@ class Run:
     def resume(self) -> dict[str, Any]:
         """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
 
-        System, method, dt and form are yours to give again. Members that diverged go on as they are and are not named again.
-
-        Raises:
-            UnsupportedError: of a run with a tolerance, whose steps depend on where it was asked to be.
+        System, method and form are yours to give again; what Verlet or leapfrog carries is for the same method only. So are, of a
+        run with a tolerance, ``max_steps``, and ``at``, which goes on behind the last time. ``dt`` is that of this run; another
+        is refused, since step k is at t0 + k·dt. Members that diverged go on as they are and are not named again.
         """
-        if self.paces is not None:
-            raise UnsupportedError("resume: a run with a tolerance goes on from its last state, run.v[-1], run.y[-1], run.t[-1]")
+        told = {"fused": True} if self.fused else {}
+        if self.stand is not None:
+            return {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, "carry": self.stand, **told}
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
+        state |= {"dt_before": self.dt, **told}
         if self.start is not None:
             state["start"] = self.start
         if self.status.any():
             state["first_bad_step"] = self.first_bad_step
         if self.system.control is not None:
             state["control"] = self.system.control
-        return state | ({} if self.carry is None else {"carry": self.carry})
+        return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
 
     def __repr__(self) -> str:
         bad = int(np.count_nonzero(self.status))
         if self.paces is not None:
             steps, rejected = int(self.paces.accepted.sum()), int(self.paces.rejected.sum())
             return (
-                f"<run of {self.system!r} by {self.method.name} with a tolerance: {len(self.t)} kept from t = {self.t[0]:g} to "
+                f"<run of {self.system!r} by {self.method.name} with a tolerance: {len(self.t)} saved from t = {self.t[0]:g} to "
                 f"{self.t[-1]:g}, {self.status.size} member(s), {steps} steps, {rejected} rejected, {bad} stopped early>"
             )
         return (
             f"<run of {self.system!r} by {self.method.name}: {self.steps} steps of {self.dt:g} from t = {self.t[0]:g}, "
-            f"{len(self.t)} kept, {self.status.size} member(s), {bad} diverged>"
+            f"{len(self.t)} saved, {self.status.size} member(s), {bad} diverged>"
         )

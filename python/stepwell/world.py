@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
-from .control import EnergyControl, Projection
-from .errors import ArgumentError, DTypeError, ShapeError
-from .integrate import fits_together
+from .control import EnergyControl, Projection, a_control
+from .errors import ArgumentError, FixedError, ShapeError
+from .integrate import fits_together, goes_on_alike
 from .methods import Method
 from .methods import method as find_method
-from .systems import System
+from .systems import Sampled, Sinusoid, System
+from .systems.base import a_system
 
 
 class World:
     """A loop over the user's own arrays: everything is checked and prepared once, then ``step`` works in place.
 
     Args:
-        system: what to step.
+        system: what to step. Its numbers are taken now: an array of parameters that is changed later changes nothing here.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block, a writeable C-contiguous float64 array of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
@@ -29,17 +31,32 @@ class World:
         start_step: number of the first step.
         start: how a method with a choice starts.
         control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
+        carry: what the method carries in the place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
+            the same step.
+        carried_by: the method that carried it, and
+        dt_before: the step so far, from the ``resume`` of a run or a world: others are then refused.
+        fused: compute each step with fused multiply-adds; see ``integrate``.
 
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system.
 
     ``step(n)`` steps in place and allocates nothing: it is meant for the few microseconds of a frame, and keeps the GIL for
-    them. A method that carries something else than v (Verlet) keeps it inside; if you change ``v`` or ``y`` between steps, it
-    starts anew from what you wrote. Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
+    them. A method that carries something else than v (Verlet, leapfrog) keeps it inside; if you change ``v`` or ``y`` between
+    steps, it starts anew from what you wrote. Ctrl-C leaves the world at the last step that was made whole.
+    Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
+
+    System, method and step are fixed; ``World(…, **world.resume)`` makes another world that goes on from where this one stands.
+    ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make the same one once more, with arrays of its own.
+
+    Example:
+        >>> v, y = np.zeros(3), np.ones(3)
+        >>> world = sw.World(sw.Oscillator(1.0), "leapfrog", v=v, y=y, dt=0.1)
+        >>> world.step(10)
+        >>> finer = sw.World(world.system, "rk4", dt=0.01, v=v.copy(), y=y.copy(), t0=world.t)
     """
 
-    __slots__ = ("_core", "_v", "_y", "dt", "method", "step", "system")
+    __slots__ = ("_core", "_dt", "_fused", "_given", "_method", "_start", "_system", "_t0", "_v", "_y", "step")
 
     def __init__(
         self,
@@ -53,35 +70,99 @@ class World:
         start_step: int = 0,
         start: str | None = None,
         control: EnergyControl | Projection | None = None,
+        carry: Array | None = None,
+        carried_by: str | None = None,
+        dt_before: float | None = None,
+        fused: bool = False,
     ) -> None:
-        if not isinstance(system, System):
-            raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
-        self.system = system = system.sized(v, y)
-        self.method = find_method(method)
-        fits_together(system, self.method)
-        self.dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        how = find_method(method)
+        system = _frozen(copy.deepcopy(a_system(system).sized(v, y)))
+        fits_together(system, how)
+        dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
-        batch = np.shape(y)[len(system.y_shape) :]
-        self._v = _checks.in_place("v", v, (*system.v_shape, *batch))
-        self._y = _checks.in_place("y", y, (*system.y_shape, *batch))
+        batch = _checks.shape_of("y", y)[len(system.y_shape) :]
+        v = _checks.in_place("v", v, (*system.v_shape, *batch))
+        y = _checks.in_place("y", y, (*system.y_shape, *batch))
         if np.shares_memory(v, y):
             raise ArgumentError("v and y: expected two arrays to step in place, got arrays that share memory")
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         first = _checks.count("start_step", start_step, 0)
-        if control is not None:
-            if not isinstance(control, (EnergyControl, Projection)):
-                raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(control).__name__}")
+        choice = how.start_choice(start)
+        if carry is not None:
+            if how.carry is None:
+                raise ArgumentError(f"carry: {how.name} carries nothing but v between steps")
+            carry = _checks.numbers("carry", carry)
+            if carry.shape != v.shape:
+                raise ShapeError(f"carry: expected the shape of v, {v.shape}, got {carry.shape}")
+            carry = np.ascontiguousarray(carry).reshape(-1)
+        stepped = system
+        if (control := a_control(control)) is not None:
             if _checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
-            self.system = system = system.controlled(control, self._v, self._y, self.dt)
-            fits_together(system, self.method)
-        system.check_time(abs(t0) + first * self.dt)
-        plan = engine.Plan(system, self.method, batch, self.dt, t0, first, choice=self.method.start_choice(start))
+            stepped = system.controlled(control, v, y, dt)
+            fits_together(stepped, how)
+        stepped.check_time(abs(t0) + first * dt)
+        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=_checks.flag("fused", fused))
         # Views: the core knows rows, not axes.
-        self._core = _core.World(engine.model(plan), plan, self._v.reshape(-1), self._y.reshape(-1))
+        loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry)
+        self._core = loop
+        self._given, self._system, self._method, self._dt = system, stepped, how, dt
+        self._t0, self._start, self._v, self._y, self._fused = t0, start, v, y, plan.fused
         #: ``step(n=1)`` makes n steps in place.
-        self.step: Any = self._core.step
+        object.__setattr__(self, "step", loop.step)
+
+    step: Any
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not name.startswith("_"):
+            raise FixedError(
+                f"{name}: a world's {name} cannot be assigned; write into the arrays world.v and world.y, or make another world "
+                f"that goes on from here, World(system, method, dt=dt, **world.resume), with what is to change"
+            )
+        object.__setattr__(self, name, value)
+
+    @property
+    def system(self) -> System:
+        """What is stepped, with what controls it; its numbers are those of when the world was made, and are read-only."""
+        return self._system
+
+    @property
+    def method(self) -> Method:
+        """How."""
+        return self._method
+
+    @property
+    def dt(self) -> float:
+        """The step, in units of time."""
+        return self._dt
+
+    @property
+    def resume(self) -> dict[str, Any]:
+        """Arguments with which another ``World``, or ``integrate``, goes on from here to the bit; the arrays are copies.
+
+        System, method and dt are yours to give again. With another method leave ``carry`` and ``start`` out; with another dt give
+        ``t0=world.t`` and ``start_step=0``, since time is t0 + k·dt, and leave ``carry`` out.
+        """
+        state: dict[str, Any] = {"v": self._v.copy(), "y": self._y.copy(), "t0": self._t0, "start_step": self.step_number}
+        if self._start is not None:
+            state["start"] = self._start
+        if self._fused:
+            state["fused"] = True
+        if self._system.control is not None:
+            state["control"] = self._system.control
+        carry = self._core.carry() if self._method.carry is not None else None
+        return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
+
+    def __copy__(self) -> World:
+        return World(self._given, self._method, dt=self._dt, **self.resume)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> World:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._given, self._method.name, self._dt, self.resume)
 
     @property
     def v(self) -> Array:
@@ -102,3 +183,19 @@ class World:
     def step_number(self) -> int:
         """The number of the step at which the world stands."""
         return self._core.step_number
+
+
+def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
+    return World(system, method, dt=dt, **state)
+
+
+def _frozen(what: Any) -> Any:
+    """The same, with all its arrays read-only: what is written there would be seen by nobody."""
+    if isinstance(what, np.ndarray):
+        what.flags.writeable = False
+    elif isinstance(what, (list, tuple)):
+        for each in what:
+            _frozen(each)
+    elif isinstance(what, (System, Sampled, Sinusoid)):
+        _frozen(list(vars(what).values()))
+    return what

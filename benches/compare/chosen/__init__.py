@@ -1,4 +1,4 @@
-"""Steps of chosen length at equal errors: one orbit, and ten thousand, by stepwell, numba, SciPy and heyoka.
+"""Adaptive steps at equal errors: one orbit, and ten thousand, by stepwell, numba, SciPy and heyoka.
 
 Each contestant goes over the same orbits with tolerances from coarse to fine. Compared is the time that it takes to be as exact
 as asked, between the two tolerances that enclose that error, on logarithmic scales.

@@ -19,7 +19,7 @@ from .orbits import Orbits, arenstorf, kepler
 
 #: Errors at the end, the median of all orbits, at which contestants are compared. Axes are about 1.
 ERRORS = (1e-3, 1e-6, 1e-9)
-TOLERANCES = tuple(10.0 ** -np.arange(2.0, 14.5, 0.5))
+TOLERANCES = tuple(10.0 ** -np.arange(1.0, 14.5, 0.5))
 #: Seconds after which a contestant gets no finer tolerance, and its least time of a sample.
 PATIENCE, SAMPLE = 3.0, 0.02
 

@@ -64,8 +64,11 @@ def kernels(*without: str, **how):
 
 
 as_many_as_pay = kernels("cluster_leapfrog", threads=None)
+#: Large clusters are no single tape, and so are not fused.
+fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", threads=1, fused=True)
 all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),
+    Contestant("stepwell, fused, 1 thread", fused),
     Contestant(f"stepwell, up to {threads()} threads", as_many_as_pay | all_of_them),
 ]

@@ -1,6 +1,6 @@
 """Advice: which method and which step are the cheapest that are good enough for a scene, and how far they are from blowing up.
 
-``motion`` knows the true motion, ``trials`` and ``paced`` run the scene with fixed steps and with steps of chosen length,
+``motion`` knows the true motion, ``trials`` and ``adaptive`` run the scene with fixed steps and with adaptive steps,
 ``candidates`` makes both alike for ``search``, which finds the fewest steps that are good enough; ``predict`` asks the
 eigenvalues, ``result`` tells it.
 """
@@ -9,28 +9,39 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 
 from .. import _checks
 from ..charts.measure import TIMED_STEP
-from ..errors import ArgumentError, DTypeError, UnsupportedError
+from ..errors import ArgumentError, TooLargeError, UnsupportedError
 from ..integrate import integrate
-from ..methods import Method
-from ..methods import method as find_method
-from ..methods import methods as every_method
+from ..methods import Method, choice
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from . import predict
-from .candidates import SHARE, Candidate, Fixed, Paced
+from .adaptive import AdaptiveTrials
+from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed
 from .motion import Grid, motion_of
-from .paced import PacedTrials
 from .result import Advice, Rejected, Row, Shortfall
-from .search import DOMINATED, MOST, Found, Missed, Search
+from .search import MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
 from .trials import Trial, Trials, step_times, tried_times
 
 __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
 
 COSTS = ("time", "evaluations")
+
+#: More seconds than this are no budget: the age of the universe is half of it.
+MOST_SECONDS = 1e18
+
+#: A frame may be this many horizons long, for its end is reached.
+LONGEST_FRAME = 100.0
+
+#: Of a state of more numbers no run is long enough that could be tried.
+MAX_NUMBERS = 100_000
+
+#: A scene by its name, made once: some take long to compute their true motion.
+_named = cache(find_scene)
 
 
 def advise(
@@ -57,9 +68,9 @@ def advise(
         budget: seconds of computing that may be used in a frame; if None, the frame itself, with the second as the unit of time.
             Without a frame, seconds in a unit of time, or no bound. Where frames take different times, the longest must keep it.
         methods: names, or what ``stepwell.method`` returns; all if None.
-        cost: ``"time"`` ranks by measured time, ``"evaluations"`` by rate evaluations, which repeat. Where frames cost
+        cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which repeat. Where frames cost
             differently, their mean counts.
-        fixed: leave out steps of chosen length, which a ``World`` cannot make.
+        fixed: leave out adaptive steps, which a ``World`` cannot make.
 
     Returns:
         An ``Advice``; print it.
@@ -67,30 +78,33 @@ def advise(
     Raises:
         ArgumentError: what was given and what was expected, or that the true motion of the scene is not known for any time.
     """
-    if not isinstance(scene, (Scene, str)):
-        raise DTypeError(f"scene: expected a Scene or its name, got {type(scene).__name__}")
-    scene = find_scene(scene)
-    if isinstance(methods, str):
-        raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
-    chosen = list(dict.fromkeys(every_method() if methods is None else map(find_method, methods)))
-    if not chosen:
-        raise ArgumentError("methods: expected at least one, got none")
+    scene, chosen = _named(scene) if isinstance(scene, str) else find_scene(scene), choice(methods)
     tolerance = _checks.number("tolerance", tolerance, positive=True)
     cost = _checks.known("cost", cost, COSTS)
+    fixed = _checks.flag("fixed", fixed)
     frame = None if frame is None else _checks.number("frame", frame, positive=True, unit="units of time")
     budget = frame if budget is None else _checks.number("budget", budget, positive=True, unit="seconds")
+    if budget is not None and budget > MOST_SECONDS:
+        raise ArgumentError(f"budget: expected at most {MOST_SECONDS:g} seconds, got {budget:g}")
     if scene.system.batch:
         raise ArgumentError(f"scene: expected a system of one member, got parameters of shape {scene.system.batch}")
+    if (numbers := scene.v.size + scene.y.size) > MAX_NUMBERS:
+        raise TooLargeError(f"scene: expected a state of at most {MAX_NUMBERS} numbers, got one of {numbers}")
+
+    if frame is not None and frame > LONGEST_FRAME * scene.horizon:
+        raise ArgumentError(
+            f"frame: expected at most {LONGEST_FRAME:g} times the horizon of {scene.horizon:g} units of time, got {frame:g}"
+        )
 
     known = motion_of(scene, frame, tolerance)
     trials = Trials(known)
-    most = MOST / max(1.0, trials.numbers / 8)
-    paced = PacedTrials(known, SHARE * tolerance, most)
+    most = MAX_EVALUATIONS / max(1.0, trials.numbers / 8) ** SIZE_EXPONENT
+    adaptive = AdaptiveTrials(known, ERROR_SHARE * tolerance, most)
     candidates: list[Candidate] = []
     rejected = []
     for method in chosen:
-        ways: list[Candidate] = [Fixed(method, trials, known.grid)]
-        ways += [Paced(method, paced)] if method.error_order is not None and not fixed else []
+        ways: list[Candidate] = [Fixed(method, trials, known.grid, known.share)]
+        ways += [Adaptive(method, adaptive)] if method.error_order is not None and not fixed else []
         for candidate in ways:
             why = _refusal(scene, candidate)
             if why is None:
@@ -100,13 +114,13 @@ def advise(
 
     times = _times(scene, candidates)
     prices = times if cost == "time" else {each.name: float(each.method.evaluations) for each in candidates}
-    search = Search(tolerance, known.grid.spans, prices, most)
+    search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + adaptive.work)
     found, missed = search.run(candidates)
 
-    spent = _Spending(known.grid, paced, times)
+    spent = _Spending(known.grid, adaptive, times)
     broken = [each for each in candidates if each.name in found and not spent.fits(each, found[each.name].k, budget)]
     if budget is not None and any(each.by == "tolerance" for each in broken):
-        # What is cheap in the mean but not in its worst frame must not stand in the way of what is dearer and even.
+        # What is cheap on average but not in its worst frame must not exclude what costs more on average, and the same in all.
         rest = [each for each in candidates if each not in broken]
         useful = max(2.0 * budget, min(spent.longest(each, found[each.name].k) for each in broken))
         again, _ = search.run(rest, {each.name: spent.steps(each, useful) for each in rest})
@@ -125,15 +139,15 @@ def advise(
             rejected.append(Rejected(each.method.name, "budget", reason, each.by))
     fastest = predict.fastest_oscillation(trials) if fits else None
     ranked = tuple(_row(trials, each, found[each.name], spent, budget, fastest) for each in fits)
-    shortfall = None if ranked else _shortfall(search, candidates, found, spent, budget)
-    made = trials.made + paced.made
+    shortfall = None if ranked else _shortfall(candidates, found, spent, budget)
+    made = trials.made + adaptive.made
     return Advice(trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut)
 
 
 def _refusal(scene: Scene, candidate: Candidate) -> str | None:
     """Why the method cannot do the scene with its control, or None: a step tells."""
     if candidate.by == "tolerance" and scene.control is not None:
-        return "steps of chosen length do not go with a control"
+        return "adaptive steps do not go with a control"
     dt = TIMED_STEP * scene.dt
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -157,8 +171,8 @@ def _times(scene: Scene, candidates: Sequence[Candidate]) -> dict[str, float]:
 class _Spending:
     """Measured seconds of a run, in a frame, or in a unit of time without one."""
 
-    def __init__(self, grid: Grid, paced: PacedTrials, times: Mapping[str, float]) -> None:
-        self.grid, self.paced, self.times = grid, paced, times
+    def __init__(self, grid: Grid, adaptive: AdaptiveTrials, times: Mapping[str, float]) -> None:
+        self.grid, self.adaptive, self.times = grid, adaptive, times
 
     def mean(self, candidate: Candidate, trial: Trial) -> float:
         """On the whole."""
@@ -184,7 +198,7 @@ class _Spending:
 
     def most(self, candidate: Candidate, k: int) -> int:
         """The most steps in a frame."""
-        return self.paced.worst(candidate.method, candidate.tolerance(k)) if isinstance(candidate, Paced) else k
+        return self.adaptive.worst(candidate.method, candidate.tolerance(k)) if isinstance(candidate, Adaptive) else k
 
 
 def _row(
@@ -200,7 +214,7 @@ def _row(
         limit = predict.limit(trials, method, fastest)
         observed = predict.observed_limit(trials, method, trial.steps)
     robust: float | None = found.robust
-    if isinstance(candidate, Paced) and found.robust is not None:
+    if isinstance(candidate, Adaptive) and found.robust is not None:
         robust = candidate.tolerance(found.robust)
     return Row(
         method=method,
@@ -224,7 +238,7 @@ def _row(
         mode_frequency=limit.frequency,
         observed_limit=observed,
         robust=robust,
-        tolerance=candidate.tolerance(found.k) if isinstance(candidate, Paced) else None,
+        tolerance=candidate.tolerance(found.k) if isinstance(candidate, Adaptive) else None,
         rejected_steps=trial.rejected,
         worst_evaluations=method.evaluations * spent.most(candidate, found.k) if grid.framed else None,
     )
@@ -234,47 +248,31 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     trial = missed.trial
     detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
     tried = f"with {candidate.said(missed.k)} ({detail})"
-    too_dear = f"costs over {DOMINATED:g} times the least"
+    too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
     needs = f"; by its order it needs about {candidate.said(missed.expected)}" if missed.expected else ""
     unstable = "still unstable" if candidate.by == "step" else "stops early"
     if trial.error <= search.allowed(candidate):
-        reason = f"good enough {tried}, which {too_dear}"
+        reason = f"good enough {tried}, which {too_expensive}"
     elif missed.kind == "unstable":
-        reason = f"{unstable} {tried}, and more {too_dear}" if missed.dear else f"{unstable} {tried}, the most tried"
-    elif missed.dear:
-        reason = f"error {trial.error:.2g} {tried}, and enough {too_dear}{needs}"
+        reason = f"{unstable} {tried}, and more {too_expensive}" if missed.expensive else f"{unstable} {tried}, the most tried"
+    elif missed.expensive:
+        reason = f"error {trial.error:.2g} {tried}, and enough {too_expensive}{needs}"
     else:
         reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
     return Rejected(candidate.method.name, missed.kind, reason, candidate.by)
 
 
-def _shortfall(
-    search: Search, candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None
-) -> Shortfall:
-    """What would have to give: the least error within the budget, and the budget for the tolerance."""
+def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None) -> Shortfall:
+    """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
     least, best = math.inf, None
     for each in candidates:
-        for k in _tries(each, search, spent, budget):
-            error = each.look(k).error
-            if error < least and spent.fits(each, k, budget):
-                least, best = error, (each, k)
+        for k, trial in each.seen.items():
+            if trial.error < least and spent.fits(each, k, budget):
+                least, best = trial.error, (each, k)
     needs = [(spent.longest(each, found[each.name].k), each.name) for each in candidates if each.name in found]
     needed, by = min(needs) if needs else (None, None)
     if best is None:
         return Shortfall(least, None, None, needed, by)
     chosen, k = best
-    tolerance = chosen.tolerance(k) if isinstance(chosen, Paced) else None
+    tolerance = chosen.tolerance(k) if isinstance(chosen, Adaptive) else None
     return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance)
-
-
-def _tries(candidate: Candidate, search: Search, spent: _Spending, budget: float | None) -> Iterator[int]:
-    """What is worth a look for the least error: of fixed steps the most, and fewer, for rounding adds up; every tolerance."""
-    if isinstance(candidate, Paced):
-        k = candidate.first
-        yield k
-        while search.affordable(candidate, 2 * k, k) and (budget is None or spent.mean(candidate, candidate.look(k)) <= budget):
-            k *= 2
-            yield k
-        return
-    most = min(search.most / (candidate.method.evaluations * spent.grid.spans), spent.steps(candidate, budget))
-    yield from {k for k in (int(most), int(most / 2), int(most / 4)) if k >= candidate.first}

@@ -1,4 +1,4 @@
-"""What is looked through: each method with fixed steps, and each that can estimate its error with steps of chosen length.
+"""The candidates of the search: each method with fixed steps, and each that can estimate its error with adaptive steps.
 
 Both have a k that is the number of steps, or grows like it: it doubles where steps are halved, and the error falls with its power
 that is the method's order. The search knows no more of them.
@@ -10,20 +10,20 @@ import math
 from typing import Protocol
 
 from ..methods import Method
+from .adaptive import AdaptiveTrials
 from .motion import Grid
-from .paced import PacedTrials
 from .trials import Trial, Trials
 
-#: A k of so many is a tolerance of 1: there one k more makes steps 1.5 % shorter.
-COARSEST = 64
+#: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
+UNIT_TOLERANCE_K = 64
 
-#: No tolerance is smaller than this, in the scene's largest lengths: below it rounding is all.
+#: No tolerance is smaller than this: below it rounding is all.
 LEAST_TOLERANCE = 1e-16
 
 
-#: A run with a tolerance is not looked at everywhere, and asked at other times it is another run: this share of the error that is
-#: allowed is all that it may have.
-SHARE = 0.7
+#: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this share of
+#: what is allowed.
+ERROR_SHARE = 0.95
 
 
 class Candidate(Protocol):
@@ -35,6 +35,7 @@ class Candidate(Protocol):
         name: the method's, and that it goes by tolerance: ``"merson, tolerance"``.
         first: the least k.
         share: of the error that is allowed, what the run may have.
+        seen: the runs that were made, by k.
     """
 
     method: Method
@@ -42,6 +43,7 @@ class Candidate(Protocol):
     name: str
     first: int
     share: float
+    seen: dict[int, Trial]
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
@@ -60,15 +62,16 @@ class Fixed:
     """Steps of one length: k of them in a span of the grid."""
 
     by = "step"
-    share = 1.0
 
-    def __init__(self, method: Method, trials: Trials, grid: Grid) -> None:
-        self.method, self.name = method, method.name
+    def __init__(self, method: Method, trials: Trials, grid: Grid, share: float) -> None:
+        self.method, self.name, self.share = method, method.name, share
         self.trials, self.grid, self.first = trials, grid, grid.first
+        self.seen: dict[int, Trial] = {}
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
-        return self.trials.look(self.method, self.grid.dt(k), self.grid.steps(k))
+        self.seen[k] = trial = self.trials.look(self.method, self.grid.dt(k), self.grid.steps(k))
+        return trial
 
     def confirm(self, k: int) -> Trial:
         """The same run, at every step."""
@@ -83,29 +86,28 @@ class Fixed:
         return f"{k} step{'s' * (k != 1)}{' a frame' * self.grid.framed}"
 
 
-class Paced:
+class Adaptive:
     """Steps chosen to a tolerance: it is the power of 1/k with which the method estimates its error."""
 
     by = "tolerance"
-    share = SHARE
+    share = ERROR_SHARE
 
-    def __init__(self, method: Method, trials: PacedTrials) -> None:
+    def __init__(self, method: Method, trials: AdaptiveTrials) -> None:
         assert method.error_order is not None
         self.method, self.name = method, f"{method.name}, tolerance"
         self.trials, self.power = trials, method.error_order
-        scale = max(trials.scene.scales)
-        self.least = LEAST_TOLERANCE * min(1.0, scale)
-        # A single step may be wrong by the tolerance and by that share of the length; more than what is allowed is luck.
-        most = min(1.0, trials.allowed * scale / (1.0 + scale))
-        self.first = math.ceil(COARSEST * most ** (-1.0 / self.power))
+        self.seen: dict[int, Trial] = {}
+        # A single step may be wrong by the tolerance; more than what is allowed is luck.
+        self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))
 
     def tolerance(self, k: int) -> float:
         """The tolerance of that k, in two digits, so that what is told is what was run."""
-        return float(f"{(COARSEST / k) ** self.power:.1e}")
+        return float(f"{(UNIT_TOLERANCE_K / k) ** self.power:.1e}")
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
-        return self.trials.look(self.method, self.tolerance(k))
+        self.seen[k] = trial = self.trials.look(self.method, self.tolerance(k))
+        return trial
 
     def confirm(self, k: int) -> Trial:
         """The same, at many more times."""
@@ -113,7 +115,7 @@ class Paced:
 
     def possible(self, k: int) -> bool:
         """Whether the tolerance is above the rounding."""
-        return self.tolerance(k) >= self.least
+        return self.tolerance(k) >= LEAST_TOLERANCE
 
     def said(self, k: int) -> str:
         """The tolerance."""

@@ -4,35 +4,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._checks import Array
-from ..charts.measure import ASKED
+from ..charts.measure import SAVED_TIMES
 from ..errors import ArgumentError
 from ..scenes import Scene
 from ..scenes.table import Exact, tabled
-from ..scenes.truth import AGREES, with_truth
+from ..scenes.truth import with_truth
 
 #: Without a frame a run has at least so many steps.
-FEWEST = 4
+MIN_STEPS = 4
 
-#: A true motion without a formula is known this many times better than the tolerance, and a table of it that many times.
-BETTER, FINER = 10.0, 1000.0
+#: A reference solution without a formula is this many times as accurate as the tolerance, and its table that many times.
+TRUTH_FACTOR, TABLE_FACTOR = 10.0, 1000.0
 
-#: A table of it is as close to it as this at least, in the blocks' largest lengths.
-CLOSE = 1e-9
+#: Runs that are compared with it may therefore use up this share of the tolerance: but for rounding, the error of the tighter of
+#: its two runs is a tenth of their difference.
+ERROR_SHARE = 0.95
 
-#: A trial compares so many states at even times with the true ones, and as many at even lengths of the true motion's path, so
-#: that a short encounter is not passed over.
-EVEN = 1000
+#: The largest error of the table, whatever the tolerance, relative to the blocks' largest lengths.
+MAX_TABLE_ERROR = 1e-9
 
-#: The path's length is found by putting times where it is long, so often.
-ROUNDS = 4
+#: A trial is compared with the reference at so many times evenly spaced in time, and at as many evenly spaced in the length of
+#: the path, so that a short encounter is not missed.
+EVEN_SAMPLES = 1000
 
-#: How many answers of ``exact`` are kept: all methods are tried with the same numbers of steps, hence at the same times.
-REMEMBERED = 96
+#: The latter are more on a long path: so many for each part of it as long as the block's largest length, and at most so many.
+SAMPLES_PER_LENGTH, MAX_SAMPLES = 4.0, 20_000
+
+#: The length of the path is found by so many refinements, each of which adds times where the path is long.
+PATH_ITERATIONS = 4
+
+#: How many results of ``exact`` are cached: all methods are tried with the same numbers of steps, hence at the same times.
+CACHED_ANSWERS = 96
 
 
 class Grid(NamedTuple):
@@ -51,7 +58,7 @@ class Grid(NamedTuple):
     @property
     def first(self) -> int:
         """The least k."""
-        return 1 if self.framed else FEWEST
+        return 1 if self.framed else MIN_STEPS
 
     @property
     def end(self) -> float:
@@ -71,7 +78,7 @@ class Grid(NamedTuple):
         """Times at which a run with a tolerance is asked for its state: the frames, or a few even ones."""
         if self.framed:
             return self.span * np.arange(1.0, self.spans + 1)
-        return np.linspace(0.0, self.span, ASKED + 1)[1:]
+        return np.linspace(0.0, self.span, SAVED_TIMES + 1)[1:]
 
 
 def grid_of(horizon: float, frame: float | None) -> Grid:
@@ -89,12 +96,14 @@ class Motion(NamedTuple):
         grid: the steps that can be chosen.
         marks: times within the horizon at which errors are looked for, ascending from 0.
         cut: whether the scene's horizon is longer, and its true motion not known so far.
+        share: of the error that is allowed, what a run may have that is compared with it.
     """
 
     scene: Scene
     grid: Grid
     marks: Array
     cut: bool
+    share: float
 
 
 def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
@@ -109,7 +118,7 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
     until = min(scene.until, last)
     exact = scene.exact
     if exact is None:
-        known = with_truth(replace(scene, horizon=last), min(AGREES, tolerance / BETTER))
+        known = with_truth(replace(scene, horizon=last), tolerance / TRUTH_FACTOR)
         exact, until = known.exact, min(known.until, last)
         assert exact is not None
     cut = until < horizon
@@ -123,44 +132,57 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
         raise ArgumentError(f"scene: the true motion of {scene.name} is not known {far}, so there is no error to judge by")
     judged = replace(scene, exact=exact, until=math.inf, horizon=horizon)
     if scene.exact is None:
-        exact = tabled(exact, until, judged.scales, min(CLOSE, tolerance / FINER))
+        exact = tabled(exact, until, judged.scales, min(MAX_TABLE_ERROR, tolerance / TABLE_FACTOR))
 
-    def within(t: Array) -> tuple[Array, Array]:
-        return exact(np.minimum(t, until))  # a last time past that by rounding is taken for it
-
-    judged = replace(judged, exact=remembered(within))
-    return Motion(judged, grid, _marks(judged), cut)
+    judged = replace(judged, exact=Within(exact, until))
+    return Motion(judged, grid, _marks(judged), cut, ERROR_SHARE if scene.exact is None else 1.0)
 
 
 def _marks(scene: Scene) -> Array:
     """Times over the horizon at which errors are looked for: even ones, and ones that are evenly far apart on the path."""
     assert scene.exact is not None
-    t = even = np.linspace(0.0, scene.horizon, EVEN + 1)
-    path = np.linspace(0.0, 1.0, EVEN + 1)
-    for _ in range(ROUNDS):
+    t = even = np.linspace(0.0, scene.horizon, EVEN_SAMPLES + 1)
+    path = np.linspace(0.0, 1.0, EVEN_SAMPLES + 1)
+    for _ in range(PATH_ITERATIONS):
         length = np.zeros(len(t) - 1)
         for block, scale in zip(scene.exact(t), scene.scales, strict=True):
             change = np.diff(block.reshape(len(t), -1), axis=0)
             length += np.sqrt((change * change).sum(axis=1)) / (scale or 1.0)
         reached = np.concatenate([[0.0], np.cumsum(length)])
+        if len(path) == len(even) and reached[-1] * SAMPLES_PER_LENGTH > EVEN_SAMPLES:
+            path = np.linspace(0.0, 1.0, min(MAX_SAMPLES, math.ceil(reached[-1] * SAMPLES_PER_LENGTH)) + 1)
         by_path = np.interp(path * reached[-1], reached, t)
         t = np.unique(np.concatenate([t, by_path]))
     return np.unique(np.concatenate([even, by_path]))
 
 
-def remembered(exact: Exact) -> Exact:
-    """The same function, which does not compute twice what it was asked for lately."""
-    kept: dict[bytes, tuple[Array, Array]] = {}
+class Within:
+    """A solution up to a time; a last time past that by rounding is taken for it.
 
-    def answer(t: Array) -> tuple[Array, Array]:
+    What it was asked for lately is not computed twice.
+    """
+
+    def __init__(self, solution: Exact, until: float) -> None:
+        self.solution, self.until = solution, until
+        self._kept: dict[bytes, tuple[Array, Array]] = {}
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at these times."""
         key = np.asarray(t).tobytes()
-        if key not in kept:
-            if len(kept) >= REMEMBERED:
-                del kept[next(iter(kept))]
-            kept[key] = exact(t)
-        return kept[key]
+        if key not in self._kept:
+            if len(self._kept) >= CACHED_ANSWERS:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = self.solution(np.minimum(t, self.until))
+        return self._kept[key]
 
-    return answer
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Within, (self.solution, self.until)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Within) and self.until == other.until and bool(self.solution == other.solution)
+
+    def __hash__(self) -> int:
+        return hash(self.until)
 
 
 def looked_up(exact: Exact, times: Array) -> Exact:

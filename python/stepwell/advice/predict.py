@@ -17,14 +17,14 @@ from .trials import Trials
 SAMPLES = 10_000
 
 #: Modes that are nearer to each other than this lets one tell give no prediction.
-CONDITION = 1e8
+MAX_CONDITION = 1e8
 
 #: States of the true motion at which a system that is not linear is taken for one; not one with more numbers than this, for
 #: eigenvalues take long.
-STATES, NUMBERS = 400, 128
+LINEARIZED_STATES, MAX_NUMBERS = 400, 128
 
 #: The search for the observed limit goes by a ladder of this many rungs in a factor of two: 2.2 % apart.
-RUNGS = 32
+RUNGS_PER_OCTAVE = 32
 
 
 class Prediction(NamedTuple):
@@ -46,6 +46,7 @@ class Limit(NamedTuple):
 
     Attributes:
         dt: the step beyond which something grows, in units of time; 0 for never stable, infinite for always; None if unknown.
+            Where rounding hides what grows, the largest step of which it is known that nothing does; ``mode`` then says so.
         how: ``"linear"``, or ``"frozen"`` for the fastest oscillation along the true motion, as if it stood still; ``"none"`` of
             steps that are chosen to a tolerance.
         mode: what grows there, in words; None if nothing or unknown.
@@ -68,7 +69,7 @@ def predicted(scene: Scene, method: Method, dt: float, steps: int) -> Prediction
     slot = method.steps.start(system.scaled(dt, ()), 0, 0.0, v, y) if method.carry else v
     z, vectors = np.linalg.eig(found.P)
     rates, shapes = np.linalg.eig(maps.rates(system))
-    if not max(np.linalg.cond(vectors), np.linalg.cond(shapes)) < CONDITION:
+    if not max(np.linalg.cond(vectors), np.linalg.cond(shapes)) < MAX_CONDITION:
         return None
     start = np.concatenate([np.ravel(v), np.ravel(y)])
     share, true_share = np.linalg.solve(vectors, np.concatenate([np.ravel(slot), np.ravel(y)])), np.linalg.solve(shapes, start)
@@ -101,7 +102,8 @@ def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
         mode: Mode | None = found.mode
         if mode is None:
             return Limit(found.dt, "linear", None, None)
-        return Limit(found.dt, "linear", mode.kind, abs(mode.rate.imag))
+        kind = mode.kind if found.decided else f"{mode.kind}; not decided between {found.dt:.6g} and {found.grows:.6g}"
+        return Limit(found.dt, "linear", kind, abs(mode.rate.imag))
     if not fastest:
         return Limit(None, "frozen", None, None)
     return Limit(method.limit / fastest, "frozen", "the fastest oscillation along the motion", fastest)
@@ -115,10 +117,10 @@ def fastest_oscillation(trials: Trials) -> float | None:
     """
     scene = trials.scene
     system = scene.system
-    if system.linear or sum(maps.size(system)) > NUMBERS:
+    if system.linear or sum(maps.size(system)) > MAX_NUMBERS:
         return None
     assert scene.exact is not None
-    t = trials.marks[:: max(1, len(trials.marks) // STATES)]
+    t = trials.marks[:: max(1, len(trials.marks) // LINEARIZED_STATES)]
     v, y = (np.asarray(block) for block in scene.exact(t))
     fastest = 0.0
     try:
@@ -142,13 +144,13 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
     horizon = trials.scene.horizon
 
     def grows(j: int) -> bool:
-        n = round(float(2.0 ** (j / RUNGS)))
+        n = round(float(2.0 ** (j / RUNGS_PER_OCTAVE)))
         return trials.unstable(method, horizon / n, n)
 
-    low, high = 2 * RUNGS, max(2 * RUNGS, math.ceil(RUNGS * math.log2(stable)))
+    low, high = 2 * RUNGS_PER_OCTAVE, max(2 * RUNGS_PER_OCTAVE, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable)))
     # From the fine end, since what is coarse may be stable again by chance.
     last = high
-    for j in range(high, low - 1, -RUNGS):
+    for j in range(high, low - 1, -RUNGS_PER_OCTAVE):
         if grows(j):
             low, high = j, last
             break
@@ -162,4 +164,4 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
     while high > low + 1:
         middle = (low + high) // 2
         low, high = (middle, high) if grows(middle) else (low, middle)
-    return float(horizon / round(2.0 ** (high / RUNGS)))
+    return float(horizon / round(2.0 ** (high / RUNGS_PER_OCTAVE)))

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from .. import _checks
 from .._checks import Array
 from ..charts.data import finite
 from ..errors import ArgumentError
@@ -41,8 +42,8 @@ class Row:
         predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with longer steps and the order.
         frequency_error: Ψ/Φ − 1 of the mode that drifts most, or None.
         damping_error: damping that the method adds to that mode, in 1 per unit of time; below zero it grows. Or None.
-        evaluations_per_frame: rate evaluations in a frame, in the mean; None without a frame.
-        evaluations_per_time: rate evaluations in a unit of time.
+        evaluations_per_frame: function (rate) evaluations in a frame, in the mean; None without a frame.
+        evaluations_per_time: function (rate) evaluations in a unit of time.
         ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
         seconds_per_frame: measured, in a frame, in the mean; None without a frame.
         seconds_per_time: measured, in a unit of time.
@@ -126,7 +127,7 @@ class Rejected:
     Attributes:
         method: its name.
         kind: ``"refused"`` by the system; ``"unstable"`` or ``"inaccurate"`` at the most steps that were tried; ``"dominated"``,
-            more than ten times as dear as the best; ``"budget"``, good enough but too dear.
+            more than ten times as expensive as the best; ``"budget"``, good enough but too expensive.
         reason: the same in words and numbers.
         by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
     """
@@ -219,7 +220,7 @@ class Advice:
         """The text of ``data()`` in JSON; also written to a file if one is given."""
         text = json.dumps(self.data(), ensure_ascii=False, indent=1)
         if path is not None:
-            Path(path).write_text(text + "\n", encoding="utf-8")
+            _checks.file("path", path).write_text(text + "\n", encoding="utf-8")
         return text
 
     @property
@@ -257,7 +258,7 @@ class Advice:
             return [*self._cut(), *self._what_would_have_to_give(per)]
         if best.tolerance is not None:
             run = f"error {best.error:.2g} in the run of {best.steps} steps, {best.rejected_steps} of them rejected"
-            lines = [f"Use {best.method.name} with steps chosen to a tolerance of {best.tolerance:g}: {run}."]
+            lines = [f"Use {best.method.name} with adaptive steps to a tolerance of {best.tolerance:g}: {run}."]
         else:
             count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
             run = f"error {best.error:.2g} in the run of {best.steps} steps"

@@ -8,39 +8,48 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
 from .candidates import Candidate
 from .trials import Trial
 
-#: No run makes more rate evaluations than this, for it would take too long; a system of more than eight numbers, fewer.
-MOST = 16_000_000
+#: Function (rate) evaluations that a run makes at most, or it would take too long; of a system of n > 8 numbers, this divided by
+#: (n/8) to this exponent.
+MAX_EVALUATIONS, SIZE_EXPONENT = 16_000_000, 1.5
 
-#: A candidate that costs more than this many times the cheapest is not looked at any further.
-DOMINATED = 10.0
+#: All runs of a search together make at most about so many times MAX_EVALUATIONS: each run may make this share of what is left.
+TOTAL_BUDGET, RUN_SHARE = 6.0, 0.25
 
-#: Rungs of the fine ladder in a factor of two: 9 % between one and the next.
-RUNGS = 8
+#: A candidate that costs more than this many times the cheapest is given up.
+MAX_COST_RATIO = 10.0
 
-#: Where an error misses the tolerance by less than the factor NEAR, FEW more numbers of steps are tried before the next rung;
-#: where it is by the factor RISES above that of fewer steps, and that missed by less than the factor FAR, MANY: the least of
-#: these, or as many up to the most as together make the share QUICK of the evaluations that one run may make.
-NEAR, FEW, RISES, FAR, MANY, QUICK = 2.5, 6, 1.3, 8.0, (8, 64), 1 / 128
+#: Rungs of the fine ladder (a geometric grid of numbers of steps) in a factor of two: 9 % from one to the next.
+RUNGS_PER_OCTAVE = 8
 
-#: A dip of the error is followed so many times, each time within half as much.
-HALVINGS = 8
+#: Between two rungs more numbers of steps are tried, evenly spaced: DENSE_POINTS where the error is above the tolerance by less
+#: than the factor DENSE_ERROR_RATIO.
+DENSE_ERROR_RATIO, DENSE_POINTS = 2.5, 6
 
-#: An error below this is taken to fall with the order of the method at most; above it a run may be wrong in other ways.
-FALLS = 0.3
+#: And IRREGULAR_POINTS where errors do not fall with the number of steps: where an error is IRREGULAR_RISE times that of fewer
+#: steps, and the latter is less than IRREGULAR_ERROR_RATIO times the tolerance. The first of these numbers, or more, up to the
+#: second, if all of them together make no more than the share IRREGULAR_SHARE of the evaluations that one run may make.
+IRREGULAR_RISE, IRREGULAR_ERROR_RATIO, IRREGULAR_POINTS, IRREGULAR_SHARE = 1.3, 8.0, (6, 24), 1 / 128
 
-#: Where errors below SMALL fall by one power over two doublings, within EVEN, and not by LESS than the order, nothing below the
-#: share BEFORE of what it asks for is tried; if runs make more than the share LONG of the evaluations that they may make.
-SMALL, EVEN, LESS, BEFORE, LONG = 0.02, 1.0, 1.3, 0.75, 1 / 256
+#: A local minimum of the error is searched by so many halvings of the interval.
+MINIMUM_HALVINGS = 8
 
-#: But what the order tells is off by up to this factor in steps.
-DOUBT = 3.0
+#: Below this an error is taken to be in the asymptotic range, where it falls by the method's order; above, nothing is predicted.
+ASYMPTOTIC_ERROR = 0.3
+
+#: Errors are regular where, below REGULAR_ERROR, they fall over two doublings by powers that differ by at most ORDER_SPREAD and
+#: are at least the order less ORDER_DEFICIT. Then the search begins at the share REGULAR_START of the steps that the power
+#: predicts, if a run makes more than the share LONG_RUN_SHARE of the evaluations that it may make.
+REGULAR_ERROR, ORDER_SPREAD, ORDER_DEFICIT, REGULAR_START, LONG_RUN_SHARE = 0.02, 1.0, 1.3, 0.75, 1 / 256
+
+#: The number of steps that the order predicts is wrong by up to this factor.
+PREDICTION_FACTOR = 3.0
 
 
 class Found(NamedTuple):
@@ -68,14 +77,14 @@ class Missed(NamedTuple):
         k: the largest that was run.
         trial: that run.
         expected: k that the order says it takes, or None.
-        dear: whether more steps were not tried because they cost too much, beside the best.
+        expensive: whether more steps were not tried because they cost too much compared with the best.
     """
 
     kind: str
     k: int
     trial: Trial
     expected: int | None
-    dear: bool = False
+    expensive: bool = False
 
 
 class Search:
@@ -85,11 +94,19 @@ class Search:
         tolerance: the error that is allowed.
         spans: the cost is that of one of so many parts of a run.
         prices: what a step costs, by the candidate's name.
-        most: rate evaluations that a run may make.
+        longest: rate evaluations that a run may make.
+        spent: tells how many all runs have made so far.
     """
 
-    def __init__(self, tolerance: float, spans: int, prices: Mapping[str, float], most: float) -> None:
-        self.tolerance, self.spans, self.prices, self.most = tolerance, spans, prices, most
+    def __init__(
+        self, tolerance: float, spans: int, prices: Mapping[str, float], longest: float, spent: Callable[[], float] = lambda: 0.0
+    ) -> None:
+        self.tolerance, self.spans, self.prices, self.longest, self.spent = tolerance, spans, prices, longest, spent
+
+    @property
+    def most(self) -> float:
+        """Rate evaluations that the next run may make."""
+        return min(self.longest, RUN_SHARE * max(0.0, TOTAL_BUDGET * self.longest - self.spent()))
 
     def cost(self, candidate: Candidate, k: int) -> float:
         """Of a span, in a run that was made."""
@@ -123,12 +140,14 @@ class Search:
         for name in sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name])):
             candidate, k = by_name[name], octaves[name]
             cost = self.cost(candidate, k)
-            if cost > 2.0 * DOMINATED * best:
+            if cost > 2.0 * MAX_COST_RATIO * best:
                 missed[name] = Missed("dominated", k, candidate.look(k), None)
                 continue
             # Three octaves back if that might be the cheapest of all, for a dip may hide there.
             # One that cannot be is halved, as if errors were even.
             least = self.halved(candidate, k) if cost > 4.0 * best else self.finest(candidate, k, 8)
+            if least is None and self.confirmed(candidate, k):
+                least = k  # what is finer would take too long to look for
             if least is None:
                 missed[name] = Missed("inaccurate", k, candidate.look(k), None)
                 continue
@@ -136,7 +155,7 @@ class Search:
             found[name] = Found(least, candidate.confirm(least), least, None)
         for name in list(found):
             candidate, k = by_name[name], found[name].k
-            if self.cost(candidate, k) > DOMINATED * best:
+            if self.cost(candidate, k) > MAX_COST_RATIO * best:
                 missed[name] = Missed("dominated", k, found.pop(name).trial, None)
             else:
                 found[name] = found[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
@@ -158,21 +177,21 @@ class Search:
                 best = min(best, cost)
                 continue
             wanted = self.wanted(candidate, k, trial)
-            least = max(2.0, (wanted or 0) / k / DOUBT)
+            least = max(2.0, (wanted or 0) / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
             made, ceiling = trial.steps * candidate.method.evaluations, ceilings.get(candidate.name, math.inf)
             if not candidate.possible(2 * k) or made * least > self.most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
-            elif cost * least > DOMINATED * best and not (trial.unstable and candidate.by == "tolerance"):
-                missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, dear=True)
+            elif cost * least > MAX_COST_RATIO * best and not (trial.unstable and candidate.by == "tolerance"):
+                missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
             else:
                 heapq.heappush(waiting, (2.0 * cost, i, 2 * k))
         return found, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
         """The k that the order of the method asks for, if the error is small enough to tell."""
-        if not trial.error < FALLS:
+        if not trial.error < ASYMPTOTIC_ERROR:
             return None
         return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
@@ -181,7 +200,7 @@ class Search:
         regular = self.regular(candidate, k)
         low = max(candidate.first, k // back, regular)
         failed, ladder = 0, rungs(low, 4 * k)
-        for rung in ladder if regular else self.closer(candidate, ladder):
+        for rung in ladder if regular else self.denser(candidate, ladder):
             if not self.affordable(candidate, rung, failed or low):
                 return None
             if self.good(candidate, rung):
@@ -193,45 +212,52 @@ class Search:
         return None
 
     def regular(self, candidate: Candidate, k: int) -> int:
-        """Where looking need not begin before, if errors fall by one power over the two doublings up to k; 0 if they do not.
+        """Where the search may begin, if errors fall by one power over the two doublings up to k; 0 if they do not.
 
-        It is not asked where runs are quick, for errors that fall evenly at the doublings may still dip between them.
+        It is 0 where runs are short, too: errors that fall regularly at the doublings may still have minima between them.
         """
-        if k < 4 * candidate.first or candidate.look(k).steps * candidate.method.evaluations < LONG * self.most:
+        if k < 4 * candidate.first or candidate.look(k).steps * candidate.method.evaluations < LONG_RUN_SHARE * self.longest:
             return 0
         first, second, third = (candidate.look(n).error for n in (k // 4, k // 2, k))
         allowed = self.allowed(candidate)
-        if not SMALL > first > second > allowed >= third > 0.0:
+        if not REGULAR_ERROR > first > second > allowed >= third > 0.0:
             return 0
         powers = math.log2(first / second), math.log2(second / third)
-        if abs(powers[0] - powers[1]) > EVEN or min(powers) < candidate.method.order - LESS:
+        if abs(powers[0] - powers[1]) > ORDER_SPREAD or min(powers) < candidate.method.order - ORDER_DEFICIT:
             return 0
-        return int(BEFORE * k / 2 * 2.0 ** (math.log2(second / allowed) / powers[1]))
+        return int(REGULAR_START * k / 2 * 2.0 ** (math.log2(second / allowed) / powers[1]))
 
-    def closer(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
-        """The ladder, with more k where the next may be good enough by chance.
+    def denser(self, candidate: Candidate, ladder: list[int]) -> Iterator[int]:
+        """The ladder, with more k where one of them may be good enough by chance.
 
-        That is where an error just misses, where errors rise with more steps, for of a chaotic motion they are a lottery, and
-        where they had a dip before that, for there an error may change its sign.
+        That is where an error is just above the tolerance; where errors rise with more steps, for those of a chaotic motion are
+        irregular; and at a local minimum, where an error may change its sign.
         """
         allowed = self.allowed(candidate)
         least, before, last = math.inf, (0, math.inf), (0, math.inf)
         for rung, following in zip(ladder, [*ladder[1:], ladder[-1]], strict=True):
             yield rung
             error = candidate.look(rung).error
-            if candidate.by == "step" and before[1] > last[1] <= FAR * allowed and error > RISES * last[1] and before[0]:
-                yield from self.dip(candidate, before[0], last[0], rung)
+            if (
+                candidate.by == "step"
+                and before[1] > last[1] <= IRREGULAR_ERROR_RATIO * allowed
+                and error > IRREGULAR_RISE * last[1]
+                and before[0]
+            ):
+                yield from self.minimum(candidate, before[0], last[0], rung)
             before, last = last, (rung, error)
-            ragged = RISES * least < error and least <= FAR * allowed
+            irregular = IRREGULAR_RISE * least < error and least <= IRREGULAR_ERROR_RATIO * allowed
             least = min(least, error)
-            if ragged or error <= NEAR * allowed:
+            if irregular or error <= DENSE_ERROR_RATIO * allowed:
                 yield from range(
-                    rung + 1, following, max(1, (following - rung) // (self.many(candidate, rung) if ragged else FEW))
+                    rung + 1,
+                    following,
+                    max(1, (following - rung) // (self.dense_points(candidate, rung) if irregular else DENSE_POINTS)),
                 )
 
-    def dip(self, candidate: Candidate, low: int, middle: int, high: int) -> Iterator[int]:
+    def minimum(self, candidate: Candidate, low: int, middle: int, high: int) -> Iterator[int]:
         """Towards the least error between two k, from one between them where it is less."""
-        for _ in range(HALVINGS):
+        for _ in range(MINIMUM_HALVINGS):
             inner = sorted({(low + middle) // 2, (middle + high) // 2} - {low, middle, high})
             if not inner:
                 return
@@ -241,10 +267,15 @@ class Search:
             i = min(max(1, errors.index(min(errors))), len(ladder) - 2)
             low, middle, high = ladder[i - 1 : i + 2]
 
-    def many(self, candidate: Candidate, k: int) -> int:
-        """How many more are tried between two rungs where errors are a lottery: the more, the quicker the runs."""
+    def dense_points(self, candidate: Candidate, k: int) -> int:
+        """How many more are tried between two rungs where errors are irregular: the more, the shorter the runs.
+
+        With adaptive steps the least: every tolerance makes other steps anyway.
+        """
+        if candidate.by == "tolerance":
+            return IRREGULAR_POINTS[0]
         made = candidate.look(k).steps * candidate.method.evaluations
-        return max(MANY[0], min(MANY[1], int(QUICK * self.most / made)))
+        return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / made)))
 
     def halved(self, candidate: Candidate, k: int) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""
@@ -277,10 +308,10 @@ class Search:
         if rung >= k:
             return None
         error = candidate.look(rung).error
-        return error * (rung / k) ** candidate.method.order if error < FALLS else None
+        return error * (rung / k) ** candidate.method.order if error < ASYMPTOTIC_ERROR else None
 
 
 def rungs(low: int, high: int) -> list[int]:
     """Whole numbers from ``low`` to ``high``, 9 % apart or by one; the same ones for every method."""
-    start, end = math.floor(RUNGS * math.log2(low)), math.ceil(RUNGS * math.log2(high))
-    return sorted({n for j in range(start, end + 1) if low <= (n := round(float(2.0 ** (j / RUNGS)))) <= high})
+    start, end = math.floor(RUNGS_PER_OCTAVE * math.log2(low)), math.ceil(RUNGS_PER_OCTAVE * math.log2(high))
+    return sorted({n for j in range(start, end + 1) if low <= (n := round(float(2.0 ** (j / RUNGS_PER_OCTAVE)))) <= high})

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
-from ..charts.measure import GROWTH, TIMED_STEP, TIMED_TOLERANCE
+from ..charts.measure import MIN_GROWTH, TIMED_STEP, TIMED_TOLERANCE
 from ..errors import ControlWarning, DivergenceWarning, ToleranceWarning
 from ..integrate import integrate
 from ..methods import Method
@@ -20,22 +20,21 @@ from ..result import Run
 from ..scenes import Scene
 from .motion import Motion
 
-#: A run keeps at most so many numbers, every step's if they are fewer.
-KEPT = 2_000_000
+#: A run saves at most so many numbers: every step, if these are fewer.
+MAX_SAVED_NUMBERS = 2_000_000
 
-#: A confirming run compares every kept state with the true one, up to so many.
-CONFIRMED = 50_000
+#: A confirming run compares all its saved states with the reference solution, up to so many.
+MAX_CONFIRMED_STATES = 50_000
 
 #: The batch that is timed has at most so many members, and at most so many numbers in all, which the cache holds.
-MEMBERS, NUMBERS = 4096, 16_384
+MAX_MEMBERS, MAX_NUMBERS = 512, 16_384
 
-#: A timed run takes at least this many seconds; of so many the quickest counts, since whatever else the machine does only adds.
-#: Where all methods take longer than this many seconds, of fewer.
-TIMED_SECONDS, REPEATS, PATIENCE = 0.001, 7, 0.5
+#: A timed run takes at least this many seconds. The shortest time of so many runs counts, since other load only adds to it; of
+#: fewer runs, where the timing of all methods takes longer than this many seconds.
+TIMED_SECONDS, REPEATS, SLOW_SECONDS = 0.0005, 5, 0.25
 
-#: With a tolerance a timed run tries so many steps or more, for what is done once a run must be lost among them; and no more
-#: than so many.
-FEW, MANY = 64, 512
+#: With a tolerance a timed run tries at least so many steps, so that the cost of the call does not count, and at most so many.
+MIN_TIMED_STEPS, MAX_TIMED_STEPS = 64, 512
 
 
 class Trial(NamedTuple):
@@ -64,7 +63,8 @@ class Trials:
         self.numbers = self.scene.v.size + self.scene.y.size
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
-        self.made = 0
+        #: Runs, and rate evaluations of all.
+        self.made, self.work = 0, 0.0
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
         """The run, of which some two thousand states are compared with the true ones."""
@@ -80,7 +80,14 @@ class Trials:
         key = (method.name, steps, dt)
         if key not in self._dense:
             trial, run = self.look(method, dt, steps), self._run(method, dt, steps)
-            run = _part(run, np.arange(0, len(run.t), max(1, math.ceil(len(run.t) * max(self.numbers / KEPT, 1.0 / CONFIRMED)))))
+            run = _part(
+                run,
+                np.arange(
+                    0,
+                    len(run.t),
+                    max(1, math.ceil(len(run.t) * max(self.numbers / MAX_SAVED_NUMBERS, 1.0 / MAX_CONFIRMED_STATES))),
+                ),
+            )
             error = float(self.scene.state_error(run).max())
             self._dense[key] = trial._replace(error=max(trial.error, error))
         return self._dense[key]
@@ -95,7 +102,8 @@ class Trials:
 
     def _run(self, method: Method, dt: float, steps: int) -> Run:
         self.made += 1
-        every = max(1, math.ceil(steps * self.numbers / KEPT))
+        self.work += method.evaluations * steps
+        every = max(1, math.ceil(steps * self.numbers / MAX_SAVED_NUMBERS))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", ControlWarning)
@@ -109,11 +117,11 @@ class Trials:
         """As the charts have it: the amplitude grows in the second half, above the true one."""
         amplitude, half = self.scene.amplitude(run), int(np.searchsorted(run.t, 0.5 * run.t[-1]))
         # NaN is above everything.
-        return not amplitude[half:].max() <= GROWTH * max(1.0, float(amplitude[: max(1, half)].max()))
+        return not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[: max(1, half)].max()))
 
 
 def _part(run: Run, places: np.ndarray[Any, np.dtype[np.int64]]) -> Run:
-    """The run with these of its kept states."""
+    """The run with these of its saved states."""
     part = copy.copy(run)
     part.t, part.v, part.y = run.t[places], run.v[places], run.y[places]
     return part
@@ -138,10 +146,18 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
 
     def tried(method: Method, v: Array, y: Array, end: float) -> int:
         run = integrate(
-            scene.system, method, v=v, y=y, tolerance=TIMED_TOLERANCE[True], at=[end], dt=1e-3 * end, max_steps=MANY, threads=1
+            scene.system,
+            method,
+            v=v,
+            y=y,
+            tolerance=TIMED_TOLERANCE[True],
+            at=[end],
+            dt=1e-3 * end,
+            max_steps=MAX_TIMED_STEPS,
+            threads=1,
         )
         assert run.paces is not None
-        return int((run.paces.accepted + run.paces.rejected).max())
+        return int(run.paces.evaluations.max()) // method.evaluations
 
     def timed(method: Method, runs: int) -> tuple[float, int]:
         begin = time.perf_counter()
@@ -153,7 +169,7 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
         warnings.simplefilter("ignore", ToleranceWarning)
         for method in methods:
             end = scene.horizon / 1024
-            while tried(method, scene.v, scene.y, end) < FEW and end < 1000 * scene.horizon:
+            while tried(method, scene.v, scene.y, end) < MIN_TIMED_STEPS and end < 1000 * scene.horizon:
                 end *= 2.0
             ends[method.name] = end
     return _in_turns(methods, timed, members)
@@ -161,7 +177,7 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
 
 def _batch(scene: Scene) -> tuple[Array, Array, int]:
     """Blocks of equal members, and how many they are."""
-    members = max(1, min(MEMBERS, NUMBERS // max(1, scene.v.size + scene.y.size)))
+    members = max(1, min(MAX_MEMBERS, MAX_NUMBERS // max(1, scene.v.size + scene.y.size)))
     v, y = (np.repeat(np.asarray(block)[..., np.newaxis], members, axis=-1) for block in (scene.v, scene.y))
     return v, y, members
 
@@ -180,7 +196,7 @@ def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[fl
         found = dict.fromkeys(sizes, math.inf)
         begun = time.perf_counter()
         for rounds in range(REPEATS):
-            if rounds >= 2 and time.perf_counter() - begun > PATIENCE:
+            if rounds >= 2 and time.perf_counter() - begun > SLOW_SECONDS:
                 break
             for method in methods:
                 seconds, steps = timed(method, sizes[method.name])

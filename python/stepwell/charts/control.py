@@ -13,9 +13,10 @@ import numpy as np
 from .. import _checks
 from .. import control as controls
 from .._checks import Array
+from .._value import Value
 from ..errors import ArgumentError, ControlWarning, DivergenceWarning, DTypeError, ShapeError, UnsupportedError
 from ..integrate import integrate
-from ..methods import Method
+from ..methods import Method, choice
 from ..methods import method as find_method
 from ..result import Run
 from ..scenes import Scene
@@ -36,8 +37,8 @@ RELATIVE = tuple(float(gain) for gain in 10.0 ** np.linspace(-4.0, 2.0, 25))
 #: Ways of projection, the limit of a control with an infinite gain.
 WAYS: tuple[str, ...] = controls.WAYS
 
-#: In how many places of a run, evenly spread, the energy and the coordinates are looked at.
-LOOKS = 1000
+#: States of a run, evenly spaced, that are saved to measure energy and coordinates.
+SAVED_STATES = 1000
 
 #: In how many places an exact solution is asked for its scale.
 SCALE_SAMPLES = 1001
@@ -47,7 +48,7 @@ Exact = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class Held(Value):
     """One method under one kind of control, over the gains. What diverged has infinite errors.
 
     Attributes:
@@ -56,9 +57,9 @@ class Held:
         dt: the step, in units of time.
         steps: how many steps were made.
         relative: h·C·K at the start, shape (gains,); one NaN if the kind has no gain.
-        energy_error: the largest |E − E₀| of the kept states, divided by the kinetic energy at the start, shape (gains,).
+        energy_error: the largest |E − E₀| of the saved states, divided by the kinetic energy at the start, shape (gains,).
         state_error: how far the last state is from the exact one, of the same shape; NaN if no exact one is known.
-        largest: the largest coordinate of the kept states, of the same shape.
+        largest: the largest coordinate of the saved states, of the same shape.
         first_bad_step: the first step that was not finite, or −1, of the same shape.
     """
 
@@ -79,7 +80,7 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class ControlSweep(Drawn):
+class ControlSweep(Drawn, Value):
     """Errors of energy and state against the gain of a control.
 
     Attributes:
@@ -210,7 +211,7 @@ def control(
     if isinstance(scene, Scene):
         given: Any = scene.system
         v, y = (b if a is None else a for a, b in ((v, scene.v), (y, scene.y)))
-        horizon = scene.horizon if horizon is None else horizon
+        horizon = scene.horizon if horizon is None else _checks.number("horizon", horizon, positive=True, unit="units of time")
         evaluations = scene.steps_for(scene.dt) if evaluations is None else evaluations
         if exact is None and horizon is not None and horizon <= scene.until:
             exact = scene.exact
@@ -222,13 +223,10 @@ def control(
     for name, argument in {"v": v, "y": y, "horizon": horizon, "evaluations": evaluations}.items():
         if argument is None:
             raise ArgumentError(f"{name}: expected it beside an NBody system, got None")
-    if isinstance(methods, str):
-        raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
-    chosen = list(dict.fromkeys(map(find_method, methods)))
-    if not chosen:
-        raise ArgumentError("methods: expected at least one, got none")
-    kinds = [_checks.known("forms", form, controls.FORMS) for form in forms]
-    kinds = ["none", *kinds, *(_checks.known("ways", way, controls.WAYS) for way in ways)]
+    chosen = choice(METHODS if methods is None else methods)
+    kinds = [_checks.known("forms", form, controls.FORMS) for form in _checks.several("forms", forms, "forms")]
+    kinds = ["none", *kinds, *(_checks.known("ways", way, controls.WAYS) for way in _checks.several("ways", ways, "ways"))]
+    progress = _checks.callback("progress", progress)
 
     system = given.sized(v, y)
     v, y = (_checks.block(name, a, system.v_shape, system.axes) for name, a in (("v", v), ("y", y)))
@@ -279,9 +277,14 @@ class _Setup:
             return
         if callable(exact):
             blocks = exact(np.linspace(0.0, horizon, SCALE_SAMPLES))
+            if not (isinstance(blocks, tuple) and [np.shape(block) for block in blocks] == [(SCALE_SAMPLES, *v.shape)] * 2):
+                raise ShapeError(f"exact: expected a function of n times that returns v and y of shape (n, {str(v.shape)[1:]}")
             self.end = blocks[0][-1], blocks[1][-1]
         else:
-            pair = [_checks.block("exact", block, system.v_shape, system.axes) for block in exact]
+            given = _checks.several("exact", exact, "blocks, v and y at the end")
+            if len(given) != 2:
+                raise ShapeError(f"exact: expected a pair of blocks, v and y at the end, got {len(given)} of them")
+            pair = [_checks.block("exact", block, system.v_shape, system.axes) for block in given]
             self.end = pair[0], pair[1]
             blocks = np.stack([v, pair[0]]), np.stack([y, pair[1]])
         self.scales = [float(_length(block, (1, 2)).max()) for block in blocks]
@@ -302,7 +305,7 @@ class _Setup:
             # That much gain is too much is what the chart shows.
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", ControlWarning)
-            run = integrate(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // LOOKS), control=held)
+            run = integrate(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
             energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic
             largest = np.abs(run.y).max(axis=(0, 1, 2))
             state = self._state_error(run)

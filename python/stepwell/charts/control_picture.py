@@ -27,7 +27,7 @@ PLACES = {"none": 0.0, "scaling": 0.93, "nacozy": 0.965}
 ROW, FIRST = 0.031, 0.022
 
 #: What is exact has no place on a logarithmic axis.
-LEAST = 1e-17
+LEAST_DRAWN = 1e-17
 
 
 def draw(chart: ControlSweep) -> Figure:
@@ -63,7 +63,7 @@ def _panel(axes: Axes, chart: ControlSweep, what: str) -> None:
     axes.set(xscale="log", yscale="log", xlabel="gain h·C·K at the start")
     axes.set_xlim(low / 10 ** (0.09 * wide), high * 10 ** (0.13 * wide))
     for line in chart.lines:
-        values = np.maximum(getattr(line, what), LEAST)
+        values = np.maximum(getattr(line, what), LEAST_DRAWN)
         seen = look(line.method)
         if line.kind in FORMS:
             shown = np.where(np.isfinite(values), values, np.nan)

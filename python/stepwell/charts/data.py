@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._checks import known
+from .._checks import file, known
+from .._value import Value
 from ..methods import Method
 from ..scenes import Scene
 from .peers import Peer
-from .style import Drawn
+from .style import Drawn, drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,8 +27,8 @@ ERRORS = ("state_error", "end_error", "phase_error", "energy_error")
 COSTS = ("evaluations", "batch", "single")
 
 
-@dataclass(frozen=True)
-class Timing:
+@dataclass(frozen=True, eq=False)
+class Timing(Value):
     """Measured nanoseconds, per step or per unit of time of one member: not repeatable.
 
     Attributes:
@@ -50,14 +51,14 @@ class Timing:
         return cls(math.nan, math.nan, math.nan)
 
 
-@dataclass(frozen=True)
-class Point:
+@dataclass(frozen=True, eq=False)
+class Point(Value):
     """One method with one step, or one tolerance.
 
     Attributes:
         steps: how many steps were made over the horizon; with a tolerance all that were tried. None if a peer does not tell.
         dt: the step, in units of time; with a tolerance the mean of all that were tried.
-        cost: rate evaluations per unit of simulated time; NaN if a peer does not tell.
+        cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not tell.
         state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the times that are asked for.
         energy_error: the largest of ``Scene.energy_error`` over the run, likewise; NaN if the system has no energy.
         unstable: the state left the finite numbers, or is wrong altogether (an error above 1) and grew: its largest
@@ -90,8 +91,8 @@ class Point:
         return not self.unstable and self.state_error <= 1.0
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, eq=False)
+class Curve(Value):
     """One method on the whole ladder of steps, or of tolerances; or a peer.
 
     Attributes:
@@ -103,6 +104,7 @@ class Curve:
         single_time: measured, of a step of a single run.
         by: ``"step"`` or ``"tolerance"``, what goes down the ladder.
         times: of a peer, measured per unit of simulated time at each point, in a single run.
+        fused: whether it was computed with fused multiply-adds.
     """
 
     method: Method | Peer
@@ -112,20 +114,22 @@ class Curve:
     single_time: Timing = field(default_factory=Timing.unknown)
     by: str = "step"
     times: tuple[Timing, ...] = ()
+    fused: bool = False
 
     @property
     def name(self) -> str:
-        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
-        return f"{self.method.name}{self._tolerance}"
+        """The method's name, and that it goes by tolerance or is fused: ``"merson, tolerance"``, ``"rk4, fused"``."""
+        return f"{self.method.name}{self._kind}"
 
     @property
     def title(self) -> str:
         """As ``name``, for pictures."""
-        return f"{self.method.title}{self._tolerance}"
+        return f"{self.method.title}{self._kind}"
 
     @property
-    def _tolerance(self) -> str:
-        return ", tolerance" if self.by == "tolerance" and isinstance(self.method, Method) else ""
+    def _kind(self) -> str:
+        tolerance = ", tolerance" if self.by == "tolerance" and isinstance(self.method, Method) else ""
+        return tolerance + (", fused" if self.fused else "")
 
     def time(self, i: int, cost: str) -> Timing:
         """Measured nanoseconds per unit of simulated time at point ``i``, with a ``cost`` of ``"batch"`` or ``"single"``."""
@@ -151,8 +155,8 @@ class Curve:
         return min((point.cost for point in self.usable if point.state_error <= error), default=math.inf)
 
 
-@dataclass(frozen=True)
-class WorkPrecision(Drawn):
+@dataclass(frozen=True, eq=False)
+class WorkPrecision(Drawn, Value):
     """Error against cost of several methods on one scene.
 
     Attributes:
@@ -193,7 +197,7 @@ class WorkPrecision(Drawn):
             ArgumentError: if there is no such error, time or format.
             UnsupportedError: if matplotlib is missing.
         """
-        return self.write(self.draw(error, time), path)
+        return drawn(path, lambda: self.draw(error, time))
 
     def front(self, error: str = "state_error", cost: str = "evaluations") -> list[dict[str, Any]]:
         """The Pareto front: the points than which none is both as cheap and as right, from the cheapest to the most right.
@@ -286,14 +290,14 @@ class WorkPrecision(Drawn):
 
     def to_json(self, path: str | Path) -> None:
         """Write ``as_dict()``; what is not finite is null."""
-        Path(path).write_text(json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        file("path", path).write_text(json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
 
 def rows_to_csv(rows: list[dict[str, Any]], path: str | Path) -> None:
     """Write rows that share their columns."""
     columns = max(rows, key=len)
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(columns), restval="", lineterminator="\n")
+    with file("path", path).open("w", newline="", encoding="utf-8") as out:
+        writer = csv.DictWriter(out, list(columns), restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
 

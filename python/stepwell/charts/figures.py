@@ -12,24 +12,25 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from .._value import Value
 from ..errors import ArgumentError
 from ..integrate import integrate
-from ..methods import Method, _section
+from ..methods import Method, _section, choice
 from ..methods import method as find_method
 from ..stability import StabilityLimit, analyse, stability_limit
 from ..systems import Oscillator
 from .files import write_csv, write_json
-from .zplane import choice
+from .zplane import within
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: More steps than this are a mistake, and no picture.
-MOST = 100_000
+MAX_STEPS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(Value):
     """The samples of one method from v₀ = 0 and y₀ = 1; arrays are of shape (steps + 1,).
 
     Attributes:
@@ -59,7 +60,7 @@ class Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Figures:
+class Figures(Value):
     """The samples of several methods with the same step.
 
     Attributes:
@@ -84,20 +85,16 @@ class Figures:
             UnsupportedError: if matplotlib is missing.
         """
         from .figures_picture import one, overview
-        from .style import save
+        from .style import drawn
 
         if method is None:
-            figure = overview(self)
-        else:
-            how = find_method(method)
-            found = [samples for samples in self.samples if samples.method is how]
-            if not found:
-                names = ", ".join(samples.method.name for samples in self.samples)
-                raise ArgumentError(f"method: expected one of these figures, {names}, got {how.name!r}")
-            figure = one(self, found[0])
-        if path is not None:
-            save(figure, path)
-        return figure
+            return drawn(path, lambda: overview(self))
+        how = find_method(method)
+        found = [samples for samples in self.samples if samples.method is how]
+        if not found:
+            names = ", ".join(samples.method.name for samples in self.samples)
+            raise ArgumentError(f"method: expected one of these figures, {names}, got {how.name!r}")
+        return drawn(path, lambda: one(self, found[0]))
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``overview.png`` and a picture for each method, named by section and method, and return the paths.
@@ -106,16 +103,18 @@ class Figures:
             folder: where to; it is made if it is not there.
 
         Raises:
+            ArgumentError: if nothing can be written there.
             UnsupportedError: if matplotlib is missing.
         """
-        from .style import save
+        from .style import new_figure
 
-        overview = self.plot()  # before the folder is made: it may be that nothing can be drawn
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        paths = [Path(folder) / "overview.png", *(Path(folder) / samples.file for samples in self.samples)]
-        save(overview, paths[0])
-        for path, samples in zip(paths[1:], self.samples, strict=True):
-            self.plot(path, method=samples.method)
+        names = ["overview.png", *(samples.file for samples in self.samples)]
+        place = _checks.folder("folder", folder, names)
+        new_figure(1.0, 1.0)  # before the folder is made: it may be that nothing can be drawn
+        place.mkdir(parents=True, exist_ok=True)
+        paths = [place / name for name in names]
+        for path, method in zip(paths, [None, *(samples.method for samples in self.samples)], strict=True):
+            self.plot(path, method=method)
         return paths
 
     def rows(self) -> list[dict[str, Any]]:
@@ -162,7 +161,7 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
 
     Args:
         methods: names, or what ``stepwell.method`` returns; all if None.
-        phi: Φ = ω₀·dt, the true angle per step, in radians, above zero.
+        phi: Φ = ω₀·dt, the true angle per step, in radians, above zero and at most 100.
         periods: how many periods of the exact solution to cover, above zero; the last step goes to its end or past it.
 
     Returns:
@@ -175,10 +174,10 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
         DivergenceWarning: if samples leave the finite numbers.
     """
     chosen = choice(methods)
-    phi = _checks.number("phi", phi, positive=True, unit="rad")
+    phi = within("phi", _checks.number("phi", phi, positive=True, unit="rad"))
     periods = _checks.number("periods", periods, positive=True)
-    if (steps := 2.0 * math.pi * periods / phi) > MOST:
-        raise ArgumentError(f"periods: {periods:g} periods with Φ = {phi:g} are {steps:.3g} steps, expected {MOST} or fewer")
+    if (steps := 2.0 * math.pi * periods / phi) > MAX_STEPS:
+        raise ArgumentError(f"periods: {periods:g} periods with Φ = {phi:g} are {steps:.3g} steps, expected {MAX_STEPS} or fewer")
     return Figures(phi, periods, tuple(_samples(method, phi, math.ceil(steps)) for method in chosen))
 
 

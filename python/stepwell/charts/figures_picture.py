@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Samples are shown up to here; what grows more leaves the picture.
-MOST = 2.2
+Y_LIMIT = 2.2
 
 #: Panels of the overview side by side.
 COLUMNS = 2
@@ -86,8 +86,8 @@ def _samples(axes: Axes, chart: Figures, samples: Samples) -> None:
     marker = "" if many else "o"
     axes.plot(samples.t / turn, y, color="black", linewidth=1.1, marker=marker, markersize=4.2, zorder=3)
     end = float(samples.t[-1]) / turn
-    axes.set(xlim=(-0.01 * end, 1.01 * end), ylim=(-MOST, MOST), yticks=(-2, -1, 0, 1, 2))
-    if not np.abs(samples.y).max() <= MOST:
+    axes.set(xlim=(-0.01 * end, 1.01 * end), ylim=(-Y_LIMIT, Y_LIMIT), yticks=(-2, -1, 0, 1, 2))
+    if not np.abs(samples.y).max() <= Y_LIMIT:
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none"}
         largest = f"|y| up to {np.nanmax(np.abs(samples.y)):.3g}"
         axes.text(0.985, 0.07, largest, transform=axes.transAxes, size=11.5, ha="right", bbox=box, zorder=5)

@@ -8,17 +8,18 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from .._checks import file
 from .data import finite
 
 
 def write_csv(columns: Mapping[str, Iterable[Any]], path: str | Path) -> None:
     """Write columns of equal length under their names; every number reads back as itself."""
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
+    with file("path", path).open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
 
 
 def write_json(value: Any, path: str | Path) -> None:
     """Write a value; what is not finite is null."""
-    Path(path).write_text(json.dumps(finite(value), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    file("path", path).write_text(json.dumps(finite(value), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")

@@ -10,13 +10,14 @@ import numpy as np
 from .._checks import Array
 from ..errors import ArgumentError
 from ..scenes import Scene
-from ..scenes.truth import AGREES, with_truth
+from ..scenes.truth import MAX_DIFFERENCE, with_truth
 
-#: Places through which a polynomial goes that tells the state between them.
-NODES = 10
+#: Nodes of the polynomial that interpolates the state.
+INTERPOLATION_POINTS = 10
 
-#: Nodes of the whole motion at first and at most, and how near to a run the polynomials come, in the blocks' largest lengths.
-FEW, MANY, NEAR = 500, 64_000, 0.1 * AGREES
+#: Nodes of the whole motion at first and at most, and the largest error of the interpolation, relative to the blocks' largest
+#: lengths.
+FIRST_NODES, MAX_NODES, MAX_INTERPOLATION_ERROR = 500, 64_000, 0.1 * MAX_DIFFERENCE
 
 Exact = Callable[[Array], tuple[Array, Array]]
 
@@ -31,7 +32,7 @@ def chartable(scene: Scene) -> tuple[Scene, float]:
     """
     if scene.exact is not None and scene.until >= scene.horizon:
         return scene, 0.0
-    floor = 0.0 if scene.exact is not None else 10.0 * AGREES
+    floor = 0.0 if scene.exact is not None else 10.0 * MAX_DIFFERENCE
     known = with_truth(scene)
     if not known.until > 0.0 or known.exact is None:
         raise ArgumentError(f"scene: the true motion of {scene.name} is not known for any time, so there is no error to chart")
@@ -46,11 +47,11 @@ def dense(exact: Exact, until: float) -> Exact:
     """The same motion from 0 to ``until``, by polynomials through states that are computed once."""
     between = np.linspace(0.0, until, 97)[1:-1] + until / 2e4
     wanted = exact(between)
-    nodes = FEW
+    nodes = FIRST_NODES
     while True:
         found = _interpolant(exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
         apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True))
-        if apart <= NEAR or nodes >= MANY:
+        if apart <= MAX_INTERPOLATION_ERROR or nodes >= MAX_NODES:
             return found
         nodes *= 2
 
@@ -60,13 +61,13 @@ def _interpolant(blocks: tuple[Array, Array], spacing: float) -> Exact:
 
     def states(t: Array) -> tuple[Array, Array]:
         place = np.asarray(t, dtype=np.float64) / spacing
-        first = np.clip(np.floor(place).astype(np.int64) - (NODES // 2 - 1), 0, last + 1 - NODES)
+        first = np.clip(np.floor(place).astype(np.int64) - (INTERPOLATION_POINTS // 2 - 1), 0, last + 1 - INTERPOLATION_POINTS)
         u = place - first
         found = []
         for block in blocks:
             value = np.zeros((len(u), *block.shape[1:]))
-            for j in range(NODES):
-                others = [k for k in range(NODES) if k != j]
+            for j in range(INTERPOLATION_POINTS):
+                others = [k for k in range(INTERPOLATION_POINTS) if k != j]
                 share = np.prod([(u - k) / (j - k) for k in others], axis=0)
                 value += share.reshape(-1, *(1,) * (block.ndim - 1)) * block[first + j]
             found.append(value)

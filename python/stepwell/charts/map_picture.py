@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 LEVELS = (0.5, 0.8, 0.9, 1.1, 1.5, 2.0)
 
 #: The colours end here: what grows more is as dark. Of the colours only the middle part is used, on which lines are seen.
-MOST, COLOURS = 2.0, (0.13, 0.87)
+RADIUS_LIMIT, COLOURS = 2.0, (0.13, 0.87)
 
 #: A number stands on its line where the other lines are this far away, as a share of the picture; where none is, there is none.
-APART = 0.03
+LABEL_DISTANCE = 0.03
 
 
 def draw(chart: StabilityMap) -> Figure:
@@ -36,7 +36,9 @@ def draw(chart: StabilityMap) -> Figure:
         x, y, shown = chart.phi, chart.damping, _decided(chart)
         extent = (float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
         colours = ListedColormap(colormaps["PuOr_r"](np.linspace(*COLOURS, 256)))
-        image = axes.imshow(shown, norm=TwoSlopeNorm(1.0, 0.0, MOST), cmap=colours, extent=extent, origin="lower", aspect="auto")
+        image = axes.imshow(
+            shown, norm=TwoSlopeNorm(1.0, 0.0, RADIUS_LIMIT), cmap=colours, extent=extent, origin="lower", aspect="auto"
+        )
         if shown.min() < 1.0 < shown.max():
             axes.contourf(x, y, shown, levels=(1.0, np.inf), colors="none", hatches=["//"])
             axes.contour(x, y, shown, levels=(1.0,), colors="black", linewidths=2.8)
@@ -60,7 +62,7 @@ def draw(chart: StabilityMap) -> Figure:
 
 def _decided(chart: StabilityMap) -> Array:
     """r₁ with what is on the unit circle moved off it, to the side on which the samples are: else lines would follow rounding."""
-    radius = np.minimum(np.nan_to_num(chart.radius, nan=np.inf), 4.0 * MOST)
+    radius = np.minimum(np.nan_to_num(chart.radius, nan=np.inf), 4.0 * RADIUS_LIMIT)
     off = 1e-9
     return np.where(chart.stable, np.minimum(radius, 1.0 - off), np.maximum(radius, 1.0 + off))
 
@@ -79,7 +81,7 @@ def _numbers(axes: Axes, lines: dict[float, Any], extent: tuple[float, float, fl
             to_lines = np.sqrt(((own[:, np.newaxis] - others) ** 2).sum(axis=2)).min(axis=1)
         room = np.minimum(to_edge, to_lines)
         best = int(room.argmax())
-        if room[best] < APART:
+        if room[best] < LABEL_DISTANCE:
             continue
         at = own[best]
         taken = np.concatenate([taken, [at]])

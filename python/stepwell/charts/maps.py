@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from .._value import Value
 from ..errors import ArgumentError, DivergenceWarning, ShapeError
 from ..integrate import fits_together, integrate
 from ..methods import Method
@@ -19,7 +20,7 @@ from ..methods import method as find_method
 from ..stability import analyse
 from ..systems import Oscillator
 from .files import write_csv, write_json
-from .zplane import largest
+from .zplane import largest, within
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,13 +32,13 @@ SIZE = 512
 ROUNDING = 1000.0 * 2.0**-53
 
 #: Rows of the map that the summary tells, evenly spread from the least damping to the most.
-TOLD = 5
+SUMMARY_ROWS = 5
 
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap:
+class StabilityMap(Value):
     """The radius r₁ of one method over angle per step and damping ratio.
 
     Attributes:
@@ -129,19 +130,16 @@ class StabilityMap:
             UnsupportedError: if matplotlib is missing.
         """
         from .map_picture import draw
-        from .style import save
+        from .style import drawn
 
         if min(self.radius.shape) < 2:
             raise ArgumentError(f"plot: expected a map of 2 × 2 points or more, got one of shape {self.radius.shape}")
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return drawn(path, lambda: draw(self))
 
     def summary(self) -> list[dict[str, Any]]:
         """Five rows, from the least damping to the most: the largest Φ up to which all points are stable, 0 for none."""
         rows = []
-        for i in sorted({round(k) for k in np.linspace(0, len(self.damping) - 1, TOLD).tolist()}):
+        for i in sorted({round(k) for k in np.linspace(0, len(self.damping) - 1, SUMMARY_ROWS).tolist()}):
             reached = np.flatnonzero(~self.stable[i])
             last = int(reached[0]) if reached.size else len(self.phi)
             rows.append(
@@ -170,7 +168,7 @@ class StabilityMap:
 
 
 @dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(Value):
     """What the points of a map do when they are stepped, beside what their eigenvalues say.
 
     Attributes:
@@ -217,7 +215,7 @@ def stability_map(
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
-        phi: from where to where Φ = ω₀·dt goes, in radians, 0 or more; the first point is one spacing above the lower end.
+        phi: from where to where Φ = ω₀·dt goes, in radians, from 0 to 100; the first point is one spacing above the lower end.
             If None, from 0 to 4, or past the method's limit.
         damping: from where to where the damping ratio D goes, without a unit, both ends included; None for the undamped
             oscillator over Φ alone, which every method can do.
@@ -234,6 +232,7 @@ def stability_map(
     low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")
     if low < 0.0:
         raise ArgumentError(f"phi: expected angles of 0 rad or more, got {low:g}")
+    within("phi", high)
     pair = size if isinstance(size, tuple) else (size, size)
     if len(pair) != 2:
         raise ShapeError(f"size: expected a number of points or a pair, over Φ and over D, got {size!r}")
@@ -242,7 +241,7 @@ def stability_map(
     rows = 1 if damping is None else rows
     # One oscillator is refused in fewer words than all.
     fits_together(Oscillator(damping=None if damping is None else most), how)
-    _checks.fits("the matrices", 48, (rows, columns), "ask for fewer points")
+    _checks.fits("size: the matrices", 48, (rows, columns), "ask for fewer points")
 
     angles = low + (high - low) * np.arange(1, columns + 1) / columns
     ratios = np.linspace(least, most, rows)

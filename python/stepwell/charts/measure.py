@@ -7,6 +7,7 @@ import statistics
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,17 +25,21 @@ SAMPLES = 1000
 
 #: The amplitude of a run grows if the largest of its second half is above the largest of its first half by this factor,
 #: and above the exact solution's. What is large but bounded, as near a stability limit, is as large in both halves.
-GROWTH = 1.1
+MIN_GROWTH = 1.1
 
 #: A run with a tolerance is asked for its state at this many times, evenly spread, the last at the horizon. Each forces the end
 #: of a step, so they are few; its errors are those at these times.
-ASKED = 10
+SAVED_TIMES = 10
+
+#: Extra steps for a saved state within a step: one that ends at it, and the step that passes it once more.
+EXTRA_STEPS = 2
 
 #: And it makes no more steps than this, rejected ones counted.
 MOST_TRIED = 10_000_000
 
-#: The shift in time is looked for from the nearest of so many, evenly spread over a period, if the end is so far off.
-SHIFTS, FAR = 64, 0.05
+#: The phase error is searched from the best of so many shifts in time, evenly spaced over a period, if the state at the end is
+#: wrong by more than this.
+COARSE_SHIFTS, COARSE_SEARCH_ABOVE = 64, 0.05
 
 #: Members of the batch that is timed, on one thread: enough to hide the cost of the call, few enough for the cache.
 MEMBERS = 4096
@@ -69,16 +74,16 @@ def refusal(scene: Scene, method: Method) -> str | None:
     return None
 
 
-def assess(scene: Scene, method: Method, dt: float, steps: int) -> Point:
-    """Run the scene with a fixed step and look at its errors."""
+def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = False) -> Point:
+    """Run the scene with a fixed step and measure its errors."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)
-        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES))
+        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused)
     state_error, end_error, energy_error = _errors(scene, run)
     amplitude = scene.amplitude(run)
     half = len(amplitude) // 2
     # Not above the exact solution is no growth: a driven system may well start small. NaN is above everything.
-    grown = not amplitude[half:].max() <= GROWTH * max(1.0, float(amplitude[:half].max()))
+    grown = not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[:half].max()))
     return Point(
         steps=steps,
         dt=dt,
@@ -92,26 +97,28 @@ def assess(scene: Scene, method: Method, dt: float, steps: int) -> Point:
 
 
 def asked(scene: Scene) -> Array:
-    """The times at which a run with a tolerance, or a peer's, is looked at."""
-    return np.linspace(0.0, scene.horizon, ASKED + 1)[1:]
+    """The times at which a run with a tolerance, or a peer's, saves its state."""
+    return np.linspace(0.0, scene.horizon, SAVED_TIMES + 1)[1:]
 
 
-def assess_tolerance(scene: Scene, method: Method, tolerance: float) -> Point:
-    """Run the scene with a tolerance and look at its errors; steps that were rejected are counted."""
+def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool = False) -> Point:
+    """Run the scene with a tolerance and measure its errors.
+
+    Steps that were rejected are counted, and those that a state at the end takes, which is one of all that are looked at.
+    """
     times = asked(scene)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
-        run = integrate(
-            scene.system, method, v=scene.v, y=scene.y, tolerance=tolerance, at=times, dt=scene.dt, max_steps=MOST_TRIED
-        )
+        motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times}
+        run = integrate(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
     assert run.paces is not None
     state_error, end_error, energy_error = _errors(scene, run)
-    tried = int(run.paces.accepted + run.paces.rejected)
+    tried = int(run.paces.accepted + run.paces.rejected) + EXTRA_STEPS
     stopped = bool(run.status != 0)
     return Point(
         steps=tried,
         dt=scene.horizon / tried,
-        cost=int(run.paces.evaluations) / scene.horizon,
+        cost=method.evaluations * tried / scene.horizon,
         state_error=math.inf if stopped else state_error,
         energy_error=math.inf if stopped else energy_error,
         unstable=stopped,
@@ -206,12 +213,12 @@ def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
 
     state = np.concatenate([np.ravel(block) / scale for block, scale in zip((v, y), scene.scales, strict=True)])
     shift = 0.0
-    if np.linalg.norm(state - states(np.zeros(1))[0]) > FAR:
-        shifts = period * (np.arange(SHIFTS + 1) / SHIFTS - 0.5)
+    if np.linalg.norm(state - states(np.zeros(1))[0]) > COARSE_SEARCH_ABOVE:
+        shifts = period * (np.arange(COARSE_SHIFTS + 1) / COARSE_SHIFTS - 0.5)
         shift = float(shifts[np.argmin(np.linalg.norm(states(shifts) - state, axis=1))])
     # The slope is good to eight digits or so, and Gauss-Newton's steps come to rest where the residue is across it whatever
     # its length. No step is longer than the distance of two shifts: next to a near collision the orbit is no line.
-    small, most = 1e-5 * period, period / SHIFTS
+    small, most = 1e-5 * period, period / COARSE_SHIFTS
     for _ in range(30):
         before, here, after = states(shift + small * np.array([-1.0, 0.0, 1.0]))
         slope = (after - before) / (2.0 * small)
@@ -222,7 +229,7 @@ def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
     return (shift / period + 0.5) % 1.0 - 0.5 if abs(shift) > 0.5 * period else shift / period
 
 
-def largest_stable_step(scene: Scene, method: Method, points: Sequence[Point]) -> float:
+def largest_stable_step(scene: Scene, method: Method, points: Sequence[Point], fused: bool = False) -> float:
     """The step at which the method falls off, within 0.1 %: below it every rung of ``points`` is stable.
 
     ``points`` go from the largest step to the smallest. Infinite if all are stable, 0 if not even the last one is.
@@ -235,7 +242,7 @@ def largest_stable_step(scene: Scene, method: Method, points: Sequence[Point]) -
     low = max((dt for dt, _ in ladder if dt < high), default=0.0)
     while low > 0.0 and high > 1.001 * low:
         middle = math.sqrt(low * high)
-        point = assess(scene, method, middle, scene.steps_for(middle))
+        point = assess(scene, method, middle, scene.steps_for(middle), fused)
         low, high = (low, middle) if point.unstable else (middle, high)
     return low
 
@@ -245,7 +252,7 @@ def members_of(scene: Scene) -> int:
     return max(8, min(MEMBERS, NUMBERS // max(1, scene.v.size, scene.y.size)))
 
 
-def step_times(scene: Scene, methods: Sequence[Method], members: int | None = None) -> dict[str, Timing]:
+def step_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
     """Nanoseconds per step of one member of a batch, by method.
 
     The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve. The
@@ -255,19 +262,20 @@ def step_times(scene: Scene, methods: Sequence[Method], members: int | None = No
         scene: what to step.
         methods: by which.
         members: of the batch; ``members_of`` the scene if None, and 0 for a run without a batch.
+        fused: with fused multiply-adds.
     """
     v, y, members = _batch(scene, members)
 
     def timed(method: Method, steps: int) -> tuple[float, int]:
         begin = time.perf_counter()
-        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, threads=1)
+        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, threads=1, fused=fused)
         return time.perf_counter() - begin, steps
 
     # A step of many bodies alone takes long enough.
     return _in_turns(methods, timed, 50 if scene.y.size <= 16 else 1, members)
 
 
-def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = None) -> dict[str, Timing]:
+def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
     """Nanoseconds per step that is tried, of one member of a batch, by method, in runs with a tolerance; as ``step_times``."""
     v, y, members = _batch(scene, members)
 
@@ -285,9 +293,10 @@ def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = N
                 at=[part * scene.horizon],
                 dt=scene.dt,
                 threads=1,
+                fused=fused,
             )
             assert run.paces is not None
-            tried += int((run.paces.accepted + run.paces.rejected).max())
+            tried += int(run.paces.evaluations.max()) // method.evaluations
         return time.perf_counter() - begin, tried
 
     with warnings.catch_warnings():

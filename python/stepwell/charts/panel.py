@@ -8,20 +8,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import _checks
 from .._checks import known
-from ..errors import ArgumentError, DTypeError
+from .._value import Value
+from ..errors import ArgumentError
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from .data import ERRORS, WorkPrecision, finite, rows_to_csv
-from .style import Drawn
+from .style import Drawn, drawn
 from .work_precision import work_precision
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Panel(Drawn):
+@dataclass(frozen=True, eq=False)
+class Panel(Drawn, Value):
     """Work-precision charts of several scenes.
 
     Attributes:
@@ -43,7 +45,7 @@ class Panel(Drawn):
             ArgumentError: if there is no such error or format.
             UnsupportedError: if matplotlib is missing.
         """
-        return self.write(self.draw(error), path)
+        return drawn(path, lambda: self.draw(error))
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of all charts."""
@@ -64,7 +66,7 @@ class Panel(Drawn):
     def to_json(self, path: str | Path) -> None:
         """Write what each chart writes, as a list; what is not finite is null."""
         whole = [chart.as_dict() for chart in self.charts]
-        Path(path).write_text(json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        _checks.file("path", path).write_text(json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
 
 def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] | None = None, **options: Any) -> Panel:
@@ -78,12 +80,11 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
     Raises:
         ArgumentError: what was given and what was expected.
     """
-    if isinstance(scenes, (str, Scene)):
-        raise DTypeError(f"scenes: expected a list of scenes, got {scenes!r}")
-    chosen = [find_scene(each) for each in scenes]
+    chosen = [find_scene(each) for each in _checks.several("scenes", scenes, "scenes")]
     if not chosen:
         raise ArgumentError("scenes: expected at least one, got none")
-    options = {name: value if value is None else list(value) for name, value in options.items()}
+    options = {name: value if value is None else _checks.several(name, value, name) for name, value in options.items()}
+    progress = _checks.callback("progress", progress)
     charts = []
     for i, scene in enumerate(chosen):
 

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from .._checks import Array, known
-from ..errors import UnsupportedError
+from .._checks import Array, count, known, numbers, short
+from .._value import Value
+from ..errors import DTypeError, ShapeError, UnsupportedError
 from ..scenes import Scene
 from ..systems import NBody
 
@@ -25,8 +26,8 @@ from ..systems import NBody
 TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
 
 
-@dataclass(frozen=True)
-class Solved:
+@dataclass(frozen=True, eq=False)
+class Solved(Value):
     """What a peer found.
 
     Attributes:
@@ -42,8 +43,8 @@ class Solved:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Peer:
+@dataclass(frozen=True, eq=False)
+class Peer(Value):
     """Another program.
 
     Attributes:
@@ -61,6 +62,18 @@ class Peer:
     by: str = "tolerance"
     order: int | None = None
 
+    def __post_init__(self) -> None:
+        """Raise if it could not be run."""
+        if not isinstance(self.name, str):
+            raise DTypeError(f"name: expected a text, got {short(self.name)}")
+        if not callable(self.solve):
+            raise DTypeError(f"solve: expected a function of scene, times and setting, got {short(self.solve)}")
+        if numbers("settings", self.settings, positive=True).ndim != 1:
+            raise ShapeError(f"settings: expected a list of numbers, got {short(self.settings)}")
+        known("by", self.by, ("tolerance", "step"))
+        if self.order is not None:
+            count("order", self.order, 0)
+
     @property
     def title(self) -> str:
         """The name in a picture."""
@@ -68,7 +81,13 @@ class Peer:
 
 
 def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
-    """A peer of a function: its name is the function's, its settings are tolerances."""
+    """A peer of a function: its name is the function's, its settings are tolerances.
+
+    Raises:
+        DTypeError: if it is neither a peer nor a function.
+    """
+    if not isinstance(given, Peer) and not callable(given):
+        raise DTypeError(f"peers: expected a Peer, such as peers.scipy(), or a function, got {short(given)}")
     return given if isinstance(given, Peer) else Peer(getattr(given, "__name__", type(given).__name__), given)
 
 

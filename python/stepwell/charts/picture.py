@@ -49,11 +49,13 @@ def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
 
 
 def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
-    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted."""
+    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted; fused it is dotted, and small."""
     if isinstance(curve.method, Peer):
         others = [each.method.name for each in chart.curves if isinstance(each.method, Peer)]
         return peer_look(others.index(curve.method.name))
     own = look(curve.method)
+    if curve.fused:
+        own |= {"linestyle": ":", "markersize": 0.6 * own.get("markersize", 6.0)}
     return own | {"markerfacecolor": "white", "linestyle": "-."} if curve.by == "tolerance" else own
 
 
@@ -185,12 +187,13 @@ def _legend(figure: Figure, chart: WorkPrecision) -> None:
 
 def title_of(name: str) -> str:
     """The title of a method, or the name of a peer."""
-    return next((method.title for method in every_method() if method.name == name), name)
+    first, *kinds = name.split(", ")
+    return ", ".join([next((method.title for method in every_method() if method.name == first), first), *kinds])
 
 
 def _label(curve: Curve) -> str:
     method, limit = curve.method, curve.largest_stable_step
-    if isinstance(method, Peer) or curve.by == "tolerance":
+    if isinstance(method, Peer) or curve.by == "tolerance" or curve.fused:  # its limit is that of the other curve
         return curve.title
     # A method without a limit on the oscillator grows at every step; how far it gets depends on the horizon.
     up_to = "stable dt <" if method.limit else "fails dt >"

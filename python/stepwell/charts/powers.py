@@ -14,7 +14,8 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array
-from ..errors import ShapeError, UnsupportedError
+from .._value import Value
+from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..integrate import fits_together, integrate
 from ..methods import Method
 from ..methods import method as find_method
@@ -22,6 +23,7 @@ from ..result import Run
 from ..stability import maps
 from ..stability.expansion import polynomials
 from ..systems import Oscillator, System
+from ..systems.base import a_system
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -42,7 +44,7 @@ BITS = 320
 
 
 @dataclass(frozen=True, eq=False)
-class Powers(Drawn):
+class Powers(Drawn, Value):
     """Cost and error of n steps in each form.
 
     Attributes:
@@ -138,7 +140,7 @@ def powers(
         UnsupportedError: if the system is not linear, or the method cannot do it.
     """
     how = find_method(method)
-    system = Oscillator() if system is None else system
+    system = Oscillator() if system is None else a_system(system)
     fits_together(system, how)
     if not system.linear:
         raise UnsupportedError(f"system: only linear systems have powers, and {system!r} is not linear")
@@ -146,15 +148,20 @@ def powers(
         raise ShapeError(f"system: expected one member, got a batch of shape {system.batch}")
     system = system.without_inputs()
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
-    counts = sorted({_checks.count("steps", n, 1) for n in steps})
+    counts = sorted({_checks.count("steps", n, 1) for n in _checks.several("steps", steps, "numbers of steps")})
+    progress = _checks.callback("progress", progress)
     if not counts:
         raise ShapeError("steps: expected at least one number of steps, got none")
     start = integrate(system, how, v=v, y=y, dt=dt, steps=1, every=1)
+    if start.status.ndim:
+        raise ShapeError(f"v, y: expected one member, got a batch of shape {start.status.shape}")
 
     seconds = {form: np.empty(len(counts)) for form in FORMS}
     errors = {form: np.empty(len(counts)) for form in FORMS}
     exact = _Exact(system, how, dt, start)
     longest = exact.length(0)
+    if not longest > 0.0:
+        raise ArgumentError(f"v, y: expected a start of more than 2**-{BITS}, got one that stays at rest")
     for i, n in enumerate(counts):
         longest = max(longest, exact.length(n))
         for form in FORMS:
@@ -200,13 +207,13 @@ class _Exact:
 
     def length(self, n: int) -> float:
         """The length of the exact coordinates and velocities, or what stands in their place."""
-        return float(np.sqrt(sum(_number(x) ** 2 for x in self.state(n))))
+        return _length(self.state(n))
 
     def distance(self, n: int, run: Run) -> float:
         """How far a run's end is from them."""
         slot = run.v[-1] if run.carry is None else run.carry
         ends = [*np.ravel(slot).tolist(), *np.ravel(run.y[-1]).tolist()]
-        return float(np.sqrt(sum(_number(_fixed(Fraction(a)) - b) ** 2 for a, b in zip(ends, self.state(n), strict=True))))
+        return _length([_fixed(Fraction(a)) - b for a, b in zip(ends, self.state(n), strict=True)])
 
 
 def _fixed(x: Fraction) -> int:
@@ -215,3 +222,11 @@ def _fixed(x: Fraction) -> int:
 
 def _number(x: int) -> float:
     return float(Fraction(x, 1 << BITS))
+
+
+def _length(state: list[int]) -> float:
+    """The length of a state."""
+    try:
+        return float(np.sqrt(sum(_number(x) ** 2 for x in state)))
+    except OverflowError:
+        raise ArgumentError("v, y, dt, steps: expected states whose squares are numbers, got larger ones") from None

@@ -13,7 +13,7 @@ from .style import FONT, GREY, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOOKS: dict[str, Any] = {
+LINE_STYLES: dict[str, Any] = {
     "direct": {"color": "#000000", "marker": "o", "linestyle": "-", "label": "direct: the method's own steps"},
     "matrix": {"color": "#0072b2", "marker": "s", "linestyle": (0, (5, 2)), "label": "matrix: s ← P·s, step by step"},
     "power": {"color": "#d55e00", "marker": "D", "linestyle": (0, (1, 1.2)), "label": "power: Pⁿ by squaring"},
@@ -29,9 +29,9 @@ def draw(chart: Powers) -> Figure:
         places = {"left": 0.075, "right": 0.985, "bottom": 0.2, "top": 0.78, "wspace": 0.2}
         time, error = figure.subplots(1, 2, gridspec_kw=places)
         for form, seconds in chart.seconds.items():
-            time.plot(chart.steps, seconds, **LOOKS[form])
+            time.plot(chart.steps, seconds, **LINE_STYLES[form])
             # What is exact has no place on a logarithmic axis; a tenth of the smallest rounding stands for it.
-            error.plot(chart.steps, np.maximum(chart.errors[form], 1e-17), **LOOKS[form])
+            error.plot(chart.steps, np.maximum(chart.errors[form], 1e-17), **LINE_STYLES[form])
         for axes in (time, error):
             axes.set(xscale="log", yscale="log", xlabel="steps n")
             axes.grid(which="major", color="#dddddd", linewidth=0.8)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, System
+from ..systems import NBody
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -27,13 +27,13 @@ EXACT = 6001
 
 
 @dataclass(frozen=True, eq=False)
-class RunPicture(Drawn):
-    """A run of a scene, with its errors at the kept states; arrays are of shape (saved,).
+class RunPicture(Drawn, Value):
+    """A run of a scene, with its errors at the saved states; arrays are of shape (saved,).
 
     Attributes:
         scene: what was run.
         run: what came of it.
-        energy_error: of each kept state, relative to ``energy_scale``; infinite where it is not finite, NaN where the true one
+        energy_error: of each saved state, relative to ``energy_scale``; infinite where it is not finite, NaN where the true one
             is not known; None for a system without an energy. Without an exact solution it is the change since the first state.
         energy_scale: what the energy error is relative to, in words.
         state_error: ``Scene.state_error``, or None if the scene has no exact solution.
@@ -59,7 +59,7 @@ class RunPicture(Drawn):
 
     @property
     def finite(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Which kept states are finite."""
+        """Which saved states are finite."""
         return np.asarray(
             np.isfinite(self.run.y).reshape(len(self.run.t), -1).all(axis=1)
             & np.isfinite(self.run.v).reshape(len(self.run.t), -1).all(axis=1)
@@ -83,18 +83,18 @@ class RunPicture(Drawn):
         return draw(self)
 
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
-        """Write a film of the run; the kept states are its frames, none is made up between them.
+        """Write an animation of the run; the saved states are its frames, none is made up between them.
 
         Args:
             path: the file, ending in .gif, .mp4 or .html.
             seconds: how long it lasts, above zero.
-            fps: frames a second, above zero; fewer if fewer states were kept.
+            fps: frames a second, above zero; fewer if fewer states were saved.
 
         Raises:
             ArgumentError: what was given and what was expected.
             UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
         """
-        from .runs_film import need, write
+        from .runs_animation import need, write
 
         seconds, fps = need(path, seconds, fps)
         write(self, path, seconds, fps)
@@ -114,7 +114,7 @@ class RunPicture(Drawn):
         }
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each kept state: time, each number of the blocks, energy and errors."""
+        """A row for each saved state: time, each number of the blocks, energy and errors."""
         columns = self._columns()
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
@@ -127,7 +127,7 @@ class RunPicture(Drawn):
         write_json({"summary": self.summary(), "rows": self.rows()}, path)
 
     def columns(self) -> dict[str, Array]:
-        """The kept states as arrays with the time along the first axis: t, v, y, energy and errors, as far as there are any."""
+        """The saved states as arrays with the time along the first axis: t, v, y, energy and errors, as far as there are any."""
         given: dict[str, Array] = {"t": self.run.t, "v": self.run.v, "y": self.run.y}
         if self.energy_error is not None:
             given["energy"] = self.run.energy
@@ -159,17 +159,15 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
     Raises:
         ArgumentError: if the run is not of that scene, or keeps too little.
     """
-    if not isinstance(scene, (Scene, str)):
-        raise DTypeError(f"scene: expected a Scene or its name, got {type(scene).__name__}")
     scene = find_scene(scene)
     if not isinstance(run, Run):
         raise DTypeError(f"run: expected what scene.run returns, got {type(run).__name__}")
     if run.y.shape[1:] != scene.system.y_shape or run.v.shape[1:] != scene.system.v_shape:
         raise ShapeError(f"run: expected one member with states of shape {scene.system.y_shape}, got {run.y.shape[1:]}")
-    if (run.t[0] == 0.0 and not _begins(scene, run)) or _left_alone(run.system) != _left_alone(scene.system):
+    if not scene.owns(run) or (run.t[0] == 0.0 and not _begins(scene, run)):
         raise ArgumentError(f"run: expected a run of the scene {scene.name}, got another start or system: {run!r}")
     if len(run.t) < 2:
-        raise ArgumentError(f"run: expected two kept states or more, got {len(run.t)}; run with every=")
+        raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
     energy_error, scale = _energy_error(scene, run)
     return RunPicture(scene, run, energy_error, scale, None if scene.exact is None else scene.state_error(run))
 
@@ -179,14 +177,6 @@ def _begins(scene: Scene, run: Run) -> bool:
     pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
     scale = max(float(np.abs(block).max()) for _, block in pairs)
     return all(np.allclose(found, block, rtol=0.0, atol=1e-9 * scale) for found, block in pairs)
-
-
-def _left_alone(system: System) -> str:
-    """A system in words, without its control."""
-    if isinstance(system, NBody):
-        system = copy.copy(system)
-        system.control = None
-    return repr(system)
 
 
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:

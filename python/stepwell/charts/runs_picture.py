@@ -26,10 +26,10 @@ BODIES: tuple[dict[str, Any], ...] = (
 EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "solid_capstyle": "round"}
 
 #: A curve of more states than this is drawn thin and without dashes, and as pixels in files of lines.
-LONG = 3000
+LONG_CURVE = 3000
 
-#: What goes further than this many times the exact motion leaves the picture; without an exact one, the start, which is less.
-FAR, FAR_FROM_START = 4.0, 30.0
+#: The view ends at this many times the size of the exact motion; without one, at this many times that of the start.
+VIEW_FACTOR, VIEW_FACTOR_FROM_START = 4.0, 30.0
 
 #: Rows of a chain are drawn up to here; of more, these many evenly chosen ones.
 MOST_ROWS = 24
@@ -79,7 +79,7 @@ def _orbits(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
 
 def view(chart: RunPicture, plane: tuple[int, int]) -> tuple[Array, float]:
     """The middle and half the side of a square that holds all that is not far away."""
-    known, far = (chart.scene.y[np.newaxis], FAR_FROM_START) if chart.exact is None else (chart.exact[2], FAR)
+    known, far = (chart.scene.y[np.newaxis], VIEW_FACTOR_FROM_START) if chart.exact is None else (chart.exact[2], VIEW_FACTOR)
     reach = far * max(float(np.abs(known).max()), 1e-300)
     points = np.concatenate([known[..., plane].reshape(-1, 2), chart.run.y[chart.finite][..., plane].reshape(-1, 2)])
     points = points[(np.abs(points) <= reach).all(axis=1)]
@@ -126,7 +126,7 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
 
     y = np.clip(chart.run.y[chart.finite], -1e9, 1e9)[..., plane]
     bodies = y.shape[1]
-    long, many = len(y) > LONG, bodies > len(BODIES)
+    long, many = len(y) > LONG_CURVE, bodies > len(BODIES)
     if chart.exact is not None:
         for i in range(bodies):
             exact(axes, chart.exact[2][:, i, plane].T, above=long)
@@ -229,7 +229,9 @@ def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
         axes.axhline(place * step, color="#cccccc", linewidth=0.7, zorder=0)
         if true is not None and chart.exact is not None:
             axes.plot(chart.exact[0], place * step + true[:, i], **(EXACT | {"linewidth": 3.0}))
-        axes.plot(chart.run.t[good], place * step + y[:, i], color="black", linewidth=0.9, zorder=3, rasterized=len(y) > LONG)
+        axes.plot(
+            chart.run.t[good], place * step + y[:, i], color="black", linewidth=0.9, zorder=3, rasterized=len(y) > LONG_CURVE
+        )
     axes.set_yticks([place * step for place in range(len(chosen))], [str(i + 1) for i in chosen.tolist()])
     axes.set_ylim(-1.15 * size, (len(chosen) - 1) * step + 1.15 * size)
     axes.set_ylabel(f"coordinate; from line to line {step:.3g}")
@@ -270,7 +272,7 @@ def errors(energy: Axes, state: Axes, chart: RunPicture) -> None:
         low = max(low, 1e-9 * high)  # the first steps, or a passage through zero, would press the rest together
         # Before the curve: a scale that is still free would look for room beyond the largest float.
         axes.set_ylim(0.4 * low, 3.0 * min(high, 1e300))
-        axes.plot(chart.run.t, np.where(shown, error, np.nan), color="black", linewidth=1.0, rasterized=len(error) > LONG)
+        axes.plot(chart.run.t, np.where(shown, error, np.nan), color="black", linewidth=1.0, rasterized=len(error) > LONG_CURVE)
         if np.isinf(error).any():
             first = int(np.argmax(np.isinf(error)))
             axes.axvline(float(chart.run.t[first]), color="black", linewidth=1.0, linestyle=(0, (4, 2)))
@@ -299,7 +301,7 @@ def text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
         said.append(f"Energy error: relative to {chart.energy_scale}.")
     said += dict.fromkeys(notes)
     if len(run.t) < run.steps + 1:
-        said.append(f"{len(run.t)} states of {run.steps + 1} were kept and are drawn.")
+        said.append(f"{len(run.t)} states of {run.steps + 1} were saved and are drawn.")
     figure.text(0.012, 0.02, "\n".join(_lines(said)), size=12, color=GREY, linespacing=1.4)
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._checks import file
 from ..errors import ArgumentError, UnsupportedError
 from ..methods import Method
 from ..methods import methods as every_method
@@ -85,16 +87,21 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure; the path's ending says in which format.
+def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
+    """Draw a figure, and write it if there is a path; its ending says in which format.
 
     Raises:
-        ArgumentError: if there is no such format.
+        ArgumentError: before anything is drawn, if there is no such format or the file cannot be written.
+        UnsupportedError: if matplotlib is missing.
     """
-    known = sorted(figure.canvas.get_supported_filetypes())
-    if Path(path).suffix.lower().removeprefix(".") not in known:
+    if path is None:
+        return draw()
+    known = sorted(new_figure(1.0, 1.0).canvas.get_supported_filetypes())
+    if Path(path := file("path", path)).suffix.lower().removeprefix(".") not in known:
         raise ArgumentError(f"path: expected an ending of a picture, one of {', '.join(known)}, got {str(path)!r}")
+    figure = draw()
     figure.savefig(path, facecolor="white")
+    return figure
 
 
 class Drawn(ABC):
@@ -111,11 +118,4 @@ class Drawn(ABC):
             ArgumentError: if there is no such format.
             UnsupportedError: if matplotlib is missing.
         """
-        return self.write(self.draw(), path)
-
-    @staticmethod
-    def write(figure: Figure, path: str | Path | None) -> Figure:
-        """Write what was drawn, if there is a path."""
-        if path is not None:
-            save(figure, path)
-        return figure
+        return drawn(path, self.draw)

@@ -13,10 +13,9 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
-from ..errors import ArgumentError, DTypeError, ShapeError
-from ..methods import Method
-from ..methods import method as find_method
-from ..methods import methods as every_method
+from .._value import Value
+from ..errors import ArgumentError, ShapeError
+from ..methods import Method, choice
 from ..stability import StabilityLimit, analyse, series, stability_limit
 from ..stability.eigen import Complex
 from ..stability.expansion import text
@@ -29,15 +28,18 @@ if TYPE_CHECKING:
 #: The default ladder has so many angles in each unit of Φ: round values are rungs.
 RUNGS = 200
 
+#: Φ is at most this, in rad: it is far past every limit, and a picture says nothing of angles as far apart.
+MAX_PHI = 100.0
+
 #: It goes past the largest limit by at least this factor.
-PAST = 1.1
+LIMIT_MARGIN = 1.1
 
 #: The pictures that there are.
 KINDS = ("loci", "curves")
 
 
 @dataclass(frozen=True, eq=False)
-class Locus:
+class Locus(Value):
     """One method on the undamped oscillator at n angles per step; arrays are of shape (n,) unless said otherwise.
 
     Attributes:
@@ -99,7 +101,7 @@ class Locus:
 
 
 @dataclass(frozen=True, eq=False)
-class Stability:
+class Stability(Value):
     """Methods on the undamped oscillator, over the angle per step.
 
     Attributes:
@@ -122,13 +124,10 @@ class Stability:
             UnsupportedError: if matplotlib is missing.
         """
         from . import zplane_picture
-        from .style import save
+        from .style import drawn
 
         draw = {"loci": zplane_picture.loci, "curves": zplane_picture.curves}[_checks.known("kind", kind, KINDS)]
-        figure = draw(self)
-        if path is not None:
-            save(figure, path)
-        return figure
+        return drawn(path, lambda: draw(self))
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each method and each angle."""
@@ -168,8 +167,8 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
 
     Args:
         methods: names, or what ``stepwell.method`` returns; all if None.
-        phi: angles Φ = ω₀·dt in radians, above zero and rising, shape (n,); if None, 200 in each unit of Φ up to past the
-            largest limit.
+        phi: angles Φ = ω₀·dt in radians, above zero, at most 100 and rising, shape (n,); if None, 200 in each unit of Φ up to
+            past the largest limit.
 
     Returns:
         A ``Stability``.
@@ -183,25 +182,24 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
         raise ShapeError(f"phi: expected a list of angles in rad, got an array of shape {angles.shape}")
     if angles is not None and (np.diff(angles) <= 0.0).any():
         raise ArgumentError("phi: expected angles that rise from one to the next")
+    if angles is not None:
+        within("phi", float(angles[-1]))
     limits = [stability_limit(Oscillator(), method) for method in chosen]
     if angles is None:
         angles = ladder(largest(limits))
     return Stability(angles, tuple(_locus(method, angles, limit) for method, limit in zip(chosen, limits, strict=True)))
 
 
-def choice(methods: Iterable[Method | str] | None) -> list[Method]:
-    """The methods that are meant, each once."""
-    if isinstance(methods, str):
-        raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
-    chosen = list(dict.fromkeys(every_method() if methods is None else map(find_method, methods)))
-    if not chosen:
-        raise ArgumentError("methods: expected at least one, got none")
-    return chosen
+def within(argument: str, phi: float) -> float:
+    """Return an angle per step if a picture of it says anything."""
+    if phi > MAX_PHI:
+        raise ArgumentError(f"{argument}: expected {MAX_PHI:g} rad a step or less, which is far past every limit, got {phi:g}")
+    return phi
 
 
 def largest(limits: Sequence[float]) -> float:
     """A round angle past all limits, and past 2, to which every Euler method is worth seeing."""
-    return math.ceil(2.0 * PAST * max([2.0, *filter(math.isfinite, limits)])) / 2.0
+    return math.ceil(2.0 * LIMIT_MARGIN * max([2.0, *filter(math.isfinite, limits)])) / 2.0
 
 
 def ladder(top: float) -> Array:

@@ -30,7 +30,7 @@ MARKED, ASIDE = 0.5, 0.17
 
 #: Below this, r₁² − 1 is shown on a linear scale, above on a logarithmic one, between these ends: what Fehlberg's results grow
 #: by at usual steps must be seen.
-LINEAR, LEAST, MOST = 1e-6, -1.6, 10.0
+LINEAR_BELOW, GROWTH_MIN, GROWTH_MAX = 1e-6, -1.6, 10.0
 
 #: Ψ/Φ is shown up to here.
 TURNS = 2.3
@@ -202,12 +202,12 @@ def curves(chart: Stability) -> Figure:
 def _radius(axes: Axes, locus: Locus) -> None:
     from matplotlib.ticker import NullLocator
 
-    axes.set_yscale("symlog", linthresh=LINEAR, linscale=0.6)
-    axes.set_ylim(LEAST, MOST)
+    axes.set_yscale("symlog", linthresh=LINEAR_BELOW, linscale=0.6)
+    axes.set_ylim(GROWTH_MIN, GROWTH_MAX)
     ticks = (-1.0, -1e-2, -1e-4, 0.0, 1e-4, 1e-2, 1.0)
     axes.set_yticks(ticks, ["−1", "−10⁻²", "−10⁻⁴", "0", "10⁻⁴", "10⁻²", "1"])
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.axhspan(0.0, MOST, facecolor="none", edgecolor="#cccccc", hatch="//", linewidth=0.0, zorder=0)
+    axes.axhspan(0.0, GROWTH_MAX, facecolor="none", edgecolor="#cccccc", hatch="//", linewidth=0.0, zorder=0)
     _lines(axes, locus, locus.r1_squared - 1.0, locus.r1_squared_series - 1.0)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .. import _checks
 from ..advice import COSTS, advise
 from ..advice.result import COLUMNS, REASONS
 from ..errors import ArgumentError
@@ -26,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--budget", type=float, metavar="S", help="seconds of computing in a frame (default: the frame)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
-    parser.add_argument("--fixed", action="store_true", help="fixed steps only, none of chosen length")
+    parser.add_argument("--fixed", action="store_true", help="fixed steps only, none adaptive")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write all of it: .json")
     show.json_option(parser)
 
@@ -35,23 +36,23 @@ def command(args: argparse.Namespace) -> None:
     """Find, write, tell."""
     chosen, frame = scene(args.scene), _frame(args.frame)
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
-    if args.output is not None and args.output.suffix != ".json":
-        raise ArgumentError(f"-o: expected a file ending in .json, got {str(args.output)!r}")
+    if args.output is not None:
+        _checks.file("-o", args.output, (".json",))
     if not args.json:
         show.need_rich()
 
     found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed)
+    written = show.Written()
     if args.output is not None:
-        found.to_json(args.output)
+        written.write(args.output, found.to_json)
+    rejected = found.rejections(REASONS)
     if args.json:
         show.print_json(found.data())
-        return
-    written = [f"written: {args.output}"] if args.output is not None else []
-    rejected = found.rejections(REASONS)
-    if found.ranked:
-        show.table(found.title, COLUMNS, found.table(), [*found.summary(), "", *rejected, *written])
+    elif found.ranked:
+        show.table(found.title, COLUMNS, found.table(), [*found.summary(), "", *rejected, *written.notes()])
     else:
-        print("\n".join([found.title, *found.summary(), "", *rejected, *written]))
+        print("\n".join([found.title, *found.summary(), "", *rejected, *written.notes()]))
+    written.close()
 
 
 def _frame(text: str) -> float | None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import math
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from .. import _checks
 from ..charts import Panel, WorkPrecision, work_precision
 from ..charts.data import ERRORS, TARGETS
 from ..charts.picture import title_of
+from ..charts.style import new_figure
 from ..methods import method
 from ..scenes import scene
 from . import show
@@ -22,6 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
+    parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")
     parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
     show.json_option(parser)
 
@@ -33,26 +37,29 @@ def command(args: argparse.Namespace) -> None:
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
     if not args.json:
         show.need_rich()
+    names = ["panel"] if args.panel else [one.name for one in chosen]
+    _checks.folder("-o", args.output, [name + ending for name in names for ending in (".png", ".csv", ".json")])
+    new_figure(1.0, 1.0)  # raises if there can be no picture
     args.output.mkdir(parents=True, exist_ok=True)
 
+    written = show.Written()
     done: list[tuple[WorkPrecision, list[str]]] = []
     for one in chosen:
         with nullcontext(None) if args.json else show.progress(one.title) as told:
-            chart = work_precision(one, methods, progress=told)
+            chart = work_precision(one, methods, fused="both" if args.fused else False, progress=told)
         if args.panel:
             done.append((chart, []))
             continue
-        files = [args.output / f"{one.name}{ending}" for ending in (".png", ".csv")]
-        chart.plot(files[0], error=args.error)
-        chart.to_csv(files[1])
-        done.append((chart, [str(file) for file in files]))
+        before = len(written.files)
+        written.write(args.output / f"{one.name}.png", partial(chart.plot, error=args.error))
+        written.write(args.output / f"{one.name}.csv", chart.to_csv)
+        done.append((chart, written.files[before:]))
     if args.panel:
         whole = Panel(tuple(chart for chart, _ in done))
-        files = [args.output / f"panel{ending}" for ending in (".png", ".csv", ".json")]
-        whole.plot(files[0], error=args.error)
-        whole.to_csv(files[1])
-        whole.to_json(files[2])
-        done = [(chart, [str(file) for file in files]) for chart, _ in done]
+        written.write(args.output / "panel.png", partial(whole.plot, error=args.error))
+        written.write(args.output / "panel.csv", whole.to_csv)
+        written.write(args.output / "panel.json", whole.to_json)
+        done = [(chart, written.files) for chart, _ in done]
     if args.json:
         show.print_json(
             [
@@ -60,9 +67,10 @@ def command(args: argparse.Namespace) -> None:
                 for c, files in done
             ]
         )
-        return
-    for chart, files in done:
-        _summary(chart, files)
+    else:
+        for chart, files in done:
+            _summary(chart, files)
+    written.close()
 
 
 def _summary(chart: WorkPrecision, files: list[str]) -> None:
@@ -90,7 +98,7 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
         rows,
         _best(chart)
         + [f"{title_of(name)} is refused: {reason}" for name, reason in chart.refused.items()]
-        + [f"written: {', '.join(files)}"],
+        + ([f"written: {', '.join(files)}"] if files else []),
     )
 
 

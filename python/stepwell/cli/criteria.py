@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .. import _checks
 from ..errors import ArgumentError
 from ..methods import method
 from ..stability import Criteria, criteria
@@ -33,22 +34,24 @@ def command(args: argparse.Namespace) -> None:
         raise ArgumentError(f"--phi: expected numbers in rad, such as 0.1,0.5, got {args.phi!r}") from None
     if args.json and args.markdown:
         raise ArgumentError("--markdown: expected either this or --json, got both")
-    if args.output is not None and args.output.suffix not in (".json", ".md"):
-        raise ArgumentError(f"-o: expected a file ending in .json or .md, got {str(args.output)!r}")
+    if args.output is not None:
+        _checks.file("-o", args.output, (".json", ".md"))
     if not (args.json or args.markdown):
         show.need_rich()
 
     found = criteria(methods, phi=phi)
+    written = show.Written()
     if args.output is not None and args.output.suffix == ".json":
-        found.to_json(args.output)
+        written.write(args.output, found.to_json)
     elif args.output is not None:
-        args.output.write_text(found.markdown(), encoding="utf-8")
+        written.write(args.output, lambda path: path.write_text(found.markdown(), encoding="utf-8"))
     if args.json:
         show.print_json(found.rows())
     elif args.markdown:
         print(found.markdown(), end="")
     else:
-        _tables(found, [f"written: {args.output}"] if args.output is not None else [])
+        _tables(found, written.notes())
+    written.close()
 
 
 def _tables(found: Criteria, notes: list[str]) -> None:

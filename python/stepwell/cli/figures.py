@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from .. import _checks
 from ..charts import figures
+from ..charts.style import new_figure
 from ..methods import method
 from ..stability.criterion import signed
 from . import show
@@ -23,13 +25,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(args: argparse.Namespace) -> None:
     """Run, draw, write, list."""
     methods = [method(name) for name in args.methods] or None
+    _checks.folder("-o", args.output)
+    new_figure(1.0, 1.0)  # raises if there can be no picture
     if not args.json:
         show.need_rich()
 
     chart = figures(methods, phi=args.phi, periods=args.periods)
-    files = [str(path) for path in chart.save(args.output)]
+    written = show.Written()
+    files = [str(path) for path in written.write(args.output, chart.save) or ()]
     if args.json:
         show.print_json({"phi": chart.phi, "files": files, "summary": chart.summary()})
+        written.close()
         return
     show.table(
         f"The undamped oscillator with Φ = {chart.phi:g}",
@@ -43,7 +49,8 @@ def command(args: argparse.Namespace) -> None:
                 f"{s['largest_y']:.4g}",
                 file,
             )
-            for s, file in zip(chart.summary(), files[1:], strict=True)
+            for s, file in zip(chart.summary(), files[1:] or ["–"] * len(chart.samples), strict=True)
         ],
-        [f"all in one: {files[0]}"],
+        [f"all in one: {file}" for file in files[:1]],
     )
+    written.close()

@@ -1,4 +1,4 @@
-"""Run a scene by a method, say where it ended and how wrong it was, and write numbers, a picture or a film."""
+"""Run a scene by a method, say where it ended and how wrong it was, and write numbers, a picture or an animation."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from .. import _checks
 from ..charts import RunPicture, run_picture
-from ..charts.runs_film import ENDINGS as FILMS
-from ..charts.runs_film import need as need_for_film
+from ..charts.runs_animation import ENDINGS as ANIMATIONS
+from ..charts.runs_animation import need as need_for_animation
 from ..charts.style import new_figure
 from ..control import WAYS, EnergyControl, Projection
-from ..errors import ArgumentError, ControlWarning, DivergenceWarning
+from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning
 from ..scenes import scene
 from . import show
 
@@ -38,15 +39,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="what keeps the energy of bodies: a gain and a form, such as 0.3 or 0.3:printed; a projection, scaling or nacozy; "
         "off for none (default: the scene's)",
     )
+    parser.add_argument("--fused", action="store_true", help="compute with fused multiply-adds")
     parser.add_argument(
         "-o",
         "--output",
         type=Path,
         metavar="FILE",
-        help="write the kept states (.csv, .npz), a picture (.png, .svg, .pdf) or a film (.gif, .mp4, .html)",
+        help="write the saved states (.csv, .npz), a picture (.png, .svg, .pdf) or an animation (.gif, .mp4, .html)",
     )
-    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="how long a film lasts (default: 10)")
-    parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames a second of a film (default: 20)")
+    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="how long an animation lasts (default: 10)")
+    parser.add_argument("--fps", type=float, default=20.0, metavar="N", help="frames a second of an animation (default: 20)")
     show.json_option(parser)
 
 
@@ -57,47 +59,47 @@ def command(args: argparse.Namespace) -> None:
     _ready(args.output, args.seconds, args.fps)
     dt = chosen.dt if args.dt is None else args.dt
     steps = chosen.steps_for(dt) if args.steps is None else args.steps
-    kept = KEPT_TO_DRAW if ending in (*PICTURES, *FILMS) else KEPT
+    kept = KEPT_TO_DRAW if ending in (*PICTURES, *ANIMATIONS) else KEPT
     every = max(1, steps // kept) if args.every is None else args.every
-    control = {} if args.control is None else {"control": _control(args.control)}
+    given: dict[str, Any] = {} if args.control is None else {"control": _control(args.control)}
+    if args.fused:
+        given["fused"] = True
     with warnings.catch_warnings(record=True) as told:
-        for kind in (DivergenceWarning, ControlWarning):
+        for kind in (AccuracyWarning, ControlWarning, DivergenceWarning):
             warnings.simplefilter("always", kind)
-        run = chosen.run(args.method, dt, steps=steps, every=every, record=list(chosen.system.quantities)[:1], **control)
+        run = chosen.run(args.method, dt, steps=steps, every=every, record=list(chosen.system.quantities)[:1], **given)
     for warning in told:
         print(f"stepwell: warning: {warning.message}", file=sys.stderr)
 
     picture = run_picture(chosen, run)
     columns: dict[str, Any] = picture.columns()
+    written = show.Written()
     if ending == ".npz":
-        np.savez(args.output, **columns)
+        written.write(args.output, lambda path: np.savez(path, **columns))
     elif ending == ".csv":
-        picture.to_csv(args.output)
+        written.write(args.output, picture.to_csv)
     elif ending in PICTURES:
-        picture.plot(args.output)
-    elif ending in FILMS:
-        picture.animate(args.output, seconds=args.seconds, fps=args.fps)
-    report = _report(picture, columns)
-    if args.output is not None:
-        report["written"] = str(args.output)
+        written.write(args.output, picture.plot)
+    elif ending in ANIMATIONS:
+        written.write(args.output, lambda path: picture.animate(path, seconds=args.seconds, fps=args.fps))
+    report = _report(picture, columns) | ({"written": written.files[0]} if written.files else {})
     if args.json:
         show.print_json(report)
-        return
-    for name, value in report.items():
-        print(f"{name.replace('_', ' '):21} {value}")
+    else:
+        for name, value in report.items():
+            print(f"{name.replace('_', ' '):21} {value}")
+    written.close()
 
 
 def _ready(path: Path | None, seconds: float, fps: float) -> None:
-    """Raise if the file cannot be written for want of a format or a program, before any work is done."""
-    if path is None or path.suffix in NUMBERS:
+    """Raise if the file cannot be written, for want of a format, a program or a place, before any work is done."""
+    if path is None:
         return
+    _checks.file("-o", path, (*NUMBERS, *PICTURES, *ANIMATIONS))
     if path.suffix in PICTURES:
         new_figure(1.0, 1.0)
-    elif path.suffix in FILMS:
-        need_for_film(path, seconds, fps)
-    else:
-        known = ", ".join((*NUMBERS, *PICTURES, *FILMS))
-        raise ArgumentError(f"-o: expected a file ending in one of {known}, got {str(path)!r}")
+    elif path.suffix in ANIMATIONS:
+        need_for_animation(path, seconds, fps)
 
 
 def _control(given: str) -> EnergyControl | Projection | None:

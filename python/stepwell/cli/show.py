@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any
 
 from ..charts.data import finite
@@ -52,6 +53,33 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], not
     console.print(printed)
     for note in notes:
         console.print(note, style="dim", markup=False)
+
+
+class Written:
+    """Files that a command writes. What cannot be written is said when all else has been, so that no result is lost with it."""
+
+    def __init__(self) -> None:
+        self.files: list[str] = []
+        self.error: Exception | None = None
+
+    def write(self, path: Path, how: Callable[[Path], Any]) -> Any:
+        """Write a file and return what ``how`` returns, or keep the error for ``close``."""
+        try:
+            what = how(path)
+        except Exception as error:  # whatever it is, it is raised in the end
+            self.error = self.error or error
+            return None
+        self.files.append(str(path))
+        return what
+
+    def notes(self) -> list[str]:
+        """What a table says below."""
+        return [f"written: {', '.join(self.files)}"] if self.files else []
+
+    def close(self) -> None:
+        """Raise what was kept."""
+        if self.error is not None:
+            raise self.error
 
 
 def progress(title: str) -> AbstractContextManager[Callable[[float], object]]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from .. import _checks
-from ..charts import Stability, powers, stability, stability_map, style
-from ..charts.zplane import KINDS, ladder
+from ..charts import Stability, powers, stability, stability_map
+from ..charts.style import new_figure
+from ..charts.zplane import KINDS, ladder, within
 from ..errors import ArgumentError, UnsupportedError
 from ..methods import method
 from . import show
@@ -34,16 +36,19 @@ def command(args: argparse.Namespace) -> None:
     kinds = [_checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]
     if args.charts is not None and args.output is None:
         raise ArgumentError("-o: expected a folder for what --charts asks for")
-    top = None if args.phi is None else _checks.number("--phi", args.phi, positive=True, unit="rad")
+    top = None if args.phi is None else within("--phi", _checks.number("--phi", args.phi, positive=True, unit="rad"))
     if not args.json:
         show.need_rich()
     if args.output is not None:
-        style.new_figure(1.0, 1.0)  # raises if there can be no picture
+        _checks.folder("-o", args.output, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
+        new_figure(1.0, 1.0)  # raises if there can be no picture
 
     chart = stability(methods, phi=None if top is None else ladder(top))
-    files, refused = ([], {}) if args.output is None else _write(chart, args.output, kinds, top)
+    written = show.Written()
+    refused = {} if args.output is None else _write(chart, args.output, kinds, top, written)
     if args.json:
-        show.print_json({"files": files, "summary": chart.summary(), "refused": refused})
+        show.print_json({"files": written.files, "summary": chart.summary(), "refused": refused})
+        written.close()
         return
     rows = [
         (
@@ -60,21 +65,18 @@ def command(args: argparse.Namespace) -> None:
         "Stability of the undamped oscillator, Φ = ω₀·dt",
         ("method", "stable for Φ <>", "steps a period >>", "past that", "r₁² − 1", "Ψ/Φ − 1"),
         rows,
-        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()]
-        + ([f"written: {', '.join(files)}"] if files else []),
+        [f"no map of {method(name).title}: {reason}" for name, reason in refused.items()] + written.notes(),
     )
+    written.close()
 
 
-def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None) -> tuple[list[str], dict[str, str]]:
-    """Write what was asked for; returns the files, and which methods have no map and why."""
+def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, written: show.Written) -> dict[str, str]:
+    """Write what was asked for; returns which methods have no map and why."""
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
     for kind in kinds:
         if kind in KINDS:
-            files.append(folder / f"stability-{kind}.png")
-            chart.plot(files[-1], kind=kind)
-    files.append(folder / "stability.csv")
-    chart.to_csv(files[-1])
+            written.write(folder / f"stability-{kind}.png", partial(chart.plot, kind=kind))
+    written.write(folder / "stability.csv", chart.to_csv)
     refused = {}
     for locus in chart.loci if "map" in kinds else ():
         try:
@@ -82,9 +84,7 @@ def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None) 
         except UnsupportedError as error:
             refused[locus.method.name] = str(error)
             continue
-        files.append(folder / f"stability-map-{locus.method.name}.png")
-        drawn.plot(files[-1])
+        written.write(folder / f"stability-map-{locus.method.name}.png", drawn.plot)
     for locus in chart.loci if "powers" in kinds else ():
-        files.append(folder / f"powers-{locus.method.name}.png")
-        powers(locus.method).plot(files[-1])
-    return [str(file) for file in files], refused
+        written.write(folder / f"powers-{locus.method.name}.png", powers(locus.method).plot)
+    return refused

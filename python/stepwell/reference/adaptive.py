@@ -1,9 +1,9 @@
-"""Steps of chosen length: each member takes its own, so long that the estimate of its error stays within a tolerance.
+"""Adaptive steps: each member takes its own, so long that the estimate of its error stays within a tolerance.
 
 The increments of a step h are h times those of a step of 1, so a system is scaled once and stretched to every step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -14,13 +14,25 @@ from .tableau import Increments, Weights
 from .types import Array, Blocks, Scaled, Whole
 
 #: A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
-#: (PI control, Gustafsson 1988), held between LEAST and MOST; after a rejected step there is no p and no growth. Where the error
-#: is estimated in a higher order than LOW, it is SAFETY·r^(−3/32)·p^(1/32). The powers are dyadic so that square roots make them,
-#: which are the same to the last bit everywhere.
-SAFETY, LEAST, MOST = 0.9, 0.2, 5.0
+#: (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth. Where
+#: the error is estimated in a higher order than LOW, it is SAFETY·r^(−3/32)·p^(1/32). The powers are dyadic so that square roots
+#: make them, which are the same to the last bit everywhere.
+SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 5.0
 LOW = 5
 #: r below TINY counts as TINY; p's root, the sixteenth or the thirty-second, is that of 1e-4 or more.
 TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
+#: What a step moves y by, relative to the longest that y has been, is lost in rounding below this, with some room. So an error of
+#: v that moves y by less is none, however small v is: near a rest v is what rounding leaves of forces that cancel.
+ROUNDING = 1.0 / (1 << 40)
+#: A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
+#: have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
+#: that follows.
+PUSHED = 1.0 / 64.0
+
+#: The first step is this share of the time in which the start changes: so short that it is never too long, for what is too short
+#: grows by MAX_FACTOR a step. Where nothing tells such a time it is BLIND, in units of time; and it moves the time by 2¹²
+#: roundings.
+FIRST, BLIND, MOVES = 0.01, 1e-6, 1.0 / (1 << 40)
 
 OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
 
@@ -35,40 +47,69 @@ class Pair(Protocol):
         """The increments of all stages; time and step are each member's own."""
 
 
+class Outlook(NamedTuple):
+    """The length of the step that comes next, whether it is an extra one, and whether there is a step of the run to try."""
+
+    step: Any
+    is_extra: Any
+    runs: Any
+
+
 class Pace(NamedTuple):
     """Where each member stands, and how it goes on. All are numbers: those that count, too.
+
+    Steps do not depend on the saved times: a step that passes the next of them is held, not taken, until the states within it are
+    saved. Each is made by an extra step, from the start of the held one.
 
     Attributes:
         t: its time.
         h: the step that it will try next.
-        target: the time to reach, exactly.
+        target: the time that is asked for next.
+        extra: above zero, the length of the extra step that comes next, to a saved time.
+        held: 1 if the step is known to be good that comes next and passes the target.
         relative: tolerated error of a step, relative to the length of a block.
         absolute: tolerated error beside the relative one.
+        lasts: 1 if the length that counts is the longest that a block has been so far, 0 if it is that of now.
+        longest_v: the square of the longest that v has been so far.
+        longest_y: likewise of y.
+        begin: the time of the start.
+        interval: no step is longer while inputs change from sample to sample, so that none is passed over,
+        until: which is until then.
         before: the sixteenth root of the last accepted error over the tolerance, or its thirty-second.
         most: how much the next step may grow.
         accepted: accepted attempts.
         rejected: rejected attempts.
+        extra_steps: steps for saved states: the extra ones, and those that were held and are made once more.
         error: the square of the last error over the tolerance.
     """
 
     t: Any
     h: Any
     target: Any
+    extra: Any
+    held: Any
     relative: Any
     absolute: Any
+    lasts: Any
+    longest_v: Any
+    longest_y: Any
+    begin: Any
+    interval: Any
+    until: Any
     before: Any
     most: Any
     accepted: Any
     rejected: Any
+    extra_steps: Any
     error: Any
 
-    def outlook(self, budget: Any) -> tuple[Any, Any, Any]:
-        """The step to try, whether it ends at the target, and whether there is anything to try."""
-        rest = self.target - self.t
-        last = at_most(rest, self.h)
-        step = where(last, rest, self.h)
-        moves = less(self.t, self.t + step)
-        return step, last, less(self.t, self.target) & moves & less(self.accepted + self.rejected, budget)
+    def outlook(self, budget: Any) -> Outlook:
+        """What comes next."""
+        is_extra = less(0.0, self.extra)
+        moves = less(self.t, self.t + self.h)
+        left = less(self.accepted + self.rejected, budget)
+        runs = less(self.t, self.target) & moves & left & at_most(self.held, 0.0) & ~is_extra
+        return Outlook(where(is_extra, self.extra, self.h), is_extra, runs)
 
 
 class Stretched:
@@ -87,74 +128,114 @@ class Stretched:
 
 
 class Outcome(NamedTuple):
-    """Kept states, and for each member where it stands: time, next step, accepted and rejected steps, status."""
+    """Kept states, and for each member where it stands in the end: state, pace and status."""
 
     v: Array
     y: Array
-    t: Array
-    h: Array
-    accepted: Whole
-    rejected: Whole
+    last_v: Array
+    last_y: Array
+    pace: Pace
     status: Whole
 
 
-def run(
-    pair: Pair,
-    s: Scaled,
+def start(
+    t0: float,
+    first: Array,
+    tolerance: tuple[Array, Array, float],
+    samples: tuple[float, float],
     v: Array,
     y: Array,
     block_axes: tuple[int, int],
-    *,
-    t0: float,
-    at: Sequence[float],
-    first: Array,
-    relative: Array,
-    absolute: Array,
-    budget: int,
-    order: int,
-) -> Outcome:
-    """Go from t0 to each time of ``at``, ascending, exactly. Members that stop before have NaN from there on.
+) -> Pace:
+    """Where members stand at the start, with a step to try first.
 
-    ``order`` is the one in which the error is estimated.
+    ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
     t, one, zero = (np.full(first.shape, number) for number in (t0, 1.0, 0.0))
-    pace = Pace(t, first, t, relative, absolute, one, MOST * one, zero, zero, zero)
-    kept_v, kept_y = [], []
+    relative, absolute, lasts = tolerance
+    interval, until = samples
+    first = np.minimum(first, interval) if t0 < until else first
+    with np.errstate(all="ignore"):
+        longest_v, longest_y = (length2(block, axes) for block, axes in zip((v, y), block_axes, strict=True))
+    counts = relative, absolute, lasts * one, longest_v, longest_y, t, interval * one, until * one, one, MAX_FACTOR * one
+    return Pace(t, first, t, zero, zero, *counts, zero, zero, zero, zero)
+
+
+def first_step(s: Scaled, t0: float, v: Array, y: Array, block_axes: tuple[int, int]) -> Array:
+    """The step to try first, for each member: a share of the shortest time in which a block changes by its length.
+
+    That is |v|/|v̇|, |y|/|ẏ| and, from rest, √(|y|/|v̇|): times that do not depend on the units of v and y.
+    """
+    with np.errstate(all="ignore"):
+        rates: Any = s.dv(t0, v, y), s.dy(t0, v, y)
+        (lv, ly), (rv, ry) = (
+            [np.sqrt(length2(block, axes)) for block, axes in zip(blocks, block_axes, strict=True)] for blocks in ((v, y), rates)
+        )
+        least = np.full(lv.shape, np.inf)
+        for time in (lv / rv, ly / ry, np.sqrt(ly / rv)):
+            least = np.where((time > 0.0) & (time < least), time, least)
+        return np.maximum(np.where(least < np.inf, FIRST * least, BLIND), MOVES * abs(t0))
+
+
+def run(
+    attempt: Callable[[Pace, int, Array, Array], tuple[Pace, Array, Array]],
+    v: Array,
+    y: Array,
+    pace: Pace,
+    *,
+    at: Sequence[float],
+    budget: int,
+) -> Outcome:
+    """Go on from where members stand and save the states at each time of ``at``, ascending. Members that stop before have NaN.
+
+    ``attempt(pace, budget, v, y)`` is one attempt of all members.
+    """
+    one = np.ones(pace.t.shape)
+    saved_v, saved_y = [], []
     with np.errstate(all="ignore"):
         for target in at:
-            pace = pace._replace(target=target * one)
-            while pace.outlook(budget)[2].any():
-                pace, v, y = attempt(pair, s, order, block_axes, pace, budget, v, y)
-            there = pace.t >= target
-            kept_v.append(np.where(there, v, np.nan))
-            kept_y.append(np.where(there, y, np.nan))
-    accepted, rejected = pace.accepted, pace.rejected
-    spent = accepted + rejected >= budget
+            within = (pace.held > 0.0) & (target < pace.t + pace.h)
+            pace = pace._replace(target=target * one, held=where(within, 1.0, 0.0))
+            while pace.outlook(budget).runs.any():
+                pace, v, y = attempt(pace, budget, v, y)
+            held = pace.held > 0.0
+            to_target = pace._replace(extra=where(held, target - pace.t, 0.0))
+            to_target, v1, y1 = attempt(to_target, budget, v, y) if held.any() else (pace, v, y)
+            pace = pace._replace(extra_steps=to_target.extra_steps)
+            there = held | (pace.t >= target)
+            saved_v.append(np.where(there, v1, np.nan))
+            saved_y.append(np.where(there, y1, np.nan))
+    spent = pace.accepted + pace.rejected >= budget
     status = np.where(there, OK, np.where(spent, BUDGET, np.where(pace.error < np.inf, UNDERFLOW, NOT_FINITE)))
-    counts = (each.astype(np.int64) for each in (accepted, rejected, status))
-    return Outcome(np.stack(kept_v), np.stack(kept_y), pace.t, pace.h, *counts)
+    return Outcome(np.stack(saved_v), np.stack(saved_y), v, y, pace, status.astype(np.int64))
 
 
 def attempt(
     pair: Pair, s: Scaled, order: int, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
 ) -> tuple[Pace, Array, Array]:
-    """One attempt at a step: the state goes on if its error is tolerated, and if there is anything to try."""
-    step, last, runs = pace.outlook(budget)
+    """One attempt at a step: the state goes on if its error is tolerated, and if there is anything to try.
+
+    An extra step leaves the pace as it is. ``order`` is the one in which the error is estimated.
+    """
+    outlook = pace.outlook(budget)
+    step = outlook.step
     increments = pair.stages(Stretched(s, step), pace.t, step, v, y)
     v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
-    tolerated = [
-        allowed(old, new, axes, pace.relative, pace.absolute) for old, new, axes in zip((v, y), (v1, y1), block_axes, strict=True)
-    ]
-    r2 = over(tableau.combined(pair.ERROR, increments), tolerated, block_axes)
+    old, new = ([length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)] for blocks in ((v, y), (v1, y1)))
+    weights = tolerated(pace, step, old, new)
+    r2 = over(tableau.combined(pair.ERROR, increments), weights, block_axes)
     if coarse := getattr(pair, "COARSE", None):
-        corrected = (r2 * r2) / (r2 + 0.01 * over(tableau.combined(coarse, increments), tolerated, block_axes))
+        corrected = (r2 * r2) / (r2 + 0.01 * over(tableau.combined(coarse, increments), weights, block_axes))
         r2 = where(less(0.0, r2), corrected, r2)
-    pace, took = decided(pace, order > LOW, r2, step, last, runs)
-    return pace, where(took, v1, v), where(took, y1, y)
+    pace, goes_on = decided(pace, order > LOW, r2, new, outlook)
+    return pace, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
-def decided(pace: Pace, high: bool, r2: Any, step: Any, last: Any, runs: Any) -> tuple[Pace, Any]:
-    """What comes after an attempt with this error, and whether the state goes on."""
+def decided(pace: Pace, high: bool, r2: Any, new: Sequence[Any], outlook: Outlook) -> tuple[Pace, Any]:
+    """What comes after an attempt with this error, and whether the state goes on; ``new`` are squares of the new lengths."""
+    step, is_extra, runs = outlook
+    # Lengths whose squares overflow tolerate anything, so they count as not finite.
+    r2 = where(less(new[0] + new[1], np.inf), r2, np.inf)
     good = at_most(r2, 1.0)  # NaN is not
     floored = where(less(TINY * TINY, r2), r2, TINY * TINY)
     r16 = np.sqrt(np.sqrt(np.sqrt(np.sqrt(floored))))  # the eighth root of r
@@ -162,39 +243,66 @@ def decided(pace: Pace, high: bool, r2: Any, step: Any, last: Any, runs: Any) ->
     r64 = np.sqrt(r32)
     factor = SAFETY / ((r32 if high else r16) * r64)
     factor = where(good, factor * pace.before, factor)
-    factor = where(less(LEAST, factor), factor, LEAST)
+    factor = where(less(MIN_FACTOR, factor), factor, MIN_FACTOR)
     ceiling = where(good, pace.most, 1.0)
     factor = where(less(factor, ceiling), factor, ceiling)
-    factor = where(less(r2, np.inf), factor, LEAST)
-    grown = step * factor
-    # A step that was cut to end at the target says little: what was meant before it stands.
-    grown = where(good & last & less(grown, pace.h), pace.h, grown)
-    took = runs & good
+    factor = where(less(r2, np.inf), factor, MIN_FACTOR)
+    reached = pace.t + step
+    passes = less(pace.target, reached)
+    takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good
+    decides = takes | fails
     root, calm = (r64, CALM_ROOTS[1]) if high else (r32, CALM_ROOTS[0])
     root = where(less(calm, root), root, calm)
+    t = where(takes, reached, pace.t)
+    grown = step * factor
+    grown = where(less(t, pace.until) & less(pace.interval, grown), pace.interval, grown)
     following = pace._replace(
-        t=where(took, where(last, pace.target, pace.t + step), pace.t),
-        h=where(runs, grown, pace.h),
-        before=where(took, root, pace.before),
-        most=where(runs, where(good, MOST, 1.0), pace.most),
-        accepted=pace.accepted + where(took, 1.0, 0.0),
-        rejected=pace.rejected + where(runs & ~good, 1.0, 0.0),
-        error=where(runs, r2, pace.error),
+        t=t,
+        h=where(decides, grown, pace.h),
+        extra=where(is_extra, 0.0, pace.extra),
+        held=where(holds, 1.0, pace.held),
+        longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
+        longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
+        before=where(takes, root, pace.before),
+        most=where(decides, where(good, MAX_FACTOR, 1.0), pace.most),
+        accepted=pace.accepted + where(takes, 1.0, 0.0),
+        rejected=pace.rejected + where(fails, 1.0, 0.0),
+        extra_steps=pace.extra_steps + where(holds | is_extra, 1.0, 0.0),
+        error=where(decides, r2, pace.error),
     )
-    return following, took
+    return following, takes | is_extra
 
 
-def allowed(old: Array, new: Array, axes: int, relative: Array, absolute: Array) -> Array:
-    """The square of the length of an error that is tolerated in a block: relative to the longer of the old and the new one."""
-    a, b = length2(old, axes), length2(new, axes)
-    length = absolute + relative * np.sqrt(where(less(b, a), a, b))
-    return np.asarray(length * length)
+def tolerated(pace: Pace, step: Any, old: Sequence[Any], new: Sequence[Any]) -> list[Any]:
+    """Squares of the errors that are tolerated in both blocks, from squares of their lengths before and after a step."""
+    # What has been at zero so far and is pushed now is as long as the push would have made it in a part of the time since.
+    since = PUSHED * ((pace.t + step - pace.begin) / step)
+    since2 = longer(1.0, since * since)
+    rested = at_most(pace.longest_v + pace.longest_y, 0.0)
+    lost = ROUNDING / step
+    lasting_v, lasting_y = (
+        where(rested, square * since2, longest) for longest, square in zip((pace.longest_v, pace.longest_y), new, strict=True)
+    )
+    lasting_v = longer(lasting_v, pace.longest_y * (lost * lost))
+    found = []
+    for lasting, before, after in zip((lasting_v, lasting_y), old, new, strict=True):
+        counts = where(less(0.0, pace.lasts), lasting, before)
+        length = pace.absolute + pace.relative * np.sqrt(longer(counts, after))
+        found.append(length * length)
+    return found
 
 
-def over(error: Blocks, tolerated: Sequence[Array], block_axes: tuple[int, int]) -> Array:
+def longer(a: Any, b: Any) -> Any:
+    """The larger of two lengths."""
+    return where(less(a, b), b, a)
+
+
+def over(error: Blocks, weights: Sequence[Any], block_axes: tuple[int, int]) -> Any:
     """The square of an error over what is tolerated, of both blocks together."""
-    (ev, ey), (nv, ny) = error, block_axes
-    return np.asarray(length2(ev, nv) / tolerated[0] + length2(ey, ny) / tolerated[1])
+    squares = (length2(block, axes) for block, axes in zip(error, block_axes, strict=True))
+    # A block that is zero, as it has always been, tolerates no error and has none.
+    of_v, of_y = (where(at_most(square, 0.0), 0.0, square / weight) for square, weight in zip(squares, weights, strict=True))
+    return of_v + of_y
 
 
 def length2(block: Array, axes: int) -> Array:

@@ -11,7 +11,7 @@ from . import bits
 from .types import Array, Blocks, Scaled
 
 #: The square of what velocities are multiplied by is held between these, the factor between ½ and 2.
-LEAST, MOST = 0.25, 4.0
+MIN_SQUARE, MAX_SQUARE = 0.25, 4.0
 
 
 class Conserving(Scaled, Protocol):
@@ -48,7 +48,7 @@ class Kept:
         """The v whose increment of y is d."""
         return self.s.velocity(d)
 
-    def settle(self, v: Array, y: Array) -> Blocks:
+    def project(self, v: Array, y: Array) -> Blocks:
         """The state after a step, set right."""
         return v, y
 
@@ -79,7 +79,7 @@ class Controlled(Kept):
             return np.asarray(self.gain * off)
         twice = 2.0 * self.gain
         square = 1.0 - (twice * off) / (1.0 + twice * kinetic)
-        return np.asarray(1.0 - np.sqrt(bits.held(square, LEAST, MOST)))
+        return np.asarray(1.0 - np.sqrt(bits.held(square, MIN_SQUARE, MAX_SQUARE)))
 
 
 class Projected(Kept):
@@ -89,12 +89,12 @@ class Projected(Kept):
         super().__init__(s, h, target)
         self.way = way
 
-    def settle(self, v: Array, y: Array) -> Blocks:
+    def project(self, v: Array, y: Array) -> Blocks:
         """The state after a step, set back onto its energy."""
         dv, kinetic, energy = self.s.energies(v, y)
         off = energy - self.target
         if self.way == "scaling":
-            factor = np.sqrt(bits.held(1.0 - off / kinetic, LEAST, MOST))
+            factor = np.sqrt(bits.held(1.0 - off / kinetic, MIN_SQUARE, MAX_SQUARE))
             self.work = self.work + (factor * factor - 1.0) * kinetic
             return v * factor, y
         along_v, along_y, square = self.s.gradient(v, y, dv)  # Nacozy

@@ -1,6 +1,6 @@
 """The loop around a step, and the transition-matrix form (Appendix B): the specification of the core's driver."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .product import times
 from .types import Array, Blocks, Signal, Whole
 
 Step = Callable[[float, Array, Array], Blocks]
-Saves = Iterable[int]
+Velocity = Callable[[float, Array, Array], Array]
 
 
 def run(
@@ -22,25 +22,31 @@ def run(
     t0: float,
     first: int,
     steps: int,
-    saves: Saves,
-) -> tuple[Array, Array, list[Blocks], Whole]:
-    """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves`` and who diverged when.
+    saves: Whole,
+    velocity: Velocity | None = None,
+) -> tuple[Array, Array, Blocks, Whole]:
+    """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves``, ascending, and who diverged when.
 
     ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is
-    t0 + k·h, never accumulated. A member has diverged at the first step whose state is not finite;
-    ``first_bad`` has those of earlier runs, −1 for none.
+    t0 + k·h, never accumulated. A member has diverged at the first step after which a number of its state is not finite, v or y;
+    where something else stands in the place of v, ``velocity(t, v, y)`` makes v of it. ``first_bad`` has the steps of earlier
+    runs, −1 for none.
     """
-    keep = set(saves)
-    kept = [(v, y)] if 0 in keep else []
+    kept = np.empty((len(saves), *v.shape)), np.empty((len(saves), *y.shape))
+    done = 0
+    if saves[0] == 0:
+        kept[0][0], kept[1][0], done = v, y, 1
     blocks = tuple(tuple(range(n)) for n in block_axes)
     with np.errstate(all="ignore"):
         for i in range(steps):
             k = first + i
             v, y = step(t0 + k * h, v, y)
             finite = np.isfinite(v).all(axis=blocks[0]) & np.isfinite(y).all(axis=blocks[1])
+            if velocity is not None:
+                finite &= np.isfinite(velocity(t0 + (k + 1) * h, v, y)).all(axis=blocks[0])
             first_bad = np.where((first_bad < 0) & ~finite, k + 1, first_bad)
-            if i + 1 in keep:
-                kept.append((v, y))
+            if done < len(saves) and saves[done] == i + 1:
+                kept[0][done], kept[1][done], done = v, y, done + 1
     return v, y, kept, first_bad
 
 

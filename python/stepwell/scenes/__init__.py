@@ -9,10 +9,15 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable
-from functools import cache
+from dataclasses import replace
+from functools import cache, wraps
+from typing import Any
 
 from .. import _checks
-from . import builtin
+from .._checks import Array
+from .._value import same
+from ..errors import DTypeError
+from . import builtin, table
 from .base import Scene
 
 __all__ = ["Scene", "scene", "scenes"]
@@ -27,17 +32,59 @@ def scene(name: str | Scene) -> Scene:
     """The scene of that name, as it is made without arguments.
 
     Raises:
+        DTypeError: if it is neither a scene nor a name.
         UnknownNameError: if there is none; the message names the nearest.
     """
     if isinstance(name, Scene):
         return name
+    if not isinstance(name, str):
+        raise DTypeError(f"scene: expected a Scene or its name, got {type(name).__name__}")
     return _makers()[_checks.known("scene", name, _makers())]()
 
 
 @cache
 def _makers() -> dict[str, Callable[..., Scene]]:
     names = sorted(module.name for module in pkgutil.iter_modules(builtin.__path__))
-    return {name: getattr(importlib.import_module(f"{builtin.__name__}.{name}"), name) for name in names}
+    return {name: _remembering(getattr(importlib.import_module(f"{builtin.__name__}.{name}"), name)) for name in names}
+
+
+def _remembering(make: Callable[..., Scene]) -> Callable[..., Scene]:
+    """The same function, whose scenes have an ``exact`` that can be pickled: it remembers with what the function was called."""
+
+    @wraps(make)
+    def made(*args: Any, **kwargs: Any) -> Scene:
+        scene = make(*args, **kwargs)
+        return scene if scene.exact is None else replace(scene, exact=Exact(make.__name__, args, kwargs, scene.exact))
+
+    return made
+
+
+class Exact:
+    """The exact solution of a scene here, by the scene's name and what it was made with."""
+
+    def __init__(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any], solution: table.Exact) -> None:
+        self.made, self.solution = (name, args, kwargs), solution
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at these times."""
+        return self.solution(t)
+
+    def __getattr__(self, name: str) -> Any:
+        """What else the solution has to say."""
+        return getattr(self.solution, name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _exact, self.made
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Exact) and same(self.made, other.made)
+
+    def __hash__(self) -> int:
+        return hash(self.made[0])
+
+
+def _exact(name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> table.Exact | None:
+    return _makers()[name](*args, **kwargs).exact
 
 
 def __getattr__(name: str) -> Callable[..., Scene]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from .._value import Value
 from ..control import EnergyControl, Projection
-from ..errors import ArgumentError
+from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
 from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
@@ -24,41 +25,84 @@ SCALE_SAMPLES = 1001
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Value):
     """A system with its start, a step and a time over which to judge a method.
 
+    Three things are enough beside the system, ``Scene(system, v=0.0, y=1.0, horizon=30.0)``; all else has something to go by.
+
     Attributes:
-        name: what you type.
-        title: what it is called in a picture.
-        section: section of the document, and what is stepwell's own.
-        description: what moves, and what it shows.
-        error: what an error of 1 means here.
-        system: what to step.
-        v: velocity block at t = 0, of the system's ``v_shape``.
-        y: coordinate block at t = 0, of the system's ``y_shape``.
-        dt: the usual step, in units of time; the document's where it gives one.
-        horizon: time over which errors are measured, in units of time.
+        system: what to step, of one member.
+        v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it.
+        y: coordinate block at t = 0, likewise of its ``y_shape``.
+        horizon: time over which errors are measured, in units of time, above zero; that of ``until`` if None.
+        dt: the usual step, in units of time; the document's where it gives one, a thousandth of the horizon if None.
         exact: the solution as a function of times of shape (n,): blocks v and y of shape (n, *block). A formula, or an orbit
-            computed to more digits than a float holds; None for a chaotic motion, which nothing follows for long.
+            computed to more digits than a float holds; None for a motion without one, which a tight run stands in for.
         until: the last time that ``exact`` is asked for, in units of time; errors after it are NaN, for they are not known.
         control: the control with which ``run`` steps, or None.
         period: time after which the exact solution is where it began, in units of time, or None.
+        name: what you type.
+        title: what it is called in a picture; the name if empty.
+        section: section of the document, and what is stepwell's own.
+        description: what moves, and what it shows.
+        error: what an error of 1 means here.
+
+    Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the scenes here
+    can, a lambda cannot.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
+        >>> sw.advise(scene, frame=None, tolerance=1e-3).best
     """
 
-    name: str
-    title: str
-    section: str
-    description: str
-    error: str
     system: System
     v: Array
     y: Array
-    dt: float
-    horizon: float
+    horizon: float = None  # type: ignore[assignment]  # never after __post_init__
+    dt: float = None  # type: ignore[assignment]
     exact: Callable[[Array], tuple[Array, Array]] | None = None
     until: float = math.inf
     control: EnergyControl | Projection | None = None
     period: float | None = None
+    name: str = "unnamed"
+    title: str = ""
+    section: str = ""
+    description: str = ""
+    error: str = "as far from the true velocities or coordinates as the largest true ones"
+
+    def __post_init__(self) -> None:
+        """Check what was given, and find what was not."""
+        if not isinstance(self.system, System):
+            raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(self.system).__name__}")
+        given = [_checks.numbers(name, block) for name, block in (("v", self.v), ("y", self.y))]
+        system = self.system.sized(*given)
+        if system.batch:
+            raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
+        found: dict[str, Any] = {"system": system}
+        for name, block, shape in zip("vy", given, (system.v_shape, system.y_shape), strict=True):
+            block = _checks.block(name, block, shape, system.axes)
+            if block.shape != shape:
+                raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
+            found[name] = block
+        until = math.inf if self.until is None else self.until
+        forever = isinstance(until, float) and until == math.inf
+        if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
+            raise ArgumentError(f"until: expected a time of zero or more in units of time, got {until:g}")
+        horizon = until if self.horizon is None else self.horizon
+        if self.horizon is None and until == math.inf:
+            raise ArgumentError("horizon: expected the time over which errors are measured, in units of time, got None")
+        found["horizon"] = horizon = _checks.number("horizon", horizon, positive=True, unit="units of time")
+        dt = 1e-3 * horizon if self.dt is None else self.dt
+        found |= {"dt": _checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
+        if self.exact is not None and not callable(self.exact):
+            raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
+        if self.control is not None and not isinstance(self.control, (EnergyControl, Projection)):
+            raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(self.control).__name__}")
+        for name, value in (found | {"title": self.title or self.name}).items():
+            object.__setattr__(self, name, value)
 
     def run(self, method: str | Method, dt: float | None = None, *, steps: int | None = None, **options: Any) -> Run:
         """Step the scene from its start.
@@ -80,6 +124,10 @@ class Scene:
         Warns:
             DivergenceWarning: if the state left the range of finite numbers.
         """
+        if given := [name for name in ("system", "v", "y") if name in options]:
+            raise ArgumentError(
+                f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
+            )
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
@@ -98,14 +146,15 @@ class Scene:
         return max(1, math.ceil(quotient - 1e-9))
 
     def state_error(self, run: Run) -> Array:
-        """How wrong each kept state is, shape (saved,); infinite where it is not finite, NaN where the true one is not known.
+        """How wrong each saved state is, shape (saved,); infinite where it is not finite, NaN where the true one is not known.
 
         The larger of the errors of the two blocks; that of a block is the length of its difference from the exact one,
         divided by the block's largest length in the exact solution. At 1 the error is as large as the solution.
 
         Raises:
-            ArgumentError: if the scene has no exact solution.
+            ArgumentError: if the scene has no exact solution, or the run is of another system.
         """
+        self._check(run)
         exact, known = self._solution(run.t)
         with np.errstate(all="ignore"):
             errors = [
@@ -116,27 +165,40 @@ class Scene:
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def energy_error(self, run: Run) -> Array:
-        """How wrong the energy of each kept state is, shape (saved,), relative to the largest kinetic energy.
+        """How wrong the energy of each saved state is, shape (saved,), relative to the largest kinetic energy.
 
         The kinetic energy is the scale because it has a zero of its own; that of a potential is a convention.
         Not finite and not known are as in ``state_error``.
 
         Raises:
-            ArgumentError: if the scene has no exact solution.
+            ArgumentError: if the scene has no exact solution, or the run is of another system.
         """
+        self._check(run)
         (true_v, true_y), known = self._solution(run.t)
         with np.errstate(all="ignore"):
             error = np.abs(run.energy - self._energy(true_v, true_y)) / self._kinetic_scale
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def amplitude(self, run: Run) -> Array:
-        """The larger of both blocks' lengths in each kept state, shape (saved,), in the exact solution's ``scales``."""
+        """The larger of both blocks' lengths in each saved state, shape (saved,), in the exact solution's ``scales``."""
+        self._check(run)
         with np.errstate(all="ignore"):
             lengths = [
                 _relative(_length(block, shape), scale)
                 for block, shape, scale in zip((run.v, run.y), self._shapes, self.scales, strict=True)
             ]
         return np.maximum(*lengths)
+
+    def owns(self, run: Run) -> bool:
+        """Whether a run is of this scene's system, controlled or not, and of one member; any start will do."""
+        return run.system.uncontrolled.sized(run.v[0], run.y[0]) == self.system.sized(self.v, self.y) and run.status.ndim == 0
+
+    def _check(self, run: Run) -> None:
+        """Raise if a run is of another system."""
+        if not isinstance(run, Run):
+            raise DTypeError(f"run: expected what scene.run returns, got {type(run).__name__}")
+        if not self.owns(run):
+            raise ArgumentError(f"run: expected a run of the scene {self.name}, one member of {self.system!r}, got {run!r}")
 
     @cached_property
     def scales(self) -> tuple[float, float]:
@@ -161,7 +223,20 @@ class Scene:
         """The exact blocks, and at which times they are known; at the others they are those of the last known time."""
         if self.exact is None:
             raise ArgumentError(f"scene: {self.name} has no exact solution, so there is no error to measure")
-        return self.exact(np.minimum(t, self.until)), t <= self.until
+        found = self.exact(np.minimum(t, self.until))
+        try:
+            v, y = (np.asarray(block, dtype=np.float64) for block in found)
+        except (TypeError, ValueError):
+            raise ArgumentError(
+                f"exact: expected the blocks v and y, arrays of real numbers, got {type(found).__name__}"
+            ) from None
+        for name, block, shape in zip("vy", (v, y), self._shapes, strict=True):
+            if block.shape != (len(t), *shape):
+                raise ShapeError(f"exact: expected {name} of shape {(len(t), *shape)} for {len(t)} times, got {block.shape}")
+            if not np.isfinite(block).all():
+                wrong = t[~np.isfinite(block).reshape(len(t), -1).all(axis=1)][0]
+                raise NotFiniteError(f"exact: expected finite numbers, got {name} = {block[t == wrong][0]} at t = {wrong:g}")
+        return (v, y), t <= self.until
 
     def _energy(self, v: Array, y: Array) -> Array:
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))

@@ -6,19 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .._checks import Array
+from .._checks import Array, Shape
+from .._value import Value
 
 Exact = Callable[[Array], tuple[Array, Array]]
 
-#: Intervals at first, and at most.
-FEWEST, MOST = 200, 20_000
+#: Intervals of the table at first, and at most.
+FIRST_INTERVALS, MAX_INTERVALS = 200, 20_000
 
-#: Where in an interval the table has the motion, at Chebyshev's places, and where it is looked at, once between each two.
+#: Chebyshev nodes of the interpolation in an interval, and the points between each two of them at which it is checked.
 NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 12))
-BETWEEN = 0.5 * (NODES[1:] + NODES[:-1])
+CHECK_POINTS = 0.5 * (NODES[1:] + NODES[:-1])
 
-#: The product of a node's distances to the others.
-APART = [float(np.prod(node - np.delete(NODES, j))) for j, node in enumerate(NODES)]
+#: Of each node the product of its distances to the others.
+NODE_PRODUCTS = [float(np.prod(node - np.delete(NODES, j))) for j, node in enumerate(NODES)]
 
 
 def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
@@ -26,18 +27,18 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
 
     Intervals are halved until that is so; where it would take too many, it is the same function.
     """
-    begins, length, number = np.linspace(0.0, until, FEWEST, endpoint=False), until / FEWEST, 0
+    begins, length, number = np.linspace(0.0, until, FIRST_INTERVALS, endpoint=False), until / FIRST_INTERVALS, 0
     good: list[tuple[Array, Array, Array, Array]] = []
     while len(begins):
         number += len(begins)
-        if number > MOST:
+        if number > MAX_INTERVALS:
             return exact
         # At the nodes and between them, to see how good it is.
-        asked = begins[:, np.newaxis] + length * np.concatenate([NODES, BETWEEN])
+        asked = begins[:, np.newaxis] + length * np.concatenate([NODES, CHECK_POINTS])
         blocks = [block.reshape(*asked.shape, *block.shape[1:]) for block in exact(np.minimum(asked, until).ravel())]
         close_enough = np.ones(len(begins), dtype=bool)
         for block, scale in zip(blocks, scales, strict=True):
-            found = np.tensordot(_shares(BETWEEN), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
+            found = np.tensordot(_shares(CHECK_POINTS), block[:, : len(NODES)], axes=(0, 1)).swapaxes(0, 1)
             missed = np.abs(found - block[:, len(NODES) :]).reshape(len(begins), -1).max(axis=1, initial=0.0)
             close_enough &= missed <= close * scale
         v, y = (block[close_enough, : len(NODES)] for block in blocks)
@@ -50,18 +51,33 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
     # For each node the numbers of a state as rows, for operations on long rows are the quick ones.
     tables = [np.ascontiguousarray(block[order].reshape(*block.shape[:2], -1).transpose(1, 2, 0)) for block in (v, y)]
 
-    def answer(t: Array) -> tuple[Array, Array]:
-        piece = np.clip(np.searchsorted(starts, t, "right") - 1, 0, len(starts) - 1)
-        shares = _shares((t - starts[piece]) / lengths[piece])
+    return Table(starts, lengths, tables, [block.shape[2:] for block in (v, y)])
+
+
+class Table(Value):
+    """A motion from a table: a polynomial over each interval.
+
+    Args:
+        starts: where the intervals begin, ascending.
+        lengths: how long they are.
+        tables: of v and of y, shape (nodes, numbers of the block, intervals).
+        shapes: of the blocks.
+    """
+
+    def __init__(self, starts: Array, lengths: Array, tables: list[Array], shapes: list[Shape]) -> None:
+        self.starts, self.lengths, self.tables, self.shapes = starts, lengths, tables, shapes
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at these times."""
+        piece = np.clip(np.searchsorted(self.starts, t, "right") - 1, 0, len(self.starts) - 1)
+        shares = _shares((t - self.starts[piece]) / self.lengths[piece])
         found = []
-        for table, block in zip(tables, (v, y), strict=True):
+        for table, shape in zip(self.tables, self.shapes, strict=True):
             value = np.zeros((table.shape[1], len(t)))
             for share, at_node in zip(shares, table, strict=True):
                 value += share * np.take(at_node, piece, axis=1)
-            found.append(np.ascontiguousarray(value.T).reshape(len(t), *block.shape[2:]))
+            found.append(np.ascontiguousarray(value.T).reshape(len(t), *shape))
         return found[0], found[1]
-
-    return answer
 
 
 def _shares(u: Array) -> Array:
@@ -69,7 +85,7 @@ def _shares(u: Array) -> Array:
     away = u - NODES[:, np.newaxis]
     shares, product = np.empty_like(away), np.ones(len(u))
     for j in range(len(NODES)):  # times the distances to the nodes before it
-        shares[j] = product / APART[j]
+        shares[j] = product / NODE_PRODUCTS[j]
         product *= away[j]
     product = np.ones(len(u))
     for j in reversed(range(len(NODES))):  # times those to the nodes after it

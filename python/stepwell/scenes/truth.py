@@ -3,32 +3,81 @@
 from __future__ import annotations
 
 import warnings
+from bisect import bisect_right
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from .._checks import Array
 from ..errors import ToleranceWarning
 from ..integrate import integrate
+from ..result import Run
 from .base import Scene
 
-#: The tolerance of the run that counts as true, and that of the one that checks it.
-TIGHT, CHECK = 1e-13, 1e-12
+#: The method of the reference solution, its tolerance, and the tolerance of the run that checks it.
+METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE = "dop853", 1e-14, 1e-13
 
-#: The two agree where their distance is below this, in the blocks' largest lengths: a thousandth of the least error that a chart
-#: of such a scene asks about.
-AGREES = 1e-8
+#: The two agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least error
+#: that a chart of such a scene asks about. But for rounding, the reference is ten times as accurate as the run that checks it.
+MAX_DIFFERENCE = 1e-8
 
-#: Times at which they are compared.
-SAMPLES = 200
+#: Times at which they are compared, and from how many of them the reference can be continued.
+SAMPLES, RESTARTS = 400, 20
+
+#: Steps of such a run at most, rejected ones counted. Beyond what they reach, the solution is unknown.
+MAX_STEPS = 2_000_000
 
 
-def with_truth(scene: Scene, agrees: float = AGREES) -> Scene:
+class Tight:
+    """The run of a scene to a tight tolerance, as a function of time; it is the same whatever it is asked for."""
+
+    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE) -> None:
+        self.scene, self.tolerance = replace(scene, control=None), tolerance
+        #: Arguments to go on from, by the time from which on.
+        self._on: list[tuple[float, dict[str, Any]]] = [(0.0, {"v": scene.v, "y": scene.y, "tolerance": tolerance})]
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at these times."""
+        asked, place = np.unique(np.asarray(t, dtype=np.float64), return_inverse=True)
+        since = bisect_right(self._on, float(asked[0]), key=lambda on: on[0]) - 1
+        run = self._run(asked, self._on[max(0, since)][1])
+        return run.v[place.reshape(-1)], run.y[place.reshape(-1)]
+
+    def followed(self, times: Array) -> tuple[Array, Array]:
+        """The states at these times, ascending; NaN from where it stopped. At some of them it can be taken up later."""
+        runs = []
+        for part in np.array_split(times, RESTARTS):
+            runs.append(run := self._run(part, self._on[-1][1]))
+            if run.status:
+                break
+            self._on.append((float(part[-1]), run.resume))
+        missing = len(times) - sum(len(run.t) for run in runs)
+        blocks = (np.concatenate([getattr(run, name) for run in runs]) for name in "vy")
+        v, y = (np.concatenate([block, np.full((missing, *block.shape[1:]), np.nan)]) for block in blocks)
+        return v, y
+
+    def _run(self, at: Array, on: dict[str, Any]) -> Run:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ToleranceWarning)
+            return integrate(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Tight, (self.scene, self.tolerance)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Tight) and (self.scene, self.tolerance) == (other.scene, other.tolerance)
+
+    def __hash__(self) -> int:
+        return hash((self.scene, self.tolerance))
+
+
+def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
     """The scene with an ``exact`` solution: its own, or else a tight run, known until a less tight one leaves it.
 
     Args:
         scene: any.
-        agrees: how near to each other the two runs are where the motion counts as known, in the blocks' largest lengths.
+        agrees: how near to each other the two runs are where the motion counts as known, in the blocks' largest lengths so far.
 
     Returns:
         A scene whose ``exact`` and ``until`` are set. A scene that has an exact solution is returned as it is. The true motion is
@@ -36,32 +85,13 @@ def with_truth(scene: Scene, agrees: float = AGREES) -> Scene:
     """
     if scene.exact is not None:
         return scene
-
-    def run(begin: float, v: Array, y: Array, times: Array, tolerance: float) -> tuple[Array, Array]:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ToleranceWarning)
-            found = integrate(scene.system, "fehlberg_5", v=v, y=y, t0=begin, tolerance=tolerance, at=times, max_steps=20_000_000)
-        return found.v, found.y
-
     times = np.linspace(0.0, scene.horizon, SAMPLES + 1)
-    true, other = (run(0.0, scene.v, scene.y, times, tolerance) for tolerance in (TIGHT, CHECK))
+    tight = Tight(scene)
     known = np.ones(len(times), dtype=bool)
-    for a, b in zip(true, other, strict=True):
+    for a, b in zip(tight.followed(times), Tight(scene, CHECK_TOLERANCE).followed(times), strict=True):
         axes = tuple(range(1, a.ndim))
         with np.errstate(all="ignore"):
             apart, length = (np.sqrt((x * x).sum(axis=axes)) for x in (a - b, a))
-            known &= apart <= agrees * np.nanmax(length)
+            known &= apart <= agrees * np.maximum.accumulate(length)
     first = len(times) if known.all() else int(np.argmin(known))
-
-    def exact(t: Array) -> tuple[Array, Array]:
-        """From the sample before each time, so that the state at a time does not depend on what else is asked for."""
-        asked, place = np.unique(np.asarray(t, dtype=np.float64), return_inverse=True)
-        after = np.clip(np.searchsorted(times, asked, "right") - 1, 0, SAMPLES - 1)
-        found = tuple(np.empty((len(asked), *block.shape[1:])) for block in true)
-        for i in np.unique(after).tolist():
-            here = after == i
-            for whole, part in zip(found, run(times[i], true[0][i], true[1][i], asked[here], TIGHT), strict=True):
-                whole[here] = part
-        return found[0][place.reshape(-1)], found[1][place.reshape(-1)]
-
-    return replace(scene, exact=exact, until=float(times[max(first - 1, 0)]))
+    return replace(scene, exact=tight, until=float(times[max(first - 1, 0)]))

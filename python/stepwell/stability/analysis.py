@@ -8,17 +8,22 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError
 from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..result import Run
 from ..systems import System
+from ..systems.base import a_system
 from . import eigen, maps
 from .eigen import Complex
+from .exact import MAX_ROWS
+from .parts import spectra
 
 #: What a sequence of samples does (§4), by the eigenvalue that decides. A single negative eigenvalue, which the document does not
-#: name, changes its sign at every step: an oscillation of two samples per period.
+#: name, changes its sign at every step: an oscillation of two samples per period. Where so many eigenvalues nearly
+#: meet that rounding hides whether they are outside the unit circle, it is not decided, and not called stable.
 KINDS = (
     "monotonic stable",
     "constant",
@@ -30,10 +35,11 @@ KINDS = (
     "unstable oscillation (double eigenvalue -1)",
     "unstable oscillation (double pair)",
     "not finite",
+    "not decided",
 )
 
 
-class Analysis:
+class Analysis(Value):
     """What one step does to a state. ``members`` is the shape to which dt, the parameters and the states broadcast.
 
     Attributes:
@@ -76,6 +82,10 @@ class Analysis:
         if n <= 2:
             z, exact = eigen.eigenvalues(P), eigen.eigenvalues(A)
             if n == 2:
+                if system.linear:
+                    with np.errstate(invalid="ignore"):
+                        close = np.maximum(np.abs(z[0] - z[1]), np.abs(np.abs(z[0]) - 1.0)) < eigen.NEARLY_DOUBLE
+                    self._in_more_digits(close & (z[0] != z[1]), A, z)
                 exact = eigen.matched_of_two(P, z, A, exact, finish)
             tolerances = np.broadcast_to(eigen.tolerance(P), z.shape)
             single_vector = (z[0] == z[-1]) & ((P[0, -1] != 0) | (P[-1, 0] != 0)) & (n == 2)
@@ -85,6 +95,12 @@ class Analysis:
             found = eigen.eigen(P, eigen.slot_units(finish, true.units))
             exact = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), true)
             z, tolerances, single_vector = eigen.settled(found)
+            if system.linear and n <= MAX_ROWS:
+                doubtful = (found.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
+                for index, values, own in self._in_more_digits(doubtful, A, z):
+                    at: Any = (slice(None), *index)
+                    exact[at], tolerances[at] = own, 16.0 * n * eigen.EPS * np.maximum(1.0, np.abs(values))
+                    single_vector[at] = eigen.one_vector(_checks.member(P, index), values)
         by_size = eigen.order(z, tolerances, single_vector)
         z, exact, tolerances, single_vector = (
             np.take_along_axis(a, by_size, axis=0) for a in (z, exact, tolerances, single_vector)
@@ -97,13 +113,33 @@ class Analysis:
         self.radius = _plain(np.abs(z[0]))
         self.angle = _plain(np.abs(np.angle(z[0])))
         self.true_angle = _plain(np.abs(exact[0].imag) * self.dt)
-        kind = _kind(z[0], single_vector[0], tolerances[0])
+        kind = _kind(z, single_vector[0], tolerances)
         self.kind: Any = np.array(KINDS)[kind] if members else KINDS[int(kind)]
         self.stable = _plain(np.isin(kind, (0, 1, 3, 4)))
         with np.errstate(divide="ignore", invalid="ignore"):
             self.omega = self.angle / self.dt
             self.frequency_ratio = _plain(np.where(self.true_angle > 0, self.angle / np.asarray(self.true_angle), np.nan))
             self.samples_per_period = _plain(np.asarray(2.0 * np.pi / np.asarray(self.angle)))
+
+    def _in_more_digits(self, doubtful: Any, A: Array, z: Complex) -> list[tuple[Shape, Complex, Complex]]:
+        """Put in the eigenvalues of a linear system that rounding moves, found in as many digits as it takes.
+
+        Returns:
+            Of each such member the index, the eigenvalues, and the rates that they continue.
+        """
+        dt = np.broadcast_to(self.dt, z.shape[1:])
+        alike: dict[bytes, list[Shape]] = {}
+        for index in map(tuple, np.argwhere(doubtful).tolist()):
+            alike.setdefault(_checks.member(A, index).tobytes(), []).append(index)
+        found = []
+        for members in alike.values():
+            steps = np.array([dt[index] for index in members])
+            values, rates = spectra(_checks.member(A, members[0]), maps.size(self.system)[0], self.method, steps)
+            for k, index in enumerate(members):
+                at: Any = (slice(None), *index)
+                z[at] = values[:, k]
+                found.append((index, values[:, k], rates[:, k]))
+        return found
 
     @property
     def radii(self) -> Array:
@@ -126,7 +162,7 @@ class Analysis:
     def monodromy(self) -> Array:
         """The derivative of a run's end with respect to its start, in slots, shape (n, n, *batch): the product of its steps' P.
 
-        For a run of which every step was kept. Its eigenvalues decide on the stability of a periodic orbit; those of
+        For a run of which every step was saved. Its eigenvalues decide on the stability of a periodic orbit; those of
         single steps do not.
         """
         if self._run is None:
@@ -137,9 +173,9 @@ class Analysis:
                 f"dt = {self._run.dt:g}, got {self.method.name} and {np.ravel(self.dt)[0]:g}"
             )
         if self._run.paces is not None or len(self._run.t) != self._run.steps + 1:
-            raise ArgumentError(f"monodromy: expected a run of which every step was kept (every=1), got {self._run!r}")
+            raise ArgumentError(f"monodromy: expected a run of which every step was saved (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
-        for k in range(1, self._run.steps):  # the last kept state makes no step in the run
+        for k in range(1, self._run.steps):  # the last saved state makes no step in the run
             product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
@@ -163,9 +199,9 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         system: what is stepped; its parameters may be arrays. That of a run under control is ``run.system``.
         method: its name, or what ``stepwell.method`` returns.
         dt: the step, in units of time, above zero; an array broadcasts with the parameters. Left out for a run, it is the run's.
-        at: the state at which a system that is not linear is looked at: a pair ``(v, y)`` of shapes (*block, *batch), or a
-            ``Run``, whose kept states then are the first axis of the members.
-        t: the time at which it is looked at; a run has its own.
+        at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
+            ``Run``, whose saved states then are the first axis of the members.
+        t: the time of the linearisation; a run has its own.
 
     Returns:
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
@@ -174,10 +210,8 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system.
     """
-    if not isinstance(system, System):
-        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
-    system = system.sized(*(at if isinstance(at, (tuple, list)) else ()))
+    system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     if isinstance(at, Run):
         if type(at.system) is not type(system):
@@ -230,7 +264,7 @@ def _given(at: Any) -> str:
 
 
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
-    """The kept states of a run, one after the other."""
+    """The saved states of a run, one after the other."""
     expected = (*system.v_shape, *run.status.shape)
     if run.v.shape[1:] != expected:
         raise ShapeError(f"at: expected a run of {system!r}, states of v of shape {expected}, got {run.v.shape[1:]}")
@@ -264,16 +298,23 @@ def _polynomial(P: Array, z: Complex) -> Array:
     return np.ascontiguousarray(coefficients.real)
 
 
-def _kind(z: Complex, single_vector: Any, tolerance: Array) -> Any:
-    """Which of ``KINDS`` the eigenvalue makes."""
+def _kind(z: Complex, single_vector: Any, tolerances: Array) -> Any:
+    """Which of ``KINDS`` the eigenvalues make, of which the first decides unless another is not known well enough."""
+    first = z[0]
     with np.errstate(invalid="ignore"):
         beyond = np.abs(z) - 1.0
-        size = np.where(np.abs(beyond) <= tolerance, 1, np.where(beyond > 0.0, 2, 0))
-        oscillates = (z.imag != 0.0) | (z.real < 0.0)
+        on = np.abs(beyond) <= tolerances
+        size = np.where(on[0], 1, np.where(beyond[0] > 0.0, 2, 0))
+        oscillates = (first.imag != 0.0) | (first.real < 0.0)
+        vague = (
+            (on & (tolerances > eigen.UNDECIDED_ABOVE)).any(axis=0) & (size != 2)
+            if len(z) > 2
+            else np.zeros(first.shape, dtype=bool)
+        )
     double = single_vector & (size == 1)
     kind = np.where(oscillates, 3 + size, size)
-    kind = np.where(double & (z.imag != 0.0), 8, np.where(double & (z.real < 0.0), 7, np.where(double, 6, kind)))
-    return np.where(np.isfinite(z), kind, 9)
+    kind = np.where(double & (first.imag != 0.0), 8, np.where(double & (first.real < 0.0), 7, np.where(double, 6, kind)))
+    return np.where(np.isfinite(first), np.where(vague, 10, kind), 9)
 
 
 def _names(block: str, shape: Shape) -> list[str]:

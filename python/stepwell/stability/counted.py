@@ -1,19 +1,18 @@
-"""Operations per step (the document's third criterion), counted by running the reference step on counting numbers."""
+"""Operations per step (the document's third criterion), counted on the tape of the step."""
 
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from .._checks import Shape
+from .. import _core
 from ..errors import ShapeError
+from ..explanation.listing import written
 from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import Oscillator, System
-from .numbers import Counting
+from ..systems.base import a_system
 
 
 class Operations(NamedTuple):
@@ -40,7 +39,7 @@ def operations(method: str | Method, system: System | None = None) -> Operations
     """Count the operations of a step, those of the system's rates included.
 
     Changes of sign are not counted, since a processor subtracts as fast as it adds. What is computed once for a whole
-    run (Φ = ω₀·dt) and what an input takes is not counted either.
+    run (Φ = ω₀·dt) is not counted either; what an input takes that changes with the time is.
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
@@ -51,34 +50,11 @@ def operations(method: str | Method, system: System | None = None) -> Operations
         UnsupportedError: if the method cannot do the system.
     """
     how = find_method(method)
-    system = Oscillator() if system is None else system
+    system = Oscillator() if system is None else a_system(system)
     fits_together(system, how)
     if system.batch:
         raise ShapeError(f"system: expected one member to count the operations of, got a batch of shape {system.batch}")
-    tally: Counter[str] = Counter()
-
-    def block(shape: Shape) -> Any:
-        numbers = np.empty(shape, dtype=object)
-        for index in np.ndindex(shape):
-            numbers[index] = Counting(tally)
-        return numbers
-
-    class Counted:
-        """The system, with a note of how often each rate is asked for."""
-
-        def __init__(self, s: Any) -> None:
-            self.s = s
-
-        def dv(self, t: float, v: Any, y: Any) -> Any:
-            tally["rate_evaluations"] += 1
-            return self.s.dv(t, v, y)
-
-        def dy(self, t: float, v: Any, y: Any) -> Any:
-            tally["rate_evaluations_y"] += 1
-            return self.s.dy(t, v, y)
-
-    s: Any = system.scaled(1.0, ())
-    v, y = how.steps.step(Counted(s), 0.0, 1.0, block(system.v_shape), block(system.y_shape))  # type: ignore[arg-type]
-    if hasattr(s, "settle"):  # what is set back onto its energy after a step
-        s.settle(v, y)
-    return Operations(**{name: tally[name] for name in Operations._fields})
+    counted = written(system, how)
+    kinds = Counter(name for name, _, _ in _core.program(how.name)[0])
+    arithmetic = {kind: counted[kind] for kind in Operations._fields[:4]}
+    return Operations(**arithmetic, rate_evaluations=kinds["dv"], rate_evaluations_y=kinds["dy"])

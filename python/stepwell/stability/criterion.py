@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _checks
-from ..errors import ArgumentError, DTypeError
-from ..methods import Method
-from ..methods import method as find_method
-from ..methods import methods as every_method
+from .._value import by_value
+from ..errors import ArgumentError
+from ..methods import Method, choice
 from ..systems import Oscillator
 from .analysis import analyse
 from .counted import Operations, operations
@@ -31,6 +30,7 @@ PHI = (0.1, 0.5, 1.0)
 ROUNDING = 1e-13
 
 
+@by_value
 class At(NamedTuple):
     """A method at one angle per step.
 
@@ -105,7 +105,7 @@ class Criteria(tuple[Criterion, ...]):
 
     def to_json(self, path: str | Path) -> None:
         """Write ``rows()``."""
-        Path(path).write_text(json.dumps(self.rows(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        _checks.file("path", path).write_text(json.dumps(self.rows(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
     def table(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of texts, for a page or a screen. Heads that end in ``>`` are of numbers."""
@@ -151,13 +151,10 @@ def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -
     Raises:
         ArgumentError: what was given and what was expected.
     """
-    if isinstance(methods, str):
-        raise DTypeError(f"methods: expected a list of names, got the text {methods!r}")
-    chosen = every_method() if methods is None else tuple(map(find_method, methods))
+    chosen = choice(methods)
     angles = np.atleast_1d(_checks.numbers("phi", phi, positive=True, unit="rad"))
-    if angles.ndim > 1 or not chosen:
-        what = "phi: expected a list of angles" if chosen else "methods: expected at least one"
-        raise ArgumentError(f"{what}, got {'an array of shape ' + str(angles.shape) if chosen else 'none'}")
+    if angles.ndim > 1:
+        raise ArgumentError(f"phi: expected a list of angles, got an array of shape {angles.shape}")
     return Criteria(_criterion(method, angles.tolist()) for method in chosen)
 
 
@@ -174,4 +171,8 @@ def _criterion(method: Method, angles: list[float]) -> Criterion:
 
 
 def _sum(terms: list[tuple[int, Any]]) -> Any:
-    return lambda phi: float(sum(float(c) * phi**k for k, c in terms))
+    def at(phi: float) -> float:
+        with np.errstate(all="ignore"):  # far past every limit a power may be infinite
+            return float(sum(float(c) * np.float64(phi) ** k for k, c in terms))
+
+    return at

@@ -16,11 +16,26 @@ Truths = np.ndarray[Any, np.dtype[np.bool_]]
 
 EPS = float(np.finfo(np.float64).eps)
 
+#: Operations on matrices at once: some hundredths of a second, so that Ctrl-C is noticed in between.
+OPERATIONS_AT_ONCE = 2e6
+
+#: Up to so many rows an eigenvector is found by a singular value decomposition, which then takes some milliseconds.
+SVD_MAX_ROWS = 40
+
 #: Rows and columns are brought to like size in this many rounds at most; a round halves the powers of two that are left.
-ROUNDS = 20
+BALANCING_ROUNDS = 20
 
 #: And only where their sum becomes smaller by this factor at least (Parlett and Reinsch 1969).
-WORTHWHILE = 0.95
+BALANCING_GAIN = 0.95
+
+
+#: Eigenvalues that rounding may move by more than this are found in more digits. Where that cannot be had, nothing is said of
+#: what it may move by more than the second: two that meet on the circle are moved by a root of some eps, and are not in doubt.
+REFINE_ABOVE, UNDECIDED_ABOVE = 1e-9, 1e-4
+
+
+#: Two eigenvalues of two states that are as close as this part of their size are moved by a root of some eps.
+NEARLY_DOUBLE = 1e-5
 
 
 class Eigen(NamedTuple):
@@ -86,16 +101,39 @@ def eigen(matrix: Array, units: Array | None = None) -> Eigen:
     finite: Any = np.isfinite(matrix).all(axis=(0, 1))
     matrix = np.where(finite, matrix, 0.0)
     if units is None:
-        units = _units(matrix)
+        units = units_of(matrix)
     scaled = matrix * units / units[:, np.newaxis]
-    values, vectors = np.linalg.eig(np.moveaxis(scaled, (0, 1), (-2, -1)))
+    stacked = np.moveaxis(scaled, (0, 1), (-2, -1))
+    n, members = len(matrix), stacked.shape[:-2]
+    each = stacked.reshape(-1, n, n)
+    at_once = max(1, int(OPERATIONS_AT_ONCE / (n**3 + 200)))
+    found = [np.linalg.eig(each[k : k + at_once]) for k in range(0, len(each), at_once)]
+    values, vectors = (np.concatenate([f[i] for f in found]) for i in range(2))
+    values, vectors = values.reshape(*members, n), vectors.reshape(*members, n, n)
     # The positive angle of a pair first: LAPACK gives it so, and what is sorted later keeps it.
     values = np.where(finite, np.moveaxis(values, -1, 0), np.nan).astype(np.complex128)
     vectors = np.moveaxis(vectors.astype(np.complex128), (-2, -1), (0, 1))
     return Eigen(values, vectors, units, np.sqrt((scaled * scaled).sum(axis=(0, 1))))
 
 
-def _units(matrix: Array) -> Array:
+def vector(matrix: Array, value: complex) -> Complex:
+    """The eigenvector of a known eigenvalue, also of a multiple one, shape (n,): what the matrix without it makes smallest."""
+    n, units = len(matrix), units_of(matrix)
+    less = matrix * units / units[:, np.newaxis] - value * np.eye(n)
+    if n > SVD_MAX_ROWS:  # by inverse iteration, which is quicker, where the inverse exists
+        found = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
+        try:
+            for _ in range(3):
+                found = np.linalg.solve(less, found)
+                found /= np.sqrt((np.abs(found) ** 2).sum())
+        except np.linalg.LinAlgError:
+            found[:] = np.nan
+        if np.isfinite(found).all():
+            return np.asarray(units * found)
+    return np.asarray(units * np.linalg.svd(less)[2][-1].conj())
+
+
+def units_of(matrix: Array) -> Array:
     """Units of the states in which rows and columns of a matrix are of like size, shape (n, *members), all powers of two.
 
     What is then said of norms and angles does not depend on the units that a user has, and powers of two round nothing. A state
@@ -105,14 +143,14 @@ def _units(matrix: Array) -> Array:
     size = np.abs(matrix)
     size[range(n), range(n)] = 0.0
     units = np.ones(size.shape[1:])
-    for _ in range(ROUNDS):
+    for _ in range(BALANCING_ROUNDS):
         changed = False
         for i in range(n):
             row, column = size[i].sum(axis=0), size[:, i].sum(axis=0)
             with np.errstate(all="ignore"):
                 by = np.sqrt(np.where(row > 0.0, row, 1.0 / column) / np.where(column > 0.0, column, 1.0 / row))
                 by = np.exp2(np.round(np.log2(by)))
-                worth = column * by + row / by < WORTHWHILE * (column + row)
+                worth = column * by + row / by < BALANCING_GAIN * (column + row)
                 by = np.where(worth & np.isfinite(by) & (by > 0.0), by, 1.0)
             if (by != 1.0).any():
                 changed = True
@@ -138,17 +176,19 @@ def slot_units(finish: Array, units: Array) -> Array:
 def _conditions(vectors: Complex) -> Array:
     """1/|wᴴx| of each eigenvalue's left and right vectors, shape (n, *members); infinite where vectors depend on each other."""
     stacked = np.moveaxis(vectors, (0, 1), (-2, -1))
-    try:
-        left = np.linalg.inv(stacked)
-    except np.linalg.LinAlgError:  # one of many is enough
-        flat = stacked.reshape(-1, *stacked.shape[-2:])
-        left = np.full_like(flat, np.inf)
-        for i, each in enumerate(flat):
-            try:
-                left[i] = np.linalg.inv(each)
-            except np.linalg.LinAlgError:
-                continue
-        left = left.reshape(stacked.shape)
+    flat = stacked.reshape(-1, *stacked.shape[-2:])
+    left = np.full_like(flat, np.inf)
+    at_once = max(1, int(OPERATIONS_AT_ONCE / (len(vectors) ** 3 + 200)))
+    for k in range(0, len(flat), at_once):
+        try:
+            left[k : k + at_once] = np.linalg.inv(flat[k : k + at_once])
+        except np.linalg.LinAlgError:  # one of many is enough
+            for i, each in enumerate(flat[k : k + at_once], k):
+                try:
+                    left[i] = np.linalg.inv(each)
+                except np.linalg.LinAlgError:
+                    continue
+    left = left.reshape(stacked.shape)
     with np.errstate(all="ignore"):
         conditions = np.sqrt((left.real**2 + left.imag**2).sum(axis=-1))
     return np.moveaxis(np.where(np.isnan(conditions), np.inf, conditions), -1, 0)
@@ -224,9 +264,35 @@ def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex,
     return np.where(real & (crossed > straight), exact[::-1], exact)
 
 
+def nearest(values: Complex, rates: Complex, exact: Complex) -> Complex:
+    """For each eigenvalue of one step the rate that it continues, told by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
+    with np.errstate(all="ignore"):
+        distance = np.nan_to_num(np.abs(values[:, np.newaxis] - exact), nan=np.inf)
+    found = np.empty_like(values)
+    for _ in values:
+        i, j = np.unravel_index(distance.argmin(), distance.shape)
+        found[i] = rates[j]
+        distance[i], distance[:, j] = np.inf, np.inf
+    return found
+
+
+def one_vector(matrix: Array, values: Complex) -> Truths:
+    """Which eigenvalues of one matrix are one with others and have fewer vectors than there are of them, shape (n,)."""
+    n = len(values)
+    units = units_of(matrix)
+    scaled = matrix * units / units[:, np.newaxis]
+    least = CLUSTER_DISTANCE * max(1.0, float(np.sqrt((scaled * scaled).sum())))
+    found = np.zeros(n, dtype=np.bool_)
+    for i in range(n):
+        if (one := np.abs(values - values[i]) < CLUSTER_DISTANCE).sum() > 1:
+            singular = np.linalg.svd(scaled - values[one].mean() * np.eye(n), compute_uv=False)
+            found[i] = (singular < least).sum() < one.sum()
+    return found
+
+
 #: Eigenvalues of more than two states that are nearer to each other than this count as one: rounding moves a double eigenvalue
 #: by the square root of its own size.
-NEAR = 1e-6
+CLUSTER_DISTANCE = 1e-6
 
 
 def settled(found: Eigen) -> tuple[Complex, Array, Truths]:
@@ -241,10 +307,10 @@ def settled(found: Eigen) -> tuple[Complex, Array, Truths]:
     for i in range(n):
         for j in range(i + 1, n):
             with np.errstate(invalid="ignore"):
-                near = np.abs(values[i] - values[j]) < NEAR
+                near = np.abs(values[i] - values[j]) < CLUSTER_DISTANCE
             if near.any():
                 overlap = np.abs((found.vectors[:, i].conj() * found.vectors[:, j]).sum(axis=0))
-                double = near & (overlap > 1.0 - NEAR)
+                double = near & (overlap > 1.0 - CLUSTER_DISTANCE)
                 mean = 0.5 * (values[i] + values[j])
                 for k in (i, j):
                     values[k] = np.where(double, mean, values[k])

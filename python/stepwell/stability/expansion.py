@@ -22,7 +22,7 @@ from .numbers import Polynomial
 TERMS = 8
 
 #: A coefficient this small is the rounding of a method's own coefficients, and none of the series.
-NONE = Fraction(1, 10**12)
+NEGLIGIBLE = Fraction(1, 10**12)
 
 
 class Series(NamedTuple):
@@ -125,7 +125,7 @@ def _root(a: list[Fraction]) -> list[Fraction]:
 
 
 def _terms(p: Polynomial, most: int) -> list[tuple[int, Fraction]]:
-    terms = [(k, c) for k, c in enumerate(p.coefficients) if abs(c) > NONE]
+    terms = [(k, c) for k, c in enumerate(p.coefficients) if abs(c) > NEGLIGIBLE]
     return terms[:most]
 
 

@@ -1,61 +1,87 @@
 """``stability_limit``: the largest step below which nothing grows that should not, and the mode that then does.
 
-The step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
+A linear system of more than two states is taken apart first (``parts``). Each part, or a system of two states, is then searched:
+the step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
 enclose the limit, of two states also a narrow window between rungs. Bisection finds it, and where an eigenvalue crosses the unit
 circle at an angle, the crossing itself is solved for. An eigenvalue that leaves the circle after a collision with another (False
 Euler at Φ = 2) does so with the square root of the excess, so there bisection alone is exact to rounding for two states; for
-more, the square of the growth is followed back to where it began.
+more, the square of the growth is followed back to where it began. Where eigenvalues nearly meet, rounding would decide; they are
+computed in more digits (``exact``), on a ladder of wider rungs.
 """
 
 from __future__ import annotations
 
+import copy
+from fractions import Fraction
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..errors import DTypeError, UnsupportedError
+from .._value import by_value
+from ..errors import UnsupportedError
 from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
-from ..systems import System
-from . import eigen, maps
+from ..systems import LinearSystem, System
+from ..systems.base import a_system
+from . import eigen, exact, maps
 from .analysis import state
-from .eigen import Complex
-from .expansion import polynomials
+from .eigen import EPS, Complex, Truths
+from .numbers import Polynomial
+from .parts import parts, rates
 
 #: The ladder of steps, as multiples of the fastest rate: from where the limits of light damping are (2D by Standard Euler) to
-#: beyond the limit of a method of a hundred stages. It is fine from FINE on, where methods have limits of their own.
-FINE, RUNG = 1e-2, 1.02
-LADDER = np.concatenate([np.geomspace(1e-6, FINE, 97)[:-1], FINE * RUNG ** np.arange(466)])
+#: beyond the limit of a method of a hundred stages. It is fine from FINE_FROM on, where methods have limits of their own.
+FINE_FROM, RUNG_RATIO = 1e-2, 1.02
+LADDER = np.concatenate([np.geomspace(1e-6, FINE_FROM, 97)[:-1], FINE_FROM * RUNG_RATIO ** np.arange(466)])
 
-#: Rungs that are looked at at once.
-RUNGS = 64
+#: Rungs that are computed at once, and numbers of all members in them, so that Ctrl-C is noticed in between.
+RUNGS_AT_ONCE, NUMBERS_AT_ONCE = 64, 200_000
 
 #: An eigenvalue of the rates that is this small a part of the largest is zero: such a mode (a chain that floats freely) has an
 #: eigenvalue 1 with every method at every step, and does not count.
-ZERO = 1e-6
+ZERO_RATE = 1e-6
+
+#: A rate whose real part is below this part of it is imaginary.
+BY_ITSELF = 1e-9
+
+#: How far rounding moves them is known to first order; an eigenvalue that is outside the circle by so many times that is surely
+#: outside.
+SURE_FACTOR = 100.0
+
+#: With more digits, only every so many-th rung of the ladder is tried, and an eigenvalue outside the unit circle by more than
+#: ``CIRCLE_TOLERANCE`` grows.
+COARSE_STRIDE, CIRCLE_TOLERANCE = 8, 1e-13
 
 #: Growth that begins at the smallest steps, like a power of dt, is lost in rounding there: where it first shows it is above its
 #: tolerance by no more than a rung with this exponent makes of it. A mode that begins to grow at a limit is far above at once.
-EXPONENT = 20.0
+GROWTH_EXPONENT = 20.0
 
 #: An eigenvalue whose magnitude changes by less than this for a relative change of the step is solved for exactly: rounding of
 #: some eps would move its crossing by more than a hundred eps.
-FLAT = 0.03
+MIN_SLOPE = 0.03
 
 #: Two eigenvalues that leave the circle at an angle and as close together as this are solved for exactly too: critical damping
 #: makes them double, and rounding moves a double eigenvalue by the square root of its own size.
-CLOSE = 1e-4
+NEARLY_DOUBLE = 1e-4
 
-#: What is found by going back to where two eigenvalues meet is believed if it is this near, in parts of the step gone back.
-MET = 1e-3
+#: The crossing is searched from this share below the limit, more than rounding moves apart two real eigenvalues that are equal.
+SEARCH_BELOW = 1e-7
 
-#: The mode that leaves is looked at this much past its limit; one that is never stable, at this multiple of the fastest rate.
-PAST, NEVER = 1e-4, 0.1
+#: A crossing that rounding may move by more than this part of the step is found in more digits.
+MAX_CROSSING_ERROR = 1e-9
+
+#: A limit extrapolated to where two eigenvalues meet is accepted if it is this near, relative to the length of the extrapolation.
+MEETING_TOLERANCE = 1e-3
+
+#: The unstable mode is computed this share past its limit; one that is never stable, at this step times the fastest rate.
+PAST_LIMIT, NEVER_STABLE_STEP = 1e-4, 0.1
 
 
+@by_value
 class Mode(NamedTuple):
     """What begins to grow at a stability limit.
 
@@ -79,16 +105,37 @@ class Mode(NamedTuple):
 class StabilityLimit(float):
     """A stability limit: the largest stable step, in units of time, 0 for never and infinity for always.
 
-    It is a number; ``mode`` says what begins to grow there, None if nothing does.
+    It is a number. Where rounding hides what happens between two steps, it is the smaller of them: below it nothing grows.
+
+    Attributes:
+        mode: what begins to grow there; None if nothing does.
+        grows: the smallest step that is known to grow: the limit itself if it is ``decided``.
     """
 
     mode: Mode | None
+    grows: float
 
-    def __new__(cls, dt: float, mode: Mode | None) -> StabilityLimit:
+    def __new__(cls, dt: float, mode: Mode | None, grows: float | None = None) -> StabilityLimit:
         """The number, with the mode."""
         limit = super().__new__(cls, dt)
         limit.mode = mode
+        limit.grows = float(dt) if grows is None else grows
         return limit
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        """What pickle and copy make it of."""
+        return float(self), self.mode, self.grows
+
+    @property
+    def decided(self) -> bool:
+        """Whether the limit is known. It is not where so many eigenvalues nearly meet that rounding hides what grows."""
+        return self.grows == float(self)
+
+    def __repr__(self) -> str:
+        """A number, or between which two it is."""
+        return f"{float(self)!r}" if self.decided else f"<between {float(self)!r} and {self.grows!r}, not decided>"
+
+    __str__ = __repr__
 
     @property
     def dt(self) -> float:
@@ -97,13 +144,43 @@ class StabilityLimit(float):
 
 
 class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
-    """Stability limits of a batch: an array of numbers. ``modes``, of the same shape, has what begins to grow."""
+    """Stability limits of a batch: an array of numbers.
+
+    Attributes:
+        modes: what begins to grow, an array of the same shape of ``Mode`` or None; None of what is computed from limits.
+        grows: the smallest steps that are known to grow: the limits themselves where they are decided.
+    """
 
     modes: Any = None
+    grows: Any = None
 
     def __array_finalize__(self, other: Any) -> None:
         """What is computed from limits is no longer a limit, and has no modes."""
-        self.modes = None
+        self.modes = self.grows = None
+
+    @property
+    def decided(self) -> Any:
+        """Of each whether it is known, as ``StabilityLimit.decided``."""
+        return np.asarray(self.grows == np.asarray(self))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What pickle and copy make it of."""
+        return _limits, (np.array(self), self.modes, self.grows)
+
+    def __copy__(self) -> StabilityLimits:
+        """Another with the same modes."""
+        return _limits(np.array(self), self.modes, self.grows)
+
+    def __deepcopy__(self, memo: Any) -> StabilityLimits:
+        """Another with copies of them."""
+        return _limits(np.array(self), copy.deepcopy(self.modes, memo), copy.deepcopy(self.grows, memo))
+
+
+def _limits(dt: Array, modes: Any, grows: Any) -> StabilityLimits:
+    """Limits of these steps and modes."""
+    found = dt.view(StabilityLimits)
+    found.modes, found.grows = modes, grows
+    return found
 
 
 def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0) -> Any:
@@ -112,10 +189,15 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     Stable means that what should not grow does not: every eigenvalue of the transition matrix stays in or on the unit circle for
     all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
     linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
-    neither is a system that grows by itself. Limits of two states are exact to some 1e-15, of more to some 1e-14 times the
-    condition of the mode that leaves, whatever the units; damping of less than a millionth of critical damping counts as none.
-    Where a method grows in a window of steps and is stable beyond, the window is found for two states, however narrow; for more,
-    one that is less than 2 % of the step wide may be missed.
+    neither is a system that grows by itself. Limits of one or two states are exact to some 1e-15, whatever the units; so are
+    those of systems that fall into such parts: filters in a row, chains, and any linear system by a method that treats both
+    blocks alike (Runge-Kutta). Of others they are as exact as the condition of the mode that leaves allows, some 1e-9 of the
+    step at worst. Eigenvalues that meet, or nearly, are found in as many digits as it takes: for the matrix as it is given,
+    since where n of them meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that
+    cannot be taken apart, the limit may stay undecided, and then says so. Damping of less than a millionth of critical
+    damping counts as none. Where a method grows in a window of steps and is stable beyond, the window is found for two
+    states, however narrow; for others, one that is less than 2 % of the step wide may be missed, or 17 % where many digits
+    are needed.
 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: they add to the samples what stays bounded.
@@ -124,31 +206,99 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         t: the time of that state.
 
     Returns:
-        A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``).
+        A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). Its
+        ``decided`` is False where rounding hides what happens between it and ``grows``, in units of time.
 
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system, or the system is not linear and no state is given.
+
+    Example:
+        >>> sw.stability_limit(sw.LinearSystem([[-1, 0, 0], [1, -1, 0], [0, 1, -1]]), "rk4")
+        2.785293563405282
     """
-    if not isinstance(system, System):
-        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(system).__name__}")
     how = find_method(method)
-    system = system.sized(*(at if isinstance(at, (tuple, list)) else ()))
+    system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     t = _checks.number("t", t)
-    if at is None:
-        if not system.linear:
-            raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there")
-        search = _Search(system, how, None, None, 0.0)
+    if at is None and not system.linear:
+        raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there")
+    v, y = (None, None) if at is None else state("at", system, at)
+    search = _Search(system, how, v, y, t) if not system.linear else _Search(system, how, None, None, 0.0)
+    if system.linear and len(search.rates) > 2:
+        limits, grows, modes = _by_parts(search)
     else:
-        search = _Search(system, how, *state("at", system, at), t)
-    limits = search.limits()
-    modes = search.modes(limits)
-    if not search.members:
-        return StabilityLimit(float(limits), modes[()])
-    found = limits.view(StabilityLimits)
-    found.modes = modes
-    return found
+        limits, grows = search.limits()
+        modes = search.modes(grows)[0]
+    if v is not None and y is not None:
+        members = maps.together(system, np.asarray(1.0), v, y)
+        limits, grows, modes = (np.array(np.broadcast_to(a, members)) for a in (limits, grows, modes))
+    if not limits.shape:
+        return StabilityLimit(float(limits), modes[()], float(grows))
+    return _limits(limits, modes, grows)
+
+
+def _by_parts(search: _Search) -> tuple[Array, Array, Any]:
+    """The limits of a linear system, the smallest steps known to grow, and the modes, by the part that is the first to grow."""
+    n_v = maps.size(search.system)[0]
+    alike: dict[tuple[int, int], list[tuple[Shape, Array]]] = {}
+    for index in np.ndindex(search.members):
+        for matrix, velocities in parts(_checks.member(search.rates, index), n_v, search.method):
+            alike.setdefault((len(matrix), velocities), []).append((index, matrix))
+    limits, grows = np.full(search.members, np.inf), np.full(search.members, np.inf)
+    modes, past = np.empty(search.members, dtype=object), np.ones(search.members, dtype=np.complex128)
+    best: dict[Shape, Any] = {}
+    for (_, velocities), each in alike.items():
+        stacked = np.stack([matrix for _, matrix in each], axis=-1)
+        part = _Search(LinearSystem(stacked, velocities=velocities), search.method, None, None, 0.0)
+        found, above = part.limits()
+        own, leaving = part.modes(above)
+        for k, (index, _) in enumerate(each):
+            # Of those that are never stable what grows by itself is told, and else the fastest.
+            rank = (above[k], not part.grows_by_itself[k], -part.fastest[k])
+            if own[k] is not None and (index not in best or rank < best[index]):
+                best[index], modes[index], past[index] = rank, own[k], leaving[k]
+            limits[index], grows[index] = min(limits[index], found[k]), min(grows[index], above[k])
+    search.lift(modes, grows, past)
+    return limits, grows, modes
+
+
+def _passes_zero(f: Polynomial, x: float) -> bool:
+    """Whether a polynomial has another sign a few last digits on."""
+    before, after = (f(Fraction(x * (1.0 + 8.0 * side * EPS))) for side in (-1, 1))
+    return bool((before < 0) != (after < 0))
+
+
+def _in_many_digits(step: exact.Step, fastest: float, near: float = 0.0) -> float:
+    """The step at which something begins to grow, in as many digits as it takes: near one, or on a ladder of wide rungs."""
+    low, high = near * (1.0 - 1e-3), near * (1.0 + 1e-3)
+    below, above = (step.beyond(low), step.beyond(high)) if near else (0.0, 0.0)
+    if not below < -CIRCLE_TOLERANCE < CIRCLE_TOLERANCE < above:
+        low, below = 0.0, 0.0
+        for high in (LADDER[::COARSE_STRIDE] / fastest).tolist():
+            above = step.beyond(high)
+            if above > CIRCLE_TOLERANCE:
+                break
+            low, below = high, above
+        else:
+            return np.inf
+        if not low:
+            return 0.0  # already at the smallest steps
+    crosses = below < -CIRCLE_TOLERANCE  # else the eigenvalue is on the circle below
+    for k in range(60):
+        middle = 0.5 * (low + high)
+        if crosses and k % 2:  # the secant; every other time the middle, so that both ends move
+            middle = low - below * (high - low) / (above - below)
+            if min(middle - low, high - middle) <= 2.0 * EPS * high:
+                return middle
+        if not low < middle < high:
+            break
+        value = step.beyond(middle)
+        if value > (0.0 if crosses else CIRCLE_TOLERANCE):
+            high, above = middle, value
+        else:
+            low, below = middle, value
+    return high
 
 
 class _Search:
@@ -159,13 +309,43 @@ class _Search:
         self.rates = maps.rates(system, t, v, y)
         self.members: Shape = self.rates.shape[2:]
         self.exact = eigen.eigen(self.rates)
-        rate = self.exact.values if len(self.rates) > 2 else eigen.eigenvalues(self.rates)
-        size = np.abs(rate)
-        self.fastest = np.where(size.max(axis=0) > 0.0, size.max(axis=0), np.abs(self.rates).max(axis=(0, 1)))
-        # What is zero comes out of rounding as some root of eps, and is not what grows.
-        rounding = self.exact.tolerance(0.0)
-        zero = size <= np.maximum(ZERO * self.fastest, rounding)
-        self.grows_by_itself = np.where(zero, -1.0, rate.real - np.maximum(1e-9 * self.fastest, rounding)).max(axis=0) > 0.0
+        #: Whether eigenvalues that nearly meet can be had in as many digits as it takes.
+        self.exactable = v is None and 2 < len(self.rates) <= exact.MAX_ROWS
+
+    @cached_property
+    def fastest(self) -> Array:
+        """The magnitude of the fastest rate."""
+        return self._speed[0]
+
+    @cached_property
+    def grows_by_itself(self) -> Truths:
+        """Whether the exact solution grows."""
+        return self._speed[1]
+
+    @cached_property
+    def _speed(self) -> tuple[Array, Truths]:
+        if self.exactable:
+            rate = np.empty((len(self.rates), *self.members), dtype=np.complex128)
+            for index in np.ndindex(self.members):
+                rate[(slice(None), *index)] = rates(_checks.member(self.rates, index)).values
+            rounding: Any = 0.0
+            zero: Any = rate == 0.0
+            size = np.abs(rate)
+        elif len(self.rates) <= 2:
+            rate = eigen.eigenvalues(self.rates)
+            size = np.abs(rate)
+            terms = np.abs(self.rates[0, 0] * self.rates[-1, -1]) + np.abs(self.rates[0, -1] * self.rates[-1, 0])
+            with np.errstate(divide="ignore", invalid="ignore"):  # the slow one is the determinant over the fast one
+                rounding = np.nan_to_num(4.0 * EPS * terms / size.max(axis=0)) if len(self.rates) == 2 else 0.0
+            zero = size <= rounding
+        else:
+            rate, rounding = self.exact.values, self.exact.tolerance(0.0)
+            size = np.abs(rate)
+            # What is zero comes out of rounding as some root of eps, and is not what grows.
+            zero = size <= np.maximum(ZERO_RATE * size.max(axis=0), rounding)
+            rounding = np.maximum(rounding, BY_ITSELF * size.max(axis=0))
+        fastest = np.where(size.max(axis=0) > 0.0, size.max(axis=0), np.abs(self.rates).max(axis=(0, 1)))
+        return fastest, np.where(zero, -1.0, rate.real - np.maximum(BY_ITSELF * size, rounding)).max(axis=0) > 0.0
 
     def matrix(self, dt: Array) -> Array:
         """P for steps of shape (…, *members)."""
@@ -197,46 +377,65 @@ class _Search:
         finite = np.isfinite(P).all(axis=(0, 1))
         return np.where(finite, z, np.inf), np.where(finite, tolerance, 1.0)
 
-    def growth(self, dt: Array) -> tuple[Array, Array, Array]:
+    def growth(self, dt: Array) -> tuple[Array, Array, Any, Any]:
         """Of the eigenvalue that is farthest outside the unit circle: how far it is, how far it may seem so by rounding.
 
-        And where all are: 1 if that one grows, −1 if all damp, 0 if it is on the circle, for all one can see.
+        And where all are: 1 if that one grows, −1 if all damp, 0 if it is on the circle, for all one can see. And whether one can
+        not see, because eigenvalues that nearly meet are moved by too much.
         """
         z, tolerance = self.eigenvalues(dt)
         beyond = np.abs(z) - 1.0
         at = (beyond - tolerance).argmax(axis=0)[np.newaxis]
         damp = (beyond < -tolerance).all(axis=0)
+        if len(z) > 2:
+            wide = tolerance > (eigen.REFINE_ABOVE if self.exactable else eigen.UNDECIDED_ABOVE)
+            grows = (beyond > np.where(wide, SURE_FACTOR * tolerance, tolerance)).any(axis=0)
+            doubt = ~grows & (wide & (beyond > -SURE_FACTOR * tolerance)).any(axis=0)
+        else:
+            doubt = np.zeros_like(damp)
         beyond, tolerance = (np.take_along_axis(a, at, axis=0)[0] for a in (beyond, tolerance))
-        return beyond, tolerance, np.where(beyond > tolerance, 1, np.where(damp, -1, 0))
+        return beyond, tolerance, np.where(beyond > tolerance, 1, np.where(damp, -1, 0)), doubt
 
-    def limits(self) -> Array:
-        """The limit of each member."""
+    def limits(self) -> tuple[Array, Array]:
+        """The limit of each member, and the smallest step known to grow: another one where rounding hides what is between."""
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         none = len(LADDER)
         first = np.full(self.members, none)
         low, high = np.zeros(self.members), np.full(self.members, LADDER[-1]) / fastest
         crept, previous, before = np.zeros(self.members, dtype=bool), np.zeros(self.members), np.zeros(self.members, dtype=int)
-        for start in range(0, none, RUNGS):
-            rungs = LADDER[start : start + RUNGS].reshape(-1, *(1,) * len(self.members)) / fastest
-            beyond, tolerance, side = self.growth(rungs)
+        doubtful, sure = np.zeros(self.members, dtype=bool), np.zeros(self.members)
+        at_once = max(1, min(RUNGS_AT_ONCE, NUMBERS_AT_ONCE // max(1, first.size)))
+        for start in range(0, none, at_once):
+            rungs = LADDER[start : start + at_once].reshape(-1, *(1,) * len(self.members)) / fastest
+            beyond, tolerance, side, doubt = self.growth(rungs)
             for i in range(len(rungs)):
                 k = start + i
-                new = (first == none) & (side[i] > 0)
+                sure = np.where(~doubtful & doubt[i] & (first == none), previous, sure)
+                doubtful |= doubt[i] & (first == none)
+                new = (first == none) & (side[i] > 0) & ~doubt[i]
                 first = np.where(new, k, first)
                 low, high = np.where(new, previous, low), np.where(new, rungs[i], high)
                 ratio = LADDER[k] / LADDER[k - 1] if k else np.inf
-                crept = np.where(new, (before >= 0) & (beyond[i] <= tolerance[i] * ratio**EXPONENT), crept)
+                crept = np.where(new, (before >= 0) & (beyond[i] <= tolerance[i] * ratio**GROWTH_EXPONENT), crept)
                 previous, before = rungs[i], side[i]
-            if (first < none).all():
+            if (doubtful | (first < none)).all() and (self.exactable or (first < none).all()):
                 break
+        crept &= ~doubtful
         never = self.grows_by_itself | crept
         if len(self.rates) == 2:
             low, high, first = self.valleys(fastest, low, high, first, never)
-        seek = (first < none) & ~never
+        seek = (first < none) & ~never & ~doubtful
         if seek.any():
             low, high = self.bisected(np.where(seek, low, 0.5 * high), high)
-            high = self.crossing(low, high, seek)
-        return np.where(never, 0.0, np.where((first < none) & (self.fastest > 0.0), high, np.inf))
+            high, blurred = self.crossing(low, high, seek)
+            doubtful |= seek & blurred & self.exactable
+        grows = np.where(never, 0.0, np.where((first < none) & (self.fastest > 0.0), high, np.inf))
+        found = np.where(doubtful & ~never, sure, grows)
+        for index in np.argwhere(doubtful & ~never & self.exactable).tolist():
+            at = tuple(index)
+            step = exact.Step(_checks.member(self.rates, at), maps.size(self.system)[0], self.method)
+            found[at] = grows[at] = _in_many_digits(step, fastest[at], grows[at] if np.isfinite(grows[at]) else 0.0)
+        return found, grows
 
     def margins(self, dt: Array) -> tuple[Array, Array]:
         """Of two states, what must not be below zero (1 − q, 1 + q − 2p, 1 + q + 2p), shape (3, …), and their rounding."""
@@ -254,8 +453,9 @@ class _Search:
         """
         last = int(np.where(never, 0, np.minimum(first, len(LADDER) - 1)).max(initial=0))
         done = np.zeros(self.members, dtype=bool)
-        for start in range(0, last - 1, RUNGS):
-            rungs = LADDER[start : min(start + RUNGS + 2, last + 1)].reshape(-1, *(1,) * len(self.members)) / fastest
+        at_once = max(1, min(RUNGS_AT_ONCE, NUMBERS_AT_ONCE // max(1, first.size)))
+        for start in range(0, last - 1, at_once):
+            rungs = LADDER[start : min(start + at_once + 2, last + 1)].reshape(-1, *(1,) * len(self.members)) / fastest
             margins, tolerance = self.margins(rungs)
             left, here, right = margins[:, :-2], margins[:, 1:-1], margins[:, 2:]
             with np.errstate(invalid="ignore"):
@@ -286,8 +486,10 @@ class _Search:
             low, high = np.where(grows, low, middle), np.where(grows, middle, high)
         return low, high
 
-    def crossing(self, low: Array, high: Array, seek: Any) -> Array:
+    def crossing(self, low: Array, high: Array, seek: Any) -> tuple[Array, Truths]:
         """Where the eigenvalue that leaves the unit circle crosses it, if it does so at an angle; else ``high``.
+
+        And whether rounding of that eigenvalue moves the crossing by more than ``MAX_CROSSING_ERROR`` of the step.
 
         Bisection stops where growth shows above rounding. The secant through |z| − 1 a little on both sides finds the crossing
         itself, because its errors on both sides cancel to the rounding of one.
@@ -342,13 +544,15 @@ class _Search:
             with np.errstate(divide="ignore", invalid="ignore"):
                 k = -level / rise
                 k = k - (level + k * (rise + k * bend)) / (rise + 2.0 * k * bend)
-            met = seek & ~at_an_angle & (np.abs(k) < MET)
+            met = seek & ~at_an_angle & (np.abs(k) < MEETING_TOLERANCE)
             found = np.where(met, high * (1.0 + excess[0] * k), found)
-        doubtful = seek & (np.abs(slope) < FLAT)
+        doubtful = seek & (np.abs(slope) < MIN_SLOPE)
         if len(self.rates) == 2:
             z, _ = self.eigenvalues(found)
-            doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < CLOSE)
-        return self.exactly(found, doubtful)
+            doubtful |= at_an_angle & (np.abs(z[0] - z[1]) < NEARLY_DOUBLE)
+        with np.errstate(invalid="ignore"):
+            blurred = ~(np.take_along_axis(tolerance, largest, axis=0)[0] <= MAX_CROSSING_ERROR * np.abs(slope))
+        return self.exactly(found, doubtful), blurred
 
     def exactly(self, limits: Array, flat: Any) -> Array:
         """The limits of two states that leave the circle at so flat an angle, or so close together, that rounding moves them.
@@ -358,31 +562,33 @@ class _Search:
         """
         if len(self.rates) != 2 or self.v is not None or not flat.any():
             return limits
-        (a, b), (c, d) = polynomials(self.system, self.method)
-        twice_p, q = (np.asarray(f, dtype=object) for f in (a + d, a * d - b * c))
         found = np.array(limits)
-        for index in np.argwhere(flat).tolist():
-            at = tuple(index)
-            roots = [q[at] - 1, 1 + q[at] - twice_p[at], 1 + q[at] + twice_p[at]]
-            steps = [f.root_near(float(limits[at])) for f in roots if f.coefficients]
-            nearest = min(steps, key=lambda x: abs(x - limits[at]))
-            found[at] = nearest if abs(nearest / limits[at] - 1.0) < RUNG - 1.0 else limits[at]
+        for at in map(tuple, np.argwhere(flat).tolist()):
+            ((a, b), (c, d)), clock = exact.unrounded(_checks.member(self.rates, at), maps.size(self.system)[0], self.method)
+            twice_p, q, near = a + d, a * d - b * c, np.ldexp(limits[at], -clock)
+            # From a little below, so that of two that nearly meet (both eigenvalues, one after the other) the first is found.
+            margins = [f for f in (q - 1, 1 + q - twice_p, 1 + q + twice_p) if f.coefficients]
+            roots = [(f, f.root_near(float(near * (1.0 - SEARCH_BELOW)))) for f in margins]
+            # A function that only nearly reaches zero (of a pair that nearly meets on the real line) has no root there.
+            passed = [x for f, x in roots if abs(x / near - 1.0) < 10.0 * SEARCH_BELOW and _passes_zero(f, x)]
+            nearest = min(passed, default=min((x for _, x in roots), key=lambda x: abs(x - near)))
+            found[at] = np.ldexp(nearest, clock) if abs(nearest / near - 1.0) < RUNG_RATIO - 1.0 else limits[at]
         return found
 
-    def modes(self, limits: Array) -> Any:
-        """The mode that begins to grow at each limit, of the shape of the members: a ``Mode``, or None."""
+    def modes(self, limits: Array) -> tuple[Any, Complex]:
+        """The mode that begins to grow at each limit, a ``Mode`` or None, and its eigenvalue past that, of the members' shape."""
         # Two steps for each: at the limit, and past it, where the mode that leaves is told from those that stay.
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
         known = np.isfinite(limits) & (limits > 0.0)
-        at = np.where(known, limits, NEVER / fastest)
-        steps = np.stack([at, np.where(known, at * (1.0 + PAST), at)])
+        at = np.where(known, limits, NEVER_STABLE_STEP / fastest)
+        steps = np.stack([at, np.where(known, at * (1.0 + PAST_LIMIT), at)])
         z, tolerance = self.eigenvalues(steps)
         finish = self.finish(steps)
         found = self.modes_of(self.matrix(steps), finish)
         states = np.einsum("ij...,jk...->ik...", finish, found.own)[:, :, 1]
         exact = eigen.matched(found.values[:, 1], states, self.exact)
 
-        modes = np.empty(self.members, dtype=object)
+        modes, left = np.empty(self.members, dtype=object), np.ones(self.members, dtype=np.complex128)
         for index in np.ndindex(self.members):
             if limits[index] == np.inf:
                 continue
@@ -392,9 +598,27 @@ class _Search:
             which = int(np.abs(found.values[(slice(None), 1, *index)] - leaving).argmin())
             rate, shape = exact[(which, *index)], states[(slice(None), which, *index)]
             if rate.imag < 0.0:  # of a pair, the one that turns forwards
-                rate, shape, crossing = rate.conj(), shape.conj(), crossing.conj()
+                rate, shape, crossing, leaving = rate.conj(), shape.conj(), crossing.conj(), leaving.conj()
+            left[index] = leaving
             modes[index] = self._mode(crossing, rate, shape, leaving, bool(self.grows_by_itself[index]))
-        return modes
+        return modes, left
+
+    def lift(self, modes: Any, steps: Array, past: Complex) -> None:
+        """Give modes of parts their shapes in the whole, a little past these steps, where these are their eigenvalues."""
+        growing = np.isfinite(steps) & (steps > 0.0)
+        dt = np.where(growing, steps * (1.0 + PAST_LIMIT), 1.0)
+        P, finish = self.matrix(dt), self.finish(dt)
+        n_v = maps.size(self.system)[0]
+        for index in np.ndindex(self.members):
+            if (mode := modes[index]) is None:
+                continue
+            matrix, z = (P, past[index]) if growing[index] else (self.rates, mode.rate)
+            matrix = _checks.member(matrix, index)
+            shape = eigen.vector(matrix, complex(z))
+            shape = _checks.member(finish, index) @ shape if growing[index] else shape
+            shape = shape / shape[np.abs(shape).argmax()]
+            v, y = shape[:n_v].reshape(self.system.v_shape), shape[n_v:].reshape(self.system.y_shape)
+            modes[index] = mode._replace(v=v, y=y)
 
     def _mode(self, crossing: complex, rate: complex, shape: Complex, leaving: complex, by_itself: bool) -> Mode:
         n_v = maps.size(self.system)[0]

@@ -19,7 +19,7 @@ from ..systems import System
 
 #: The imaginary part that stands for an infinitesimal. Its square is below the smallest number, so derivatives by the complex
 #: step, f'(x) = Im f(x + iε)/ε, have no truncation error.
-TINY = 1e-200
+COMPLEX_STEP = 1e-200
 
 
 def size(system: System) -> tuple[int, int]:
@@ -64,8 +64,8 @@ def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: A
     slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y) if method.carry else v
     s: Any = _scaled(system, dt, (sum(size(system)), *members))
     h: Any = float(dt) if dt.ndim == 0 else dt
-    settle: Callable[[Any, Any], Blocks] = getattr(s, "settle", lambda v, y: (v, y))
-    return _derivative(system, members, slot, y, lambda v, y: settle(*method.steps.step(s, t, h, v, y)))
+    project: Callable[[Any, Any], Blocks] = getattr(s, "project", lambda v, y: (v, y))
+    return _derivative(system, members, slot, y, lambda v, y: project(*method.steps.step(s, t, h, v, y)))
 
 
 def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | None = None) -> Array:
@@ -140,9 +140,9 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
     def seeded(block: Array, shape: Shape, direction: Array) -> Any:
         own = block.shape[len(shape) :]
         aligned = block.reshape(*shape, 1, *(1,) * (len(members) - len(own)), *own)
-        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * TINY * direction
+        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * COMPLEX_STEP * direction
 
     unit_v, unit_y = unit(system, members)
     with np.errstate(all="ignore"):
         found = rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
-    return np.asarray(found.imag / TINY)
+    return np.asarray(found.imag / COMPLEX_STEP)

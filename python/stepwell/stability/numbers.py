@@ -1,66 +1,16 @@
 """Numbers that are not numbers: run a reference step on them and it says what it does.
 
-``Counting`` counts the operations, ``Polynomial`` carries an unknown exactly. Both live in NumPy arrays of objects, whose
-operations are those of their elements, so the reference needs no change for them.
+``Polynomial`` carries an unknown exactly. It lives in NumPy arrays of objects, whose operations are those of their elements, so
+the reference needs no change for it.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-
-
-class Counting:
-    """A number that counts what is done to it, in ``tally``, which its results share. It has no value."""
-
-    __slots__ = ("tally",)
-
-    def __init__(self, tally: Counter[str]) -> None:
-        self.tally = tally
-
-    def _count(self, operation: str, other: object = 0.0) -> Any:
-        if isinstance(other, np.ndarray):
-            return NotImplemented  # each of its elements then comes here by itself
-        self.tally[operation] += 1
-        return self
-
-    def __add__(self, other: object) -> Any:
-        return self._count("additions", other)
-
-    def __mul__(self, other: object) -> Any:
-        return self._count("multiplications", other)
-
-    def __truediv__(self, other: object) -> Any:
-        return self._count("divisions", other)
-
-    def __neg__(self) -> Any:
-        return self._count("negations")
-
-    def sqrt(self) -> Any:
-        """NumPy calls this for the square root of an object."""
-        return self._count("square_roots")
-
-    def __lt__(self, other: object) -> Any:
-        """Comparisons, choices and work on bits are not counted."""
-        return NotImplemented if isinstance(other, np.ndarray) else self
-
-    def choose(self, yes: object, no: object) -> Any:
-        """Whatever is held within bounds is."""
-        return no
-
-    def xor_bits(self, other: object) -> Any:
-        """The same number, as far as counting goes; so are the others."""
-        return self
-
-    and_bits = or_bits = add_bits = shift_up = shift_down = xor_bits
-    __gt__ = __lt__
-    __radd__ = __sub__ = __rsub__ = __add__
-    __rmul__ = __mul__
-    __rtruediv__ = __truediv__
 
 
 def exact(value: float | Fraction) -> Fraction:
@@ -81,6 +31,12 @@ class Polynomial:
         while kept and not kept[-1]:
             kept.pop()
         self.coefficients = tuple(kept)
+
+    def __eq__(self, other: object) -> bool:
+        return self.coefficients == other.coefficients if isinstance(other, Polynomial) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.coefficients)
 
     def __getitem__(self, power: int) -> Fraction:
         return self.coefficients[power] if power < len(self.coefficients) else Fraction(0)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from math import prod
+from math import inf, prod
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from .._checks import Array, Shape
-from ..errors import UnsupportedError
+from .._value import Value
+from ..errors import DTypeError, UnsupportedError
 from ..reference.signal import Constant, Held, Sine
+from .inputs import Sampled
 
 if TYPE_CHECKING:
     from ..control import EnergyControl, Projection
@@ -22,7 +24,11 @@ if TYPE_CHECKING:
 Given = list[tuple[str, Any]]
 
 
-class System(ABC):
+#: A step so short that no gain of a control is too large for it.
+TINY = 1e-200
+
+
+class System(Value, ABC):
     """Two blocks, velocities ``v`` and coordinates ``y``, and a rate for each.
 
     Attributes:
@@ -50,6 +56,12 @@ class System(ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
     control: EnergyControl | Projection | None = None
+    _free: System | None = None
+
+    @property
+    def uncontrolled(self) -> System:
+        """The same system without what controls it."""
+        return self if self._free is None else self._free
 
     @abstractmethod
     def said(self) -> list[str]:
@@ -79,6 +91,10 @@ class System(ABC):
     def parameters(self, batch: Shape) -> Given:
         """This system and what controls it, as the core takes them."""
         return flat(self.given(batch) | ({} if self.control is None else self.control.given()), batch)
+
+    def named(self, name: str, index: Shape) -> str:
+        """What a number among those that describe the system is called: the name of an argument, and where in it."""
+        return f"{name}[{','.join(map(str, index))}]" if index else name
 
     @property
     def quantities(self) -> dict[str, Shape]:
@@ -112,6 +128,10 @@ class System(ABC):
         for given in self.given_inputs().values():
             given.check(last)
 
+    def doubt(self, y: Array) -> str | None:
+        """Why the rates mean nothing at some of these coordinates, in words, or None."""
+        return None
+
     def sized(self, *states: Any) -> System:
         """The same system for states of these shapes; only a system that leaves its size open minds."""
         return self
@@ -122,12 +142,28 @@ class System(ABC):
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        if not hasattr(self.reference, "energies"):
-            raise UnsupportedError(f"control: {self!r} has no energy control")
+        self._controllable()
         with np.errstate(all="ignore"):
             _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
+        return self._held_by(control.aimed(kinetic, energy, dt))
+
+    def under(self, control: EnergyControl | Projection, batch: Shape) -> Self:
+        """The same system under control, in what a step does and not in numbers, for unknown states of that batch shape.
+
+        Raises:
+            UnsupportedError: if the system has no energy that a control can keep.
+        """
+        self._controllable()
+        return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
+
+    def _controllable(self) -> None:
+        if not hasattr(self.reference, "energies"):
+            raise UnsupportedError(f"control: {self!r} has no energy control")
+
+    def _held_by(self, control: EnergyControl | Projection) -> Self:
         held = copy.copy(self)
-        held.control = control.aimed(kinetic, energy, dt)
+        held._free = self
+        held.control = control
         held.velocity_term = "energy control"
         return held
 
@@ -137,6 +173,14 @@ class System(ABC):
         """The inputs that it was given, by name."""
         return {}
 
+    @property
+    def samples(self) -> tuple[float, float]:
+        """The shortest time from one sample of an input to the next, and the time of the last; infinite if none changes so."""
+        held = [each for each in self.given_inputs().values() if isinstance(each, Sampled) and not each.constant]
+        if not held:
+            return inf, -inf
+        return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
+
     def without_inputs(self) -> System:
         """The same system, left to itself."""
         return self
@@ -144,6 +188,13 @@ class System(ABC):
     def with_pulse(self, name: str, values: Array, interval: float) -> System:
         """The same system with these samples as its only input."""
         raise KeyError(name)
+
+
+def a_system(value: Any) -> System:
+    """Return the argument ``system`` if it is one."""
+    if not isinstance(value, System):
+        raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
+    return value
 
 
 def shown(**given: Any) -> list[str]:

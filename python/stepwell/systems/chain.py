@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..errors import ArgumentError, ShapeError
+from ..errors import ShapeError
 from ..reference.systems.chain import Chain as Reference
 from .base import System, aligned
 
@@ -33,12 +33,9 @@ class Chain(System):
 
     def __init__(self, n: int, *, stiffness: Any = 1.0, mass: Any = 1.0) -> None:
         self.n = _checks.count("n", n, 1)
-        self.stiffness = _per_row("stiffness", stiffness, self.n + 1, "springs")
-        self.mass = _per_row("mass", mass, self.n, "masses")
-        if (self.mass <= 0).any():
-            raise ArgumentError(f"mass: expected numbers above zero, got {self.mass.min():g}")
-        if (self.stiffness < 0).any():
-            raise ArgumentError(f"stiffness: expected numbers of zero or more, got {self.stiffness.min():g}")
+        _checks.fits("n: stiffnesses and masses", 2 * self.n + 1, (), "take fewer masses")
+        self.stiffness = _per_row("stiffness", _checks.not_negative("stiffness", stiffness), self.n + 1, "springs")
+        self.mass = _per_row("mass", _checks.numbers("mass", mass, positive=True), self.n, "masses")
         self.v_shape = self.y_shape = (self.n,)
         self.batch = _checks.batch_shape({"stiffness": self.stiffness.shape[1:], "mass": self.mass.shape[1:]})
 
@@ -58,8 +55,7 @@ class Chain(System):
         return np.asarray(0.5 * (m * v * v).sum(axis=0) + 0.5 * (k * stretch * stretch).sum(axis=0))
 
 
-def _per_row(argument: str, value: Any, rows: int, what: str) -> Array:
-    array = _checks.numbers(argument, value)
+def _per_row(argument: str, array: Array, rows: int, what: str) -> Array:
     if array.ndim == 0:
         return np.full(rows, array)
     if array.shape[0] not in (1, rows):

@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Shape
+from .._value import Value
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import Constant, Held, Sine
 
@@ -15,7 +16,7 @@ from ..reference.signal import Constant, Held, Sine
 LAST_ANGLE = 2.0**50
 
 
-class Sinusoid:
+class Sinusoid(Value):
     """amplitude · sin(omega·t + phase).
 
     Args:
@@ -48,7 +49,7 @@ class Sinusoid:
         return Sine(self.amplitude, self.omega, self.phase)
 
 
-class Sampled:
+class Sampled(Value):
     """Samples, each held until the next; the first also before it, the last also after it.
 
     Args:

@@ -49,10 +49,10 @@ class LinearSystem(System):
     def __init__(self, A: Any, B: Any = None, C: Any = None, D: Any = None, *, x: Any = None, velocities: Any = None) -> None:
         self.A = _square(A)
         n = len(self.A)
-        lone = self.A.ndim == 2  # else a single axis might be meant for the batch
-        self.B = None if B is None else _matrix("B", B, ("n", n), ("m", None), (n, 1) if lone else None)
+        single = self.A.ndim == 2  # else a single axis might be meant for the batch
+        self.B = None if B is None else _matrix("B", B, ("n", n), ("m", None), (n, 1) if single else None)
         m = 0 if self.B is None else self.B.shape[1]
-        self.C = None if C is None else _matrix("C", C, ("r", None), ("n", n), (1, n) if lone else None)
+        self.C = None if C is None else _matrix("C", C, ("r", None), ("n", n), (1, n) if single else None)
         r = 0 if self.C is None else len(self.C)
         for given, needed, why in (
             (D, C, "D: expected C too, without which there are no outputs to add inputs to"),
@@ -125,6 +125,17 @@ class LinearSystem(System):
             "inputs": [each.signal() for each in self.given_inputs().values()],
         }
 
+    def named(self, name: str, index: Shape) -> str:
+        """As in A and B, whose rows and columns the core has in the order of the blocks, but for inputs that are not given."""
+        if name != "rows":
+            position, dot, rest = name.removeprefix("inputs[").partition("]")
+            return (list(self.given_inputs())[int(position)] + rest) if dot else name
+        order = [*self.velocities, *self.coordinates]
+        row, column = index
+        if column < len(order):
+            return f"A[{order[row]},{order[column]}]"
+        return f"B[{order[row]},{self._columns()[column - len(order)]}]"
+
     def split(self, state: Any) -> tuple[Array, Array]:
         """The blocks (v, y) of a state in the order of A, shape (n, *batch).
 
@@ -176,15 +187,15 @@ def _square(A: Any) -> Array:
 
 
 def _matrix(
-    argument: str, value: Any, rows: tuple[str, int | None], columns: tuple[str, int | None], lone: tuple[int, int] | None
+    argument: str, value: Any, rows: tuple[str, int | None], columns: tuple[str, int | None], single: tuple[int, int] | None
 ) -> Array:
     """A matrix of so many rows and columns, each with its name, None for any number.
 
-    ``lone`` is the shape of a single row, column or number that may be given without its other axes.
+    ``single`` is the shape of a single row, column or number that may be given without its other axes.
     """
     array = _checks.numbers(argument, value)
-    if lone is not None and array.ndim < 2 and array.size == lone[0] * lone[1]:
-        array = array.reshape(lone)
+    if single is not None and array.ndim < 2 and array.size == single[0] * single[1]:
+        array = array.reshape(single)
     fits = array.ndim >= 2 and all(
         n in (None, got) and got > 0 for (_, n), got in zip((rows, columns), array.shape, strict=False)
     )

@@ -11,7 +11,7 @@ from .._checks import Array, Shape
 from ..reference import trig
 from ..reference.systems.pendulum import Pendulum as Reference
 from .base import System, shown
-from .inputs import Input, as_input, signal
+from .inputs import LAST_ANGLE, Input, as_input, signal
 
 
 class Pendulum(System):
@@ -22,7 +22,8 @@ class Pendulum(System):
         damping: damping ratio D of small swings, without a unit; broadcasts. None leaves the term out.
         a: angular acceleration from outside: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
 
-    An angle is not brought back into one turn. The sine is that of the core up to 2⁵⁰ rad, and means nothing beyond.
+    An angle is not brought back into one turn. The sine is that of the core up to 2⁵⁰ rad, and means nothing beyond;
+    a run that keeps such an angle warns of it.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -53,6 +54,16 @@ class Pendulum(System):
     def given(self, batch: Shape) -> dict[str, Any]:
         """Parameters and input."""
         return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
+
+    def doubt(self, y: Array) -> str | None:
+        """That an angle is too large for a sine."""
+        with np.errstate(invalid="ignore"):
+            beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > LAST_ANGLE)])
+        return (
+            f"an angle grew to {beyond.max():.3g} rad, and beyond {LAST_ANGLE:.3g} rad its sine means nothing"
+            if beyond.size
+            else None
+        )
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest below."""

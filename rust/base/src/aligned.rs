@@ -34,12 +34,14 @@ impl Aligned {
 
 impl Deref for Aligned {
     type Target = [f64];
+    #[inline]
     fn deref(&self) -> &[f64] {
         &self.numbers[self.first..self.first + self.count]
     }
 }
 
 impl DerefMut for Aligned {
+    #[inline]
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.numbers[self.first..self.first + self.count]
     }

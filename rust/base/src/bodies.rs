@@ -37,7 +37,7 @@ impl Law {
 /// Sums over bodies are kept in this many parts, body i in part i mod `LANES`; distances that are taken together are so far apart.
 pub const LANES: usize = 8;
 /// Bodies from which on the distances are cut into slabs.
-const LONG: usize = 64;
+const SLABBED_FROM: usize = 64;
 /// Bodies for each slab, and how many slabs there are at most.
 const SLAB: usize = 256;
 const SLABS: usize = 16;
@@ -46,7 +46,7 @@ const SLABS: usize = 16;
 ///
 /// Distances that are `LANES` apart form a group, groups form slabs, and a slab has sums of its own.
 pub fn partners(n: usize) -> Vec<Vec<Vec<usize>>> {
-    if n < LONG {
+    if n < SLABBED_FROM {
         let pairs = n / 2 / (2 * LANES) * (2 * LANES);
         let twos = (1..=pairs).step_by(2 * LANES).flat_map(|first| (first..first + LANES).map(|k| vec![k, k + LANES]));
         return vec![twos.chain((pairs + 1..=n / 2).map(|k| vec![k])).collect()];

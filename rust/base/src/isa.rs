@@ -1,8 +1,8 @@
 //! Run-time CPU dispatch. The project's `unsafe` stands here and in the core's `kernel/pages.rs`.
 //!
 //! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
-//! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA or reorders, so all give
-//! the same bits.
+//! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or reorders, so all
+//! give the same bits.
 
 use std::{ffi::OsString, fmt};
 
@@ -68,7 +68,8 @@ impl Level {
     pub fn here(self) -> bool {
         match self {
             Level::Baseline => true,
-            Level::Avx2 => is_x86_feature_detected!("avx2"),
+            // Whatever has the one has the other, but for a few CPUs of one maker.
+            Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             Level::Avx512 => {
                 is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")
@@ -161,7 +162,7 @@ mod x86 {
     pub struct Avx512(());
 
     #[inline(never)]
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,fma")]
     fn avx2(task: impl Task) {
         task.run();
     }

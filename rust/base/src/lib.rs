@@ -4,8 +4,8 @@
 //! them, CPU levels, and the one kernel that is compiled ahead of time for each of them and takes a minute, the forces of many bodies.
 
 pub mod aligned;
-pub mod along;
 pub mod bodies;
+pub mod forces;
 pub mod functions;
 pub mod isa;
 pub mod number;

@@ -40,6 +40,14 @@ pub enum Error {
         /// The term that depends on the velocity.
         term: &'static str,
     },
+    /// A step that is too long for one tape, which fused multiply-adds need.
+    #[error("fused: a step of about {operations} operations is too long; fused multiply-adds go with steps of up to {most}")]
+    TooLongToFuse {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// Arrays that do not fit together.
     #[error("{what}: expected {expected}, got {got}")]
     Shape {
@@ -53,6 +61,12 @@ pub enum Error {
     /// A CPU level that this machine does not have or nobody knows.
     #[error(transparent)]
     Level(#[from] stepwell_base::isa::UnknownLevel),
+    /// There is no room for what a run needs.
+    #[error("the system and its workings need {} MiB, which this process cannot have; use a smaller system or fewer threads", bytes >> 20)]
+    Memory {
+        /// How many bytes it would take.
+        bytes: usize,
+    },
     /// The caller's monitor said stop.
     #[error("interrupted")]
     Interrupted,

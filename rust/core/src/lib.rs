@@ -1,6 +1,6 @@
 //! # stepwell-core
 //!
-//! Fixed and chosen steps of very large batches of small systems, bit for bit the same on every CPU level, thread count and batch. A step
+//! Fixed and adaptive steps of very large batches of small systems, bit for bit the same on every CPU level, thread count and batch. A step
 //! is written once, over any kind of number ([`number`]); run once with symbols, it becomes a tape ([`tape`]), and the tape becomes
 //! machine code ([`kernel`]).
 //!

@@ -1,4 +1,4 @@
-//! Steps of chosen length: a member's own time and step, and the decision after each attempt.
+//! Adaptive steps: a member's own time and step, and the decision after each attempt.
 //!
 //! The increments of a step h are h times those of a step of 1. So a system is scaled once, to 1, and stretched to every step.
 
@@ -9,11 +9,11 @@ use crate::{
 };
 
 /// A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
-/// (PI control, Gustafsson 1988), held between LEAST and MOST; after a rejected step there is no p and no growth. Where the error
-/// is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
+/// (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth. Where
+/// the error is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
 const SAFETY: f64 = 0.9;
-const LEAST: f64 = 0.2;
-const MOST: f64 = 5.0;
+const MIN_FACTOR: f64 = 0.2;
+const MAX_FACTOR: f64 = 5.0;
 /// r² below this counts as this.
 const TINY_SQUARE: f64 = 1e-10 * 1e-10;
 /// The sixteenth root of the least p, 1e-4, and its thirty-second.
@@ -21,19 +21,42 @@ const CALM_ROOTS: [f64; 2] = [0.562_341_325_190_349_1, 0.749_894_209_332_455_8];
 /// The highest order of an estimate that counts as low.
 const LOW: u32 = 5;
 
-/// Where a member stands, and how it goes on.
+/// What a step moves y by, relative to the longest that y has been, is lost in rounding below this, with some room. So an error of v
+/// that moves y by less is none, however small v is: near a rest v is what rounding leaves of forces that cancel.
+const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// That part. A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of such a length: so it must
+/// be long beside the roundings of time, and short beside the motion that follows.
+const PUSHED: f64 = 1.0 / 64.0;
+
+/// Where a member stands, and how it goes on. Steps do not depend on the saved times: a step that passes the next of them is held, not
+/// taken, until the states within it are saved. Each is made by an extra step, from the start of the held one.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace<N> {
     /// Its time.
     pub t: N,
     /// The step that it will try next.
     pub h: N,
-    /// The time to reach, exactly.
+    /// The time that is asked for next.
     pub target: N,
-    /// Tolerated error, relative to the length of a block.
+    /// Above zero: the length of the extra step that comes next, to a saved time.
+    pub extra: N,
+    /// 1 if the step is known to be good that comes next and passes the target.
+    pub held: N,
+    /// Tolerated error of a step, relative to the length of a block.
     pub relative: N,
     /// Tolerated error beside the relative one.
     pub absolute: N,
+    /// 1 if the length that counts is the longest that a block has been so far, 0 if it is that of now.
+    pub lasts: N,
+    /// The squares of the longest that v and y have been so far.
+    pub longest: [N; 2],
+    /// The time of the start.
+    pub begin: N,
+    /// No step is longer than this while inputs change from sample to sample, so that none is passed over,
+    pub interval: N,
+    /// which is until then.
+    pub until: N,
     /// The sixteenth root of the last accepted error, or its thirty-second.
     pub before: N,
     /// How much the next step may grow.
@@ -42,45 +65,107 @@ pub struct Pace<N> {
     pub accepted: N,
     /// Rejected attempts.
     pub rejected: N,
+    /// Steps for saved states: the extra ones, and those that were held and are made once more.
+    pub extra_steps: N,
     /// The square of the last error over the tolerance.
     pub error: N,
 }
 
+/// What comes next: the length of the step, whether it is an extra one, and whether there is a step of the run itself to try.
+#[derive(Clone, Copy, Debug)]
+pub struct Outlook<N: Number> {
+    /// How long the step is.
+    pub step: N,
+    /// Whether it is an extra one.
+    pub is_extra: N::Truth,
+    /// Whether it is a step of the run: not at the target, not held, not out of attempts, and the time moves.
+    pub runs: N::Truth,
+}
+
 impl Pace<f64> {
-    /// At the start, with a step to try first.
-    pub fn new(t: f64, h: f64, relative: f64, absolute: f64) -> Self {
-        Pace { t, h, target: t, relative, absolute, before: 1.0, most: MOST, accepted: 0.0, rejected: 0.0, error: 0.0 }
+    /// Whether there is a step of the run to try.
+    pub fn runs(&self, budget: f64) -> bool {
+        self.outlook(budget).runs
     }
 
-    /// Whether there is anything to try: not at the target, not out of attempts, and the step still moves the time.
-    pub fn runs(&self, budget: f64) -> bool {
-        self.step_and_whether(budget).2
+    /// Whether the time that is asked for next is within the held step.
+    pub fn holds(&self) -> bool {
+        self.held > 0.0 && self.target < self.t + self.h
+    }
+
+    /// The same where nothing runs.
+    #[must_use]
+    pub fn idle(self) -> Self {
+        Pace { target: self.t, extra: 0.0, held: 0.0, ..self }
     }
 }
 
 impl<N: Number> Pace<N> {
     /// How many numbers it has.
-    pub const NUMBERS: usize = 10;
+    pub const NUMBERS: usize = 19;
 
     /// From its numbers.
-    pub fn of(numbers: [N; 10]) -> Self {
-        let [t, h, target, relative, absolute, before, most, accepted, rejected, error] = numbers;
-        Pace { t, h, target, relative, absolute, before, most, accepted, rejected, error }
+    pub fn of(numbers: [N; 19]) -> Self {
+        let [t, h, target, extra, held, relative, absolute, lasts, rest @ ..] = numbers;
+        let [v, y, begin, interval, until, before, most, accepted, rejected, extra_steps, error] = rest;
+        let longest = [v, y];
+        Pace {
+            t,
+            h,
+            target,
+            extra,
+            held,
+            relative,
+            absolute,
+            lasts,
+            longest,
+            begin,
+            interval,
+            until,
+            before,
+            most,
+            accepted,
+            rejected,
+            extra_steps,
+            error,
+        }
     }
 
     /// Its numbers.
-    pub fn numbers(&self) -> [N; 10] {
-        let Pace { t, h, target, relative, absolute, before, most, accepted, rejected, error } = *self;
-        [t, h, target, relative, absolute, before, most, accepted, rejected, error]
+    pub fn numbers(&self) -> [N; 19] {
+        let Pace { t, h, target, extra, held, relative, absolute, lasts, longest: [v, y], .. } = *self;
+        let Pace { begin, interval, until, before, most, accepted, rejected, extra_steps, error, .. } = *self;
+        [
+            t,
+            h,
+            target,
+            extra,
+            held,
+            relative,
+            absolute,
+            lasts,
+            v,
+            y,
+            begin,
+            interval,
+            until,
+            before,
+            most,
+            accepted,
+            rejected,
+            extra_steps,
+            error,
+        ]
     }
 
-    /// The step to try, whether it ends at the target, and whether there is anything to try.
-    fn step_and_whether(&self, budget: N) -> (N, N::Truth, N::Truth) {
-        let rest = self.target - self.t;
-        let last = rest.at_most(self.h);
-        let step = N::choose(last, rest, self.h);
-        let moves = self.t.below(self.t + step);
-        (step, last, self.t.below(self.target) & moves & (self.accepted + self.rejected).below(budget))
+    /// What comes next.
+    pub fn outlook(&self, budget: N) -> Outlook<N> {
+        let zero = N::of(0.0);
+        let is_extra = zero.below(self.extra);
+        let moves = self.t.below(self.t + self.h);
+        let left = (self.accepted + self.rejected).below(budget);
+        let runs = self.t.below(self.target) & moves & left & self.held.at_most(zero) & !is_extra;
+        Outlook { step: N::choose(is_extra, self.extra, self.h), is_extra, runs }
     }
 }
 
@@ -100,7 +185,8 @@ impl<N: Number> System<N> for Stretched<'_, N> {
     }
 }
 
-/// One attempt at a step: the state goes on if its error is tolerated. `order` is that of the estimate.
+/// One attempt at a step: the state goes on if its error is tolerated. `order` is that of the estimate. An extra step leaves
+/// the pace as it is, and its state has to be put back.
 pub fn attempt<N: Number>(
     program: &Program,
     s: &dyn System<N>,
@@ -110,59 +196,62 @@ pub fn attempt<N: Number>(
     v: &Block<N>,
     y: &Block<N>,
 ) -> (Pace<N>, Block<N>, Block<N>) {
-    let (step, last, runs) = pace.step_and_whether(budget);
-    let made = program.run(&Stretched { s, h: step }, pace.t, step, v, y);
+    let outlook = pace.outlook(budget);
+    let made = program.run(&Stretched { s, h: outlook.step }, pace.t, outlook.step, v, y);
     let lengths: Vec<N> = made.iter().map(length2).collect();
-    let (next, took) = judge(&pace, order, [length2(v), length2(y)], &lengths, (step, last, runs));
+    let (next, took) = judge(&pace, order, [length2(v), length2(y)], &lengths, outlook);
     let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
     (next, goes_on(&made[0], v), goes_on(&made[1], y))
 }
 
 /// What comes after an attempt, and whether the state goes on. Of both blocks: squares of the lengths of the old state and of what was made,
 /// the new state and one or two estimates of its error.
-pub fn judge<N: Number>(
-    pace: &Pace<N>,
-    order: u32,
-    old: [N; 2],
-    made: &[N],
-    outlook: (N, N::Truth, N::Truth),
-) -> (Pace<N>, N::Truth) {
-    let error = Error { new: [made[0], made[1]], old, estimates: &made[2..] };
-    pace.decided(order > LOW, error.over_tolerance(pace), outlook)
+pub fn judge<N: Number>(pace: &Pace<N>, order: u32, old: [N; 2], made: &[N], outlook: Outlook<N>) -> (Pace<N>, N::Truth) {
+    let new = [made[0], made[1]];
+    let r2 = over_tolerance(&made[2..], pace.tolerated(outlook.step, old, new));
+    pace.decided(order > LOW, r2, new, outlook)
 }
 
-/// Squares of lengths of both blocks: of the state after the step and before it, and of one or two estimates of the error.
-pub struct Error<'a, N> {
-    /// Of the state after the step.
-    pub new: [N; 2],
-    /// Of the state before it.
-    pub old: [N; 2],
-    /// Of the estimates.
-    pub estimates: &'a [N],
-}
-
-impl<N: Number> Error<'_, N> {
-    /// The square of the error over what is tolerated.
-    pub fn over_tolerance(&self, pace: &Pace<N>) -> N {
-        let allowed = |old: N, new: N| {
-            let length = pace.absolute + pace.relative * N::choose(new.below(old), old, new).sqrt();
-            length * length
-        };
-        let tolerated = [allowed(self.old[0], self.new[0]), allowed(self.old[1], self.new[1])];
-        let over = |estimate: &[N]| estimate[0] / tolerated[0] + estimate[1] / tolerated[1];
-        let r2 = over(&self.estimates[..2]);
-        if self.estimates.len() < 4 {
-            return r2;
-        }
-        let corrected = (r2 * r2) / (r2 + N::of(0.01) * over(&self.estimates[2..]));
-        N::choose(N::of(0.0).below(r2), corrected, r2)
+/// The square of the error over what is tolerated, from squares of lengths of one or two estimates of both blocks.
+fn over_tolerance<N: Number>(estimates: &[N], tolerated: [N; 2]) -> N {
+    let zero = N::of(0.0);
+    // A block that is zero, as it has always been, tolerates no error and has none.
+    let share = |error: N, tolerated: N| N::choose(error.at_most(zero), zero, error / tolerated);
+    let over = |estimate: &[N]| share(estimate[0], tolerated[0]) + share(estimate[1], tolerated[1]);
+    let r2 = over(&estimates[..2]);
+    if estimates.len() < 4 {
+        return r2;
     }
+    let corrected = (r2 * r2) / (r2 + N::of(0.01) * over(&estimates[2..]));
+    N::choose(zero.below(r2), corrected, r2)
 }
 
 impl<N: Number> Pace<N> {
-    /// What comes after an attempt with this error, and whether the state goes on. `high`: the estimate is of a high order.
-    pub fn decided(&self, high: bool, r2: N, (step, last, runs): (N, N::Truth, N::Truth)) -> (Pace<N>, N::Truth) {
+    /// Squares of the errors that are tolerated in both blocks, from squares of their lengths before and after a step.
+    fn tolerated(&self, step: N, old: [N; 2], new: [N; 2]) -> [N; 2] {
+        let zero = N::of(0.0);
+        let longer = |a: N, b: N| N::choose(a.below(b), b, a);
+        // What has been at zero so far and is pushed now is as long as the push would have made it in a part of the time since.
+        let since = N::of(PUSHED) * ((self.t + step - self.begin) / step);
+        let since2 = longer(N::of(1.0), since * since);
+        let rested = (self.longest[0] + self.longest[1]).at_most(zero);
+        let lasting = |i: usize| N::choose(rested, new[i] * since2, self.longest[i]);
+        let lost = N::of(ROUNDING) / step;
+        let lasting = [longer(lasting(0), self.longest[1] * (lost * lost)), lasting(1)];
+        [0, 1].map(|i| {
+            let counts = N::choose(zero.below(self.lasts), lasting[i], old[i]);
+            let length = self.absolute + self.relative * longer(counts, new[i]).sqrt();
+            length * length
+        })
+    }
+
+    /// What comes after an attempt with this error, and whether the state goes on. `high`: the estimate is of a high order. `new`: squares
+    /// of the lengths of the new blocks.
+    fn decided(&self, high: bool, r2: N, new: [N; 2], outlook: Outlook<N>) -> (Pace<N>, N::Truth) {
         let number = N::of;
+        let Outlook { step, is_extra, runs } = outlook;
+        // Lengths whose squares overflow tolerate anything, so they count as not finite.
+        let r2 = N::choose((new[0] + new[1]).below(number(f64::INFINITY)), r2, number(f64::INFINITY));
         let good = r2.at_most(number(1.0)); // NaN is not
         let floored = N::choose(number(TINY_SQUARE).below(r2), r2, number(TINY_SQUARE));
         let r16 = floored.sqrt().sqrt().sqrt().sqrt(); // the eighth root of r
@@ -170,34 +259,36 @@ impl<N: Number> Pace<N> {
         let r64 = r32.sqrt();
         let factor = number(SAFETY) / (if high { r32 } else { r16 } * r64);
         let factor = N::choose(good, factor * self.before, factor);
-        let factor = N::choose(number(LEAST).below(factor), factor, number(LEAST));
+        let factor = N::choose(number(MIN_FACTOR).below(factor), factor, number(MIN_FACTOR));
         let ceiling = N::choose(good, self.most, number(1.0));
         let factor = N::choose(factor.below(ceiling), factor, ceiling);
-        let factor = N::choose(r2.below(number(f64::INFINITY)), factor, number(LEAST));
-        let grown = step * factor;
-        // A step that was cut to end at the target says little: what was meant before it stands.
-        let grown = N::choose(good & last & grown.below(self.h), self.h, grown);
-        let took = runs & good;
-        let reached = N::choose(last, self.target, self.t + step);
+        let factor = N::choose(r2.below(number(f64::INFINITY)), factor, number(MIN_FACTOR));
+        let reached = self.t + step;
+        let passes = self.target.below(reached);
+        let (takes, holds, fails) = (runs & good & !passes, runs & good & passes, runs & !good);
+        let decides = takes | fails;
         let (root, calm) = if high { (r64, CALM_ROOTS[1]) } else { (r32, CALM_ROOTS[0]) };
         let root = N::choose(number(calm).below(root), root, number(calm));
         let count = |truth: N::Truth| N::choose(truth, number(1.0), number(0.0));
+        let longest = |i: usize| N::choose(takes & self.longest[i].below(new[i]), new[i], self.longest[i]);
+        let t = N::choose(takes, reached, self.t);
+        let grown = step * factor;
+        let grown = N::choose(t.below(self.until) & self.interval.below(grown), self.interval, grown);
         let next = Pace {
-            t: N::choose(took, reached, self.t),
-            h: N::choose(runs, grown, self.h),
-            before: N::choose(took, root, self.before),
-            most: N::choose(runs, N::choose(good, number(MOST), number(1.0)), self.most),
-            accepted: self.accepted + count(took),
-            rejected: self.rejected + count(runs & !good),
-            error: N::choose(runs, r2, self.error),
+            t,
+            h: N::choose(decides, grown, self.h),
+            extra: N::choose(is_extra, number(0.0), self.extra),
+            held: N::choose(holds, number(1.0), self.held),
+            longest: [longest(0), longest(1)],
+            before: N::choose(takes, root, self.before),
+            most: N::choose(decides, N::choose(good, number(MAX_FACTOR), number(1.0)), self.most),
+            accepted: self.accepted + count(takes),
+            rejected: self.rejected + count(fails),
+            extra_steps: self.extra_steps + count(holds | is_extra),
+            error: N::choose(decides, r2, self.error),
             ..*self
         };
-        (next, took)
-    }
-
-    /// The step to try next, whether it ends at the target, and whether there is anything to try.
-    pub fn outlook(&self, budget: N) -> (N, N::Truth, N::Truth) {
-        self.step_and_whether(budget)
+        (next, takes | is_extra)
     }
 }
 

@@ -48,8 +48,8 @@ pub trait System<N: Number> {
         None
     }
 
-    /// The state after a step, corrected: projections onto what should be constant.
-    fn settle(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+    /// The state after a step, projected onto what should be constant.
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
         (v, y)
     }
 

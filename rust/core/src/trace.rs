@@ -18,7 +18,7 @@ use crate::{
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
     systems::linear::products,
-    tape::{Counts, Id, Op, Tape, split::split},
+    tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
 };
 
 /// What makes a step.
@@ -31,7 +31,7 @@ pub enum How {
         /// Which of its ways to start.
         choice: usize,
     },
-    /// Attempts at steps of chosen length by a method.
+    /// Attempts at adaptive steps by a method.
     Attempts {
         /// The method's name.
         name: String,
@@ -52,6 +52,8 @@ pub struct Scene {
     pub how: How,
     /// Quantities that are recorded beside states.
     pub record: Vec<String>,
+    /// Whether steps are computed with fused multiply-adds: see [`fuse`]. What is recorded is not.
+    pub fused: bool,
 }
 
 /// The tapes of a scene.
@@ -64,7 +66,7 @@ pub struct Tapes {
     pub finish: Option<Stage>,
     /// The recorded numbers, behind v and y.
     pub record: Option<Stage>,
-    /// Operations of a step as the document writes them.
+    /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
 }
 
@@ -188,7 +190,7 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
     let s = system(kind, &parameters(given, h), Symbol::new(Op::State((shape.v + shape.y) as u32)));
     let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
     let (v, y) = (made.next().unwrap_or(v), made.next().unwrap_or(y));
-    let (v, y) = s.settle(v, y);
+    let (v, y) = s.project(v, y);
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));
@@ -302,6 +304,9 @@ impl Scene {
         Cache::find(CACHE.get_or_init(Mutex::default), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
+            if self.fused && operations.1 > STRAIGHT {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: STRAIGHT });
+            }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
                 (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
@@ -324,7 +329,20 @@ impl Scene {
     }
 }
 
+/// Operations of a step that take longer than a user who wants to stop should wait, or nearly so.
+const LONG_STEP: usize = 1 << 24;
+
 impl Traced {
+    /// Whether a step of so many members may take long.
+    pub fn is_long(&self, members: usize) -> bool {
+        self.operations.1.saturating_mul(members) >= LONG_STEP
+    }
+
+    /// How many steps of so many members have that many operations; one or more.
+    pub fn steps_of(&self, members: usize, operations: usize) -> i64 {
+        (operations / self.operations.1.saturating_mul(members).max(1)).max(1) as i64
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -371,6 +389,7 @@ impl Scene {
     /// Traces all that a run needs, anew.
     pub fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
+        let fused = |tape: Tape, next: &[Id]| if self.fused { fuse(&tape, next) } else { tape };
         let mut start = None;
         let mut finish = None;
         if let How::Method { name, choice } = &self.how {
@@ -378,7 +397,7 @@ impl Scene {
             for (stage, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
                     let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
-                    *stage = Some(cut(&self.given, &(tape, next)));
+                    *stage = Some(cut(&self.given, &(fused(tape, &next), next)));
                 }
             }
         }
@@ -386,13 +405,14 @@ impl Scene {
         if !self.record.is_empty() {
             quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
         }
-        let written = steps.tape.written();
-        Ok(Tapes { step: cut(&self.given, &(steps.tape, steps.next)), start, finish, record: quantities, written })
+        let written = steps.tape.written(steps.next.iter().copied());
+        let step = cut(&self.given, &(fused(steps.tape, &steps.next), steps.next));
+        Ok(Tapes { step, start, finish, record: quantities, written })
     }
 }
 
-/// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each vector
-/// that goes abreast, as machine code. When something new would pass it, what was there is forgotten.
+/// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each
+/// interleaved vector, as machine code. When something new would pass it, what was there is forgotten.
 const MOST_OPERATIONS: usize = 200_000;
 
 /// Rates, by the system and what is recorded of it: methods have them in common.

@@ -99,20 +99,20 @@ fn arithmetic(body: &Body) -> usize {
 }
 
 const ONE: Row = Row(&[0.7]);
-const OWN: Row = Row(&[0.5, 0.6, 0.7]);
+const PER_MEMBER: Row = Row(&[0.5, 0.6, 0.7]);
 
 fn sine(amplitude: Row<'static>) -> [(&'static str, Vec<Row<'static>>); 3] {
     [("a.amplitude", vec![amplitude]), ("a.omega", vec![ONE]), ("a.phase", vec![ONE])]
 }
 
 fn oscillator(method: &str) -> Model<'static> {
-    oscillators(OWN.0, method)
+    oscillators(PER_MEMBER.0, method)
 }
 
 /// With samples of their own.
 fn held(method: &str) -> Model<'static> {
-    let tables = vec![("x", Table { samples: vec![OWN; 5], start: 0.0, interval: 0.1 })];
-    let (words, rows) = ([("form", "canonical")], [("omega", vec![OWN])]);
+    let tables = vec![("x", Table { samples: vec![PER_MEMBER; 5], start: 0.0, interval: 0.1 })];
+    let (words, rows) = ([("form", "canonical")], [("omega", vec![PER_MEMBER])]);
     model(spec("oscillator", Of { words: &words, rows: &rows, tables, ..Of::default() }), method)
 }
 
@@ -120,18 +120,18 @@ fn held(method: &str) -> Model<'static> {
 fn pendulum(method: &str, driven: bool) -> Model<'static> {
     let mut rows = vec![("omega", vec![ONE]), ("damping", vec![ONE])];
     if driven {
-        rows.extend(sine(OWN));
+        rows.extend(sine(PER_MEMBER));
     }
     model(spec("pendulum", Of { rows: &rows, ..Of::default() }), method)
 }
 
 fn three_bodies(method: &str) -> Model<'static> {
-    let rows = [("masses", vec![OWN; 3]), ("strength", vec![OWN; 3]), ("softening", vec![ONE])];
+    let rows = [("masses", vec![PER_MEMBER; 3]), ("strength", vec![PER_MEMBER; 3]), ("softening", vec![ONE])];
     model(spec("nbody", Of { words: &[("force", "newton")], wholes: &[("dim", 3)], rows: &rows, ..Of::default() }), method)
 }
 
 fn chain(method: &str) -> Model<'static> {
-    model(spec("chain", Of { rows: &[("stiffness", vec![ONE; 5]), ("mass", vec![OWN; 4])], ..Of::default() }), method)
+    model(spec("chain", Of { rows: &[("stiffness", vec![ONE; 5]), ("mass", vec![PER_MEMBER; 4])], ..Of::default() }), method)
 }
 
 fn linear(method: &str) -> Model<'static> {
@@ -147,9 +147,9 @@ fn levels() -> impl Iterator<Item = Level> {
     [Level::Avx2, Level::Avx512].into_iter().filter(|level| level.here())
 }
 
-/// A lone member, a vector of them, very many.
+/// A single member, a vector of them, very many.
 const MEMBERS: [usize; 3] = [1, 8, usize::MAX];
-const MANY: usize = usize::MAX;
+const UNLIMITED: usize = usize::MAX;
 
 fn tapes(model: &Model) -> Arc<Tapes> {
     model.traced().unwrap().tapes().unwrap()
@@ -171,7 +171,7 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
         let mut models = vec![oscillator(name), held(name), pendulum(name, true), three_bodies(name), chain(name), linear(name)];
         models.push(restricted(name));
         if method.estimate.is_some() {
-            // Steps of chosen length.
+            // Adaptive steps.
             let attempts = |model: Model<'static>| {
                 let how = How::Attempts { name: name.to_owned() };
                 Model { scene: Scene { how, ..model.scene }, ..model }
@@ -185,7 +185,7 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
             for (level, members) in levels().flat_map(|level| MEMBERS.map(|members| (level, members))) {
                 let (shape, turn, arithmetic) = written(&model, level, members);
                 let what = (turn.arithmetic, turn.narrower);
-                assert_eq!(what, (shape.abreast * arithmetic, 0), "{:?}, {shape:?}: {turn:?}", model.scene);
+                assert_eq!(what, (shape.block_vectors * arithmetic, 0), "{:?}, {shape:?}: {turn:?}", model.scene);
                 seen += 1;
             }
         }
@@ -198,12 +198,12 @@ fn oscillators_by_false_euler_are_four_instructions_a_vector() {
     for level in levels() {
         for members in MEMBERS {
             let (shape, turn, arithmetic) = written(&oscillator("false_euler"), level, members);
-            assert!(arithmetic == 4 && turn.arithmetic == 4 * shape.abreast && turn.spilled == 0, "{shape:?}: {turn:?}");
+            assert!(arithmetic == 4 && turn.arithmetic == 4 * shape.block_vectors && turn.spilled == 0, "{shape:?}: {turn:?}");
             // The state is in registers, if there are enough of them: 40 of its numbers are not in the 16 of AVX2.
-            let in_memory = if level == Level::Avx2 && members == MANY { 2 * shape.abreast } else { 0 };
+            let in_memory = if level == Level::Avx2 && members == UNLIMITED { 2 * shape.block_vectors } else { 0 };
             assert!(turn.state_read <= in_memory && turn.state_written <= in_memory, "{shape:?}: {turn:?}");
             // Beside them only the count of steps, and what brings the factor.
-            let beside = if in_memory > 0 { 5 * shape.abreast } else { 2 + shape.abreast };
+            let beside = if in_memory > 0 { 5 * shape.block_vectors } else { 2 + shape.block_vectors };
             assert!(turn.all <= turn.arithmetic + beside, "{shape:?}: {turn:?}");
         }
     }
@@ -226,7 +226,7 @@ fn few_members_spill_nothing_where_there_are_32_registers() {
 
 /// What a kernel of many members does beside its arithmetic, in percent of it: all instructions, and what is spilled.
 fn beside(model: &Model, level: Level) -> (usize, usize) {
-    let (_, turn, _) = written(model, level, MANY);
+    let (_, turn, _) = written(model, level, UNLIMITED);
     (100 * (turn.all - turn.arithmetic) / turn.arithmetic, 100 * turn.spilled / turn.arithmetic)
 }
 
@@ -248,13 +248,15 @@ fn arithmetic_is_most_of_what_many_members_do() {
 }
 
 #[test]
-fn a_state_that_streams_is_read_and_written_once_a_step() {
+fn a_state_that_streams_is_written_once_a_step() {
     if Level::Avx512.here() {
         for model in [oscillator("standard_heun"), pendulum("rk4", true), three_bodies("leapfrog")] {
-            let (shape, turn, _) = written(&model, Level::Avx512, MANY);
+            let (shape, turn, _) = written(&model, Level::Avx512, UNLIMITED);
             let traced = model.traced().unwrap();
-            let numbers = shape.abreast * (traced.shape.v + traced.shape.y);
-            assert_eq!(turn.state_written, numbers, "{:?}, {shape:?}: {turn:?}", model.scene);
+            let numbers = shape.block_vectors * (traced.shape.v + traced.shape.y);
+            // Where the state is resident as far as there are registers, some of it is not written at all.
+            let is_once = turn.state_written == numbers || shape.resident && turn.state_written < numbers;
+            assert!(is_once, "{:?}, {shape:?}: {turn:?}", model.scene);
         }
     }
 }
@@ -278,7 +280,7 @@ fn kernels_are_a_few_kilobytes() {
         for level in levels() {
             let tapes = tapes(&model);
             let body = &tapes.step.split.body;
-            let code = write(body, choose(body, level, MANY).unwrap()).unwrap().code().len();
+            let code = write(body, choose(body, level, UNLIMITED).unwrap()).unwrap().code().len();
             assert!(code < 32 << 10, "{:?}, {level:?}: {code}", model.scene);
         }
     }

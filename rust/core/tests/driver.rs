@@ -12,7 +12,7 @@ use stepwell_core::{
     run::{
         Machine, Model,
         batch::{Arrays, Plan, run, saves},
-        stage::{Clock, Loaded, Stage},
+        stage::{Clock, PreparedStage, Stage},
         world::World,
     },
     spec::{Row, Spec, Table},
@@ -71,7 +71,7 @@ fn every_method_is_the_same_for_every_number_of_threads() {
 
 #[test]
 fn a_batch_of_any_size_is_its_members() {
-    // Tiles of some vectors abreast, narrow ones of one vector, and lone members, one or several after another: sizes on both sides of
+    // Tiles of several interleaved vectors, narrow ones of one vector, and single members, one or several after another: sizes around
     // each.
     let omega: Vec<f64> = (0..385).map(|i| 0.5 + f64::from(i) / 200.0).collect();
     let pendulums = |members: usize| {
@@ -212,13 +212,13 @@ fn found(rows: &[Vec<f64>], h: f64, own: bool, t0: f64, steps: std::ops::RangeIn
     let table = Table { samples: rows.iter().map(|row| Row(row)).collect(), start: 0.0, interval: h };
     let spec = Spec { tables: vec![table], ..Spec::default() };
     let (stage, clock) = (sampled(rows[0].len() == 1, own), Clock { t0, h });
-    let mut loaded = Loaded::new(&stage, &spec, Level::Baseline, 8, &clock, 0.0);
-    assert_eq!(loaded.lanes(), LANES);
-    loaded.prepare(&stage, &spec, 0, LANES);
+    let mut prepared = PreparedStage::new(&stage, &spec, Level::Baseline, 8, &clock, 0.0);
+    assert_eq!(prepared.lanes(), LANES);
+    prepared.prepare(&stage, &spec, 0, LANES);
     let step = |k: i64| {
         let mut state = vec![-1.0; LANES];
         state.extend(vec![clock.at(k); if own { LANES } else { 0 }]);
-        loaded.advance(&stage, &clock, k, 1, &mut state);
+        prepared.advance(&stage, &clock, k, 1, &mut state);
         (k, state[..LANES].to_vec())
     };
     steps.map(step).collect()

@@ -7,19 +7,19 @@ use stepwell_core::{
     isa::Level,
     large::{
         Asked, Facts, Rates,
+        adaptive::LargeAdaptive,
         course::{Act, Course, Goal},
         group::LargeGroup,
-        lone,
         matrix::Matrix,
-        paced::LargePaced,
+        single,
         tapes::TapeRates,
     },
     method,
     pace::Pace,
     run::{
         Machine,
+        adaptive::{AdaptiveBatch, AdaptiveLanes},
         group::{Group, Lanes},
-        paced::{Paced, PacedLanes},
         stage::Clock,
     },
     spec::{Given, Row, Spec, Table},
@@ -128,7 +128,7 @@ fn made(group: &mut dyn Group, spec: &Spec, member: usize, count: usize, state: 
 fn scene(given: &Given, how: How) -> Scene {
     let kind = system::kind(&given.system).unwrap();
     let record = if matches!(how, How::Method { .. }) { (kind.quantities)(given) } else { Vec::new() };
-    Scene { given: given.clone(), how, record: record.into_iter().map(|(name, _)| name.to_owned()).collect() }
+    Scene { given: given.clone(), how, record: record.into_iter().map(|(name, _)| name.to_owned()).collect(), fused: false }
 }
 
 /// Panics unless the rows of several members are those of their own runs.
@@ -180,7 +180,7 @@ fn a_program_over_rows_is_its_tape() {
                     for threads in [1, 2] {
                         let machine = Machine { level, threads };
                         let asked = Asked { given: &given, shape: traced.shape, record: &scene.record, machine, h: CLOCK.h };
-                        let mut group = large(lone(long, &asked));
+                        let mut group = large(single(long, &asked));
                         for (i, of_one) in of_each.iter().enumerate() {
                             assert_eq!(&made(&mut group, &spec, 2 + i, 1, &state), of_one, "kernel, {what}, member {i}");
                         }
@@ -208,7 +208,7 @@ fn every_level_makes_the_same_of_a_large_member() {
         let of_level = |level: Level| {
             let machine = Machine { level, threads: 1 };
             let asked = Asked { given: &given, shape: traced.shape, record: &scene.record, machine, h: CLOCK.h };
-            let rates = lone(system::kind(&given.system).unwrap().long.unwrap(), &asked);
+            let rates = single(system::kind(&given.system).unwrap().long.unwrap(), &asked);
             let courses = traced.courses(rates.facts()).unwrap();
             made(&mut LargeGroup::new(courses, rates, traced.shape, traced.recorded, level, &CLOCK), &spec, 3, 1, &state)
         };
@@ -230,29 +230,35 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
             let traced = scene.traced().unwrap();
             let (level, shape) = (Level::choose().unwrap(), traced.shape);
             let state = numbers(shape.v + shape.y, 98);
-            let run = |paced: &mut dyn Paced| {
+            let run = |adaptive: &mut dyn AdaptiveBatch| {
                 let mut seen = Vec::new();
                 for member in [4, 11] {
-                    paced.prepare_lane(&spec, 0, member);
-                    paced.sit(0, &state);
-                    paced.set_pace(0, Pace { target: 0.9, ..Pace::new(0.3, 0.2, 1e-6, 1e-9) });
-                    for attempts in [1, 1, 40] {
-                        paced.attempt(attempts);
-                        let numbers = [paced.state(0), paced.pace(0).numbers().to_vec()].concat();
+                    adaptive.prepare_lane(&spec, 0, member);
+                    adaptive.set_state(0, &state);
+                    let new = Pace::of([0.0; Pace::<f64>::NUMBERS]);
+                    let (t, interval, until) = (0.3, f64::INFINITY, f64::NEG_INFINITY);
+                    let begun = Pace { t, begin: t, h: 0.2, interval, until, relative: 1e-6, before: 1.0, most: 5.0, ..new };
+                    let lasts = f64::from(u8::from(member == 4));
+                    adaptive.set_pace(0, Pace { target: 0.9, lasts, absolute: 1e-9 * (1.0 - lasts), ..begun });
+                    // Along the path, and then a step beside it, wherever that has come to.
+                    for (attempts, extra) in [(1, 0.0), (1, 0.0), (40, 0.0), (1, 0.01)] {
+                        adaptive.set_pace(0, Pace { extra, ..adaptive.pace(0) });
+                        adaptive.attempt(attempts);
+                        let numbers = [adaptive.state(0), adaptive.pace(0).numbers().to_vec()].concat();
                         seen.push(numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>());
                     }
                 }
                 seen
             };
-            let of_tape = run(&mut PacedLanes::new(&traced, &spec, level, 1, 30.0).unwrap());
+            let of_tape = run(&mut AdaptiveLanes::new(&traced, &spec, level, 1, 30.0).unwrap());
             let clock = Clock { t0: 0.0, h: 1.0 };
             let mut rates: Vec<Box<dyn Rates>> = vec![Box::new(TapeRates::new(traced.rated().unwrap(), &spec, level, 1, &clock))];
             let machine = Machine { level, threads: 1 };
             let asked = Asked { given: &given, shape, record: &[], machine, h: 1.0 };
-            rates.extend(system::kind(&given.system).unwrap().long.map(|long| lone(long, &asked)));
+            rates.extend(system::kind(&given.system).unwrap().long.map(|long| single(long, &asked)));
             for (kind, rates) in rates.into_iter().enumerate() {
                 let courses = traced.courses(rates.facts()).unwrap();
-                let mut large = LargePaced::new(courses, rates, &traced, level, 30.0).unwrap();
+                let mut large = LargeAdaptive::new(courses, rates, &traced, level, 30.0).unwrap();
                 assert_eq!(run(&mut large), of_tape, "{} on {given:?}, rates {kind}", record.name);
             }
         }
@@ -276,7 +282,7 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
         given.rows.retain(|(_, rows)| !rows.is_empty());
         let parameters = numbers(13 * (given.parameters() + 9), n as u64);
         let spec = spec(&given, &parameters, 13);
-        let traced = Scene { given, how: how.clone(), record: Vec::new() }.traced().unwrap();
+        let traced = Scene { given, how: how.clone(), record: Vec::new(), fused: false }.traced().unwrap();
         let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
         let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
         let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();

@@ -139,7 +139,7 @@ fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Sha
     let system = controls::wrap(p, make(p), tally);
     let (v, y) = state.split_at(shape.v);
     let next = method.program().run(&*system, t, p.h, &DVector::from_column_slice(v), &DVector::from_column_slice(y));
-    let (v, y) = system.settle(next[0].clone(), next[1].clone());
+    let (v, y) = system.project(next[0].clone(), next[1].clone());
     v.iter().chain(&y).copied().chain(system.tally()).collect()
 }
 

@@ -4,24 +4,28 @@ mod model;
 mod tape;
 mod world;
 
-use numpy::{PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
     isa::Level,
     method::{Fact, Record},
+    program::{Entry, Program},
     run::{
         Machine,
         batch::{self, Arrays, Plan},
         chosen,
         stage::Clock,
     },
-    spec::Row,
     steppers, systems as kinds,
-    tape::Counts,
+    tape::{
+        Counts,
+        split::{self, Body, Split},
+    },
 };
 
 use model::{ModelSpec, by_row, core_error};
+use tape::{Operation, operation};
 
 /// Everything that a method says of itself.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
@@ -116,59 +120,56 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
         carry: arrays.carry.as_slice_mut()?,
         first_bad: arrays.first_bad.as_slice_mut()?,
     };
-    detached(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))
+    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))
 }
 
-/// Where to be when, and how exactly: see `Pacing` in `engine.py`.
+/// When the state is asked for, and how long to try: see `Pacing` in `engine.py`.
 #[derive(FromPyObject)]
 struct PacingOf<'py> {
-    at: Vec<f64>,
-    first: PyReadonlyArray2<'py, f64>,
-    relative: PyReadonlyArray2<'py, f64>,
-    absolute: PyReadonlyArray2<'py, f64>,
+    at: PyReadonlyArray1<'py, f64>,
     budget: i64,
 }
 
-/// What a run with a tolerance begins with and what it fills: see `PacedArrays` in `engine.py`.
+/// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `engine.py`.
 #[derive(FromPyObject)]
-struct PacedArraysOf<'py> {
+struct AdaptiveArraysOf<'py> {
     v: PyReadonlyArray2<'py, f64>,
     y: PyReadonlyArray2<'py, f64>,
+    paces: PyReadonlyArray2<'py, f64>,
     saved_v: PyReadwriteArrayDyn<'py, f64>,
     saved_y: PyReadwriteArrayDyn<'py, f64>,
-    reached: PyReadwriteArray2<'py, f64>,
-    counts: PyReadwriteArray2<'py, i64>,
+    last_state: PyReadwriteArray2<'py, f64>,
+    last_paces: PyReadwriteArray2<'py, f64>,
+    status: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run of steps of chosen length from the rows of `v` and `y`, and fills what is kept at the times of the pacing.
+/// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing.
 #[pyfunction]
-fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf<'_>, mut arrays: PacedArraysOf<'_>) -> PyResult<()> {
+fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<()> {
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
-        t0: plan.t0,
-        at: &pacing.at,
-        first: Row(pacing.first.as_slice()?),
-        relative: Row(pacing.relative.as_slice()?),
-        absolute: Row(pacing.absolute.as_slice()?),
+        at: pacing.at.as_slice()?,
+        paces: by_row(&arrays.paces)?,
         budget: pacing.budget,
         v: by_row(&arrays.v)?,
         y: by_row(&arrays.y)?,
-        members: arrays.counts.as_array().ncols(),
+        members: arrays.status.as_array().len(),
     };
     let to_fill = chosen::Arrays {
         saved_v: arrays.saved_v.as_slice_mut()?,
         saved_y: arrays.saved_y.as_slice_mut()?,
-        reached: arrays.reached.as_slice_mut()?,
-        counts: arrays.counts.as_slice_mut()?,
+        state: arrays.last_state.as_slice_mut()?,
+        paces: arrays.last_paces.as_slice_mut()?,
+        status: arrays.status.as_slice_mut()?,
     };
-    detached(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
+    interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
 /// Runs without the GIL, tells how far it is and hears Ctrl-C.
-fn detached(
+fn interruptible(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
     run: impl FnOnce(&mut dyn FnMut(f64) -> bool) -> Result<(), Error> + Send,
@@ -196,15 +197,82 @@ fn detached(
 }
 
 /// A number of operations of each kind.
-fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, PyDict>> {
+pub fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
     d.set_item("additions", counts.additions)?;
     d.set_item("multiplications", counts.multiplications)?;
+    d.set_item("fused", counts.fused)?;
     d.set_item("divisions", counts.divisions)?;
     d.set_item("square_roots", counts.square_roots)?;
     d.set_item("choices", counts.choices)?;
     d.set_item("bits", counts.bits)?;
     Ok(d)
+}
+
+/// A body's operations, and the places of what comes of them.
+fn body_of(body: &Body) -> (Vec<Operation>, Vec<usize>) {
+    let operations = body.ops.iter().map(|op| operation(*op, |operand| operand as usize)).collect();
+    (operations, body.next.iter().map(|id| *id as usize).collect())
+}
+
+/// A cut tape: see `compiled` in `_core.pyi`.
+fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>> {
+    let given = |given: &split::Given| match *given {
+        split::Given::Step => ("step", 0),
+        split::Given::Param(i) => ("parameter", i),
+        split::Given::Start(table) => ("start", table),
+        split::Given::Interval(table) => ("interval", table),
+        split::Given::Last(table) => ("last", table),
+        split::Given::First(table) => ("first", table),
+        split::Given::Lanes => ("lanes", 0),
+    };
+    let entry = |entry: &split::Entry| match *entry {
+        split::Entry::Value => ("value", 0),
+        split::Entry::Sample(table) => ("sample", table),
+        split::Entry::Row(table) => ("row", table),
+    };
+    let d = PyDict::new(py);
+    d.set_item("given", split.given.iter().map(given).collect::<Vec<_>>())?;
+    d.set_item("params", &split.params)?;
+    d.set_item("entries", split.entries.iter().map(entry).collect::<Vec<_>>())?;
+    for (name, body) in [("run", &split.run), ("member", &split.member), ("step", &split.step), ("body", &split.body)] {
+        d.set_item(name, body_of(body))?;
+    }
+    Ok(d)
+}
+
+/// A name, the places of operands, and a time or a factor.
+type BlockOperation = (&'static str, Vec<usize>, f64);
+
+/// What a method does to blocks: names, operands, times or factors, and the places of the results; see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (method, *, attempts=false))]
+fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
+    let record =
+        stepwell_core::method::record(method).ok_or_else(|| model::argument_error(format!("method: there is no {method:?}")))?;
+    let made = if attempts { record.attempt() } else { Some(record.program()) };
+    let Program { entries, results } = made.ok_or_else(|| core_error(Error::NoEstimate))?;
+    let entry = |entry: &Entry| {
+        let (name, number) = match *entry {
+            Entry::V => ("v", 0.0),
+            Entry::Y => ("y", 0.0),
+            Entry::Dv(t, ..) => ("dv", t.node()),
+            Entry::Dy(t, ..) => ("dy", t.node()),
+            Entry::Velocity(_) => ("velocity", 0.0),
+            Entry::Add(..) => ("add", 0.0),
+            Entry::Sub(..) => ("subtract", 0.0),
+            Entry::Scale(by, _) => ("scale", by),
+        };
+        (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
+    };
+    Ok((entries.iter().map(entry).collect(), results.into_iter().map(|block| block.index()).collect()))
+}
+
+/// Raises if a model cannot be stepped so.
+#[pyfunction]
+fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
 }
 
 /// What a step becomes, traced and compiled anew for so many members: see `_core.pyi`.
@@ -224,6 +292,18 @@ fn compiled<'py>(
     let Some(made) = made else { return Ok(None) };
     let d = PyDict::new(py);
     d.set_item("level", level.name())?;
+    d.set_item("split", split_of(py, &made.split)?)?;
+    match made.layout {
+        Ok(layout) => {
+            d.set_item("interpreted", py.None())?;
+            d.set_item("width", layout.width)?;
+            d.set_item("block_vectors", layout.block_vectors)?;
+            d.set_item("blocks", layout.blocks)?;
+            d.set_item("resident", layout.resident)?;
+            d.set_item("registers", layout.registers)?;
+        }
+        Err(why) => d.set_item("interpreted", why.name())?,
+    }
     d.set_item("written", kinds_of(py, &made.written)?)?;
     d.set_item("computed", kinds_of(py, &made.computed)?)?;
     let [run, member, step] = made.before;
@@ -238,6 +318,22 @@ fn compiled<'py>(
     Ok(Some(d))
 }
 
+/// By what a step is made that is too long for one tape; None if it is one: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, members, *, choice=0, attempts=false))]
+fn in_parts(
+    py: Python<'_>,
+    model: &ModelSpec,
+    members: usize,
+    choice: usize,
+    attempts: bool,
+) -> PyResult<Option<(&'static str, usize, usize)>> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let level = Level::choose().map_err(|unknown| core_error(unknown.into()))?;
+    let how = if attempts { model.attempts() } else { model.started(choice) };
+    model.model(how, &rows, &tables)?.in_parts(Machine { level, threads: 1 }, members, attempts).map_err(core_error)
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -247,7 +343,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
+    m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
+    m.add_function(wrap_pyfunction!(in_parts, m)?)?;
+    m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;

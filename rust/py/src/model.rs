@@ -1,7 +1,10 @@
 //! What to step: names, parameters and tables that stay Python's.
 
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pyo3::{prelude::*, types::PyType};
+use pyo3::{
+    prelude::*,
+    types::{PyString, PyTuple, PyType},
+};
 use stepwell_core::{
     error::Error,
     run::Model,
@@ -9,9 +12,14 @@ use stepwell_core::{
     trace::{How, Scene},
 };
 
-/// A message as the package's own error.
+/// A message as an argument error of the package.
 pub fn argument_error(message: String) -> PyErr {
-    let class = Python::attach(|py| Ok(py.import("stepwell.errors")?.getattr("ArgumentError")?.cast_into::<PyType>()?.unbind()));
+    error_of("ArgumentError", message)
+}
+
+/// A message as the package's own error of that name.
+pub fn error_of(name: &str, message: String) -> PyErr {
+    let class = Python::attach(|py| Ok(py.import("stepwell.errors")?.getattr(name)?.cast_into::<PyType>()?.unbind()));
     match class {
         Ok(class) => Python::attach(|py| PyErr::from_type(class.into_bound(py), message)),
         Err(error) => error,
@@ -20,16 +28,32 @@ pub fn argument_error(message: String) -> PyErr {
 
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
-    argument_error(error.to_string())
+    error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
 }
 
 /// What is given under a name: a word, a whole number, rows of a parameter, or samples with their start and interval.
-#[derive(FromPyObject)]
 enum Value {
     Word(String),
     Whole(usize),
     Samples((f64, f64, Py<PyArray2<f64>>)),
     Rows(Py<PyArray2<f64>>),
+}
+
+// By the type that it has: a derived one would try each, and an exception for what it is not takes longer than all else in a short call.
+impl<'py> FromPyObject<'_, 'py> for Value {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Value> {
+        if let Ok(array) = given.cast::<PyArray2<f64>>() {
+            Ok(Value::Rows(array.to_owned().unbind()))
+        } else if given.is_instance_of::<PyString>() {
+            given.extract().map(Value::Word)
+        } else if given.is_instance_of::<PyTuple>() {
+            given.extract().map(Value::Samples)
+        } else {
+            given.extract().map(Value::Whole)
+        }
+    }
 }
 
 /// A system and what makes its steps.
@@ -40,6 +64,7 @@ pub struct ModelSpec {
     rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     record: Vec<String>,
+    fused: bool,
 }
 
 /// The parameters, borrowed for a run.
@@ -49,8 +74,18 @@ pub type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
 
 /// The rows of an array, each of one number or one for each member.
 pub fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
+    let mut rows = Vec::new();
+    add_rows(array, &mut rows)?;
+    Ok(rows)
+}
+
+fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -> PyResult<()> {
     let width = array.as_array().ncols().max(1);
-    Ok(array.as_slice()?.chunks_exact(width).map(Row).collect())
+    let numbers = array.as_slice()?;
+    let (count, bytes) = (numbers.len() / width, size_of_val(numbers));
+    rows.try_reserve(count).map_err(|_| core_error(Error::Memory { bytes }))?;
+    rows.extend(numbers.chunks_exact(width).map(Row));
+    Ok(())
 }
 
 #[pymethods]
@@ -58,7 +93,7 @@ impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
     /// in its v slot, if it is asked for.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new()))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false))]
     fn new(
         py: Python<'_>,
         system: String,
@@ -66,6 +101,7 @@ impl ModelSpec {
         given: Vec<(String, Value)>,
         matrix: Option<(Vec<f64>, usize)>,
         record: Vec<String>,
+        fused: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
         let (mut rows, mut tables) = (Vec::new(), Vec::new());
@@ -89,7 +125,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record }
+        ModelSpec { given: names, how, rows, tables, record, fused }
     }
 }
 
@@ -112,7 +148,7 @@ impl ModelSpec {
         }
     }
 
-    /// Steps of chosen length.
+    /// Adaptive steps.
     pub fn attempts(&self) -> How {
         match &self.how {
             How::Method { name, .. } => How::Attempts { name: name.clone() },
@@ -122,14 +158,16 @@ impl ModelSpec {
 
     /// What the core steps.
     pub fn model<'a>(&'a self, how: How, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+        let mut all = Vec::new();
+        rows.iter().try_for_each(|array| add_rows(array, &mut all))?;
         let spec = Spec {
             given: self.given.clone(),
-            rows: rows.iter().map(by_row).collect::<PyResult<Vec<_>>>()?.concat(),
+            rows: all,
             tables: tables
                 .iter()
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
         };
-        Ok(Model { spec, scene: Scene { given: self.given.clone(), how, record: self.record.clone() } })
+        Ok(Model { spec, scene: Scene { given: self.given.clone(), how, record: self.record.clone(), fused: self.fused } })
     }
 }

@@ -6,16 +6,29 @@ use pyo3::{
     exceptions::{PyIndexError, PyTypeError, PyValueError},
     prelude::*,
     pyclass::CompareOp,
-    types::{PyFloat, PyInt},
+    types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
-    tape::{self, Id, Op, print},
+    tape::{self, Id, Op, fuse::fuse, print},
     trace,
 };
 
-use crate::model::{ModelSpec, core_error};
+use crate::{
+    kinds_of,
+    model::{ModelSpec, core_error},
+};
 
 type Shared = Arc<Mutex<tape::Tape>>;
+
+/// A name, the places of operands, and what else is given.
+pub type Operation = (&'static str, Vec<usize>, u64);
+
+/// An operation, whose operands have these places.
+pub fn operation(op: Op, place: impl Fn(Id) -> usize) -> Operation {
+    let (operands, n) = op.operands();
+    let (name, given) = print::named(op);
+    (name, operands[..n].iter().map(|operand| place(*operand)).collect(), given)
+}
 
 fn lock(tape: &Shared) -> MutexGuard<'_, tape::Tape> {
     // Every operation leaves a tape whole.
@@ -205,7 +218,7 @@ impl Tape {
         self.leaf(Op::Param(i))
     }
 
-    /// The most attempts of a member with steps of chosen length.
+    /// The most attempts of a member with adaptive steps.
     fn budget(&self) -> Symbol {
         self.leaf(Op::Param(trace::BUDGET))
     }
@@ -251,12 +264,52 @@ impl Tape {
         Ok(lines.map(|(id, op)| print::line(id as Id, *op) + "\n").collect())
     }
 
+    /// The operations that these values are made of, and nothing else, in order: the name of each, the places of its operands, and what
+    /// else it is given; behind them the places of the values.
+    fn operations(&self, of: Vec<PyRef<'_, Symbol>>) -> PyResult<(Vec<Operation>, Vec<usize>)> {
+        let (tape, roots) = self.with(&of)?;
+        let needed = tape.needed(roots.iter().copied());
+        let mut place = vec![0; needed.len()];
+        let mut operations = Vec::new();
+        for (id, op) in tape.ops().iter().enumerate().filter(|(id, _)| needed[*id]) {
+            place[id] = operations.len();
+            operations.push(operation(*op, |operand| place[operand as usize]));
+        }
+        Ok((operations, roots.into_iter().map(|root| place[root as usize]).collect()))
+    }
+
+    /// A tape with fused multiply-adds in what these values need, and the values on it.
+    fn fused(&self, of: Vec<PyRef<'_, Symbol>>) -> PyResult<(Tape, Vec<Symbol>)> {
+        let (tape, roots) = self.with(&of)?;
+        let fused = Shared::new(Mutex::new(fuse(&tape, &roots)));
+        let symbols = roots.into_iter().map(|id| Symbol { tape: Arc::clone(&fused), id }).collect();
+        Ok((Tape(fused), symbols))
+    }
+
+    /// How often each kind of operation was asked for in a step, if these values are its next state.
+    fn written<'py>(&self, py: Python<'py>, of: Vec<PyRef<'_, Symbol>>) -> PyResult<Bound<'py, PyDict>> {
+        let (tape, roots) = self.with(&of)?;
+        let counts = tape.written(roots);
+        drop(tape);
+        kinds_of(py, &counts)
+    }
+
     fn __len__(&self) -> usize {
         lock(&self.0).ops().len()
     }
 }
 
 impl Tape {
+    /// The tape, and the values of symbols on it.
+    fn with(&self, of: &[PyRef<'_, Symbol>]) -> PyResult<(MutexGuard<'_, tape::Tape>, Vec<Id>)> {
+        let tape = lock(&self.0);
+        let roots: Vec<Id> = of.iter().map(|symbol| symbol.id).collect();
+        if roots.iter().any(|id| *id as usize >= tape.ops().len()) {
+            return Err(PyIndexError::new_err("a symbol of another tape"));
+        }
+        Ok((tape, roots))
+    }
+
     fn leaf(&self, op: Op) -> Symbol {
         let id = lock(&self.0).push(op);
         Symbol { tape: Arc::clone(&self.0), id }

@@ -1,13 +1,21 @@
 //! The real-time loop over the user's own arrays.
 
-use numpy::{PyArrayDyn, PyArrayMethods};
-use pyo3::{buffer::PyBuffer, prelude::*};
+use std::sync::{
+    Mutex, TryLockError,
+    atomic::{AtomicI64, Ordering::Relaxed},
+};
+
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use pyo3::{buffer::PyBuffer, prelude::*, types::PyInt};
 use stepwell_core::{
     isa::Level,
     run::{Machine, stage::Clock, world},
 };
 
-use crate::model::{ModelSpec, argument_error, core_error};
+use crate::{
+    interruptible,
+    model::{ModelSpec, argument_error, core_error, error_of},
+};
 
 /// How the arrays are reached.
 enum Arrays {
@@ -17,27 +25,66 @@ enum Arrays {
     Many { v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>> },
 }
 
-/// Arrays of up to so many numbers are copied.
-const FEW: usize = 256;
-
-/// A prepared loop. It holds both arrays.
-#[pyclass(module = "stepwell._core")]
-pub struct World {
-    world: world::World,
-    arrays: Arrays,
-    /// Steps between two looks at pending signals.
-    patience: i64,
+impl Arrays {
+    /// Does something with them.
+    fn with<R>(&mut self, py: Python<'_>, act: impl FnOnce(&mut [f64], &mut [f64]) -> PyResult<R>) -> PyResult<R> {
+        match self {
+            Arrays::Few { buffers, copies: (v, y) } => {
+                buffers.0.copy_to_slice(py, v)?;
+                buffers.1.copy_to_slice(py, y)?;
+                let result = act(v, y);
+                buffers.0.copy_from_slice(py, v)?;
+                buffers.1.copy_from_slice(py, y)?;
+                result
+            }
+            Arrays::Many { v, y } => {
+                let (mut v, mut y) = (v.bind(py).try_readwrite()?, y.bind(py).try_readwrite()?);
+                act(v.as_slice_mut()?, y.as_slice_mut()?)
+            }
+        }
+    }
 }
 
-/// `n` steps; long ones let other threads run, and look for Ctrl-C.
-fn advance(py: Python<'_>, world: &mut world::World, patience: i64, mut n: i64, v: &mut [f64], y: &mut [f64]) -> PyResult<()> {
-    while n > patience {
-        py.detach(|| world.step(patience, v, y));
-        n -= patience;
-        py.check_signals()?;
+/// Arrays of up to so many numbers are copied.
+const COPIED_NUMBERS: usize = 256;
+/// Steps above this are no longer exact as floating-point numbers.
+const LAST_STEP: i64 = 1 << 53;
+
+/// A prepared loop. It holds both arrays.
+#[pyclass(module = "stepwell._core", frozen)]
+pub struct World {
+    loop_: Mutex<Loop>,
+    clock: Clock,
+    /// Where it stands, for whoever asks while it is being stepped.
+    step: AtomicI64,
+}
+
+struct Loop {
+    world: world::World,
+    arrays: Arrays,
+}
+
+impl Loop {
+    /// `n` steps; long ones let other threads run, and look for Ctrl-C.
+    fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
+        let Loop { world, arrays } = self;
+        arrays.with(py, |v, y| {
+            let Some(patience) = world.patience() else {
+                let result = interruptible(py, None, |monitor| world.step_in_background(n, v, y, monitor));
+                at.store(world.step_number(), Relaxed);
+                return result;
+            };
+            while n > patience {
+                py.detach(|| world.step(patience, v, y));
+                n -= patience;
+                at.store(world.step_number(), Relaxed);
+                py.check_signals()?;
+            }
+            world.step(n, v, y);
+            at.store(world.step_number(), Relaxed);
+            Ok(())
+        })
     }
-    world.step(n, v, y);
-    Ok(())
 }
 
 /// What is read of a plan: see `Plan` in `engine.py`.
@@ -53,62 +100,89 @@ struct WorldPlan {
 #[pymethods]
 impl World {
     #[new]
-    fn new(py: Python<'_>, model: &ModelSpec, plan: WorldPlan, v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>>) -> PyResult<Self> {
+    #[pyo3(signature = (model, plan, v, y, carry = None))]
+    fn new(
+        py: Python<'_>,
+        model: &ModelSpec,
+        plan: WorldPlan,
+        v: Py<PyArrayDyn<f64>>,
+        y: Py<PyArrayDyn<f64>>,
+        carry: Option<PyReadonlyArray1<f64>>,
+    ) -> PyResult<Self> {
         let WorldPlan { t0, dt, choice, first, members } = plan;
         let (clock, machine) =
             (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 });
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
         let model = model.model(model.started(choice), &rows, &tables)?;
-        let world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
+        let mut world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
         let sizes = world.sizes();
-        let (v_size, y_size) =
-            (v.bind(py).try_readwrite()?.as_slice_mut()?.len(), y.bind(py).try_readwrite()?.as_slice_mut()?.len());
-        if (v_size, y_size) != sizes {
+        let (mut v_now, mut y_now) = (v.bind(py).try_readwrite()?, y.bind(py).try_readwrite()?);
+        let (v_now, y_now) = (v_now.as_slice_mut()?, y_now.as_slice_mut()?);
+        if (v_now.len(), y_now.len()) != sizes {
             return Err(argument_error("v and y must be of the system's shape".to_owned()));
         }
-        let patience = ((1 << 22) / (sizes.0 + sizes.1).max(1) as i64).max(1);
-        let arrays = if sizes.0.max(sizes.1) <= FEW {
+        if let Some(carry) = carry {
+            world.carry_on(carry.as_slice()?, v_now, y_now);
+        }
+        let arrays = if sizes.0.max(sizes.1) <= COPIED_NUMBERS {
             let buffers = (PyBuffer::get(v.bind(py))?, PyBuffer::get(y.bind(py))?);
             Arrays::Few { buffers, copies: (vec![0.0; sizes.0], vec![0.0; sizes.1]) }
         } else {
             Arrays::Many { v, y }
         };
-        Ok(World { world, arrays, patience })
+        Ok(World { loop_: Mutex::new(Loop { world, arrays }), clock, step: AtomicI64::new(first) })
     }
 
     /// `n` steps, in place.
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<()> {
-        if n < 0 {
-            return Err(argument_error(format!("n must be a number of steps, zero or more; got {n}")));
-        }
-        let (world, patience) = (&mut self.world, self.patience);
-        match &mut self.arrays {
-            Arrays::Few { buffers, copies: (v, y) } => {
-                buffers.0.copy_to_slice(py, v)?;
-                buffers.1.copy_to_slice(py, y)?;
-                let result = advance(py, world, patience, n, v, y);
-                buffers.0.copy_from_slice(py, v)?;
-                buffers.1.copy_from_slice(py, y)?;
-                result
+    #[pyo3(signature = (n = None), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let most = LAST_STEP - self.step.load(Relaxed);
+        let n = match n {
+            None if most >= 1 => 1,
+            Some(n) if n.is_exact_instance_of::<PyInt>() && n.extract().is_ok_and(|n: i64| (0..=most).contains(&n)) => {
+                n.extract()?
             }
-            Arrays::Many { v, y } => {
-                let (mut v, mut y) = (v.bind(py).try_readwrite()?, y.bind(py).try_readwrite()?);
-                advance(py, world, patience, n, v.as_slice_mut()?, y.as_slice_mut()?)
+            // What is no such number: Python says what is wrong with it, or what whole number it is.
+            other => {
+                let n = other.map_or_else(|| 1.into_pyobject(py).map(Bound::into_any), |n| Ok(n.clone()))?;
+                py.import("stepwell._checks")?.getattr("count")?.call1(("n", n, 0, most))?.extract()?
             }
-        }
+        };
+        self.alone(|of| of.advance(py, n, &self.step))
+    }
+
+    /// What the method carries in the place of v, by rows; None if the next step begins with v itself.
+    fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let carry = self.alone(|Loop { world, arrays }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
+        Ok(carry.map(|carry| carry.into_pyarray(py)))
     }
 
     /// The time at which the world stands.
     #[getter]
     fn t(&self) -> f64 {
-        self.world.time()
+        self.clock.at(self.step.load(Relaxed))
     }
 
     /// The number of the step at which the world stands.
     #[getter]
     fn step_number(&self) -> i64 {
-        self.world.step_number()
+        self.step.load(Relaxed)
+    }
+}
+
+impl World {
+    /// Does something unless somebody else is at it. To wait would be to wait for ever: whoever steps may wait for the GIL.
+    fn alone<R>(&self, act: impl FnOnce(&mut Loop) -> PyResult<R>) -> PyResult<R> {
+        match self.loop_.try_lock() {
+            Ok(mut of) => act(&mut of),
+            Err(TryLockError::WouldBlock) => {
+                Err(error_of("BusyError", "the world is being stepped by another thread; one at a time may do that".to_owned()))
+            }
+            // A panic within a step: what the slots hold is of no use any more.
+            Err(TryLockError::Poisoned(_)) => {
+                Err(error_of("BusyError", "a step of this world broke off; make a new one".to_owned()))
+            }
+        }
     }
 }

@@ -83,13 +83,14 @@ class NBody:
         """h·v̇ from every pair once; adds h·G·Σⱼ mⱼ·φ to ``potential`` for each body, if it is there.
 
         Body i pulls the partner after it, i + k, and is pulled by it; what bodies get from the partners after them and before
-        them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps.
+        them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps. These sums start from −0:
+        x + −0 is x, also where x is a zero.
         """
         n = len(y)
-        dv = np.full_like(y, 0.0)  # whatever y is made of
+        dv = np.full_like(y, -0.0)  # whatever y is made of
         twice, strength = np.concatenate([y, y]), np.concatenate([self.strength, self.strength])
         for slab in partners(n):
-            after, before, wells = (np.full_like(each, 0.0) for each in (y, twice, y[:, 0]))
+            after, before, wells = np.full_like(y, -0.0), np.full_like(twice, -0.0), np.full_like(y[:, 0], 0.0)
             for group in slab:
                 pushes = []
                 for k in group:
@@ -102,8 +103,8 @@ class NBody:
                     if potential is not None:
                         wells[:m] = wells[:m] + self.phi(r2, pull, strength[k : k + m])
                 for k, m, push in reversed(pushes):
-                    before[k : k + m] = before[k : k + m] - push
-            dv = dv + (after + (before[:n] + before[n:]))
+                    before[k : k + m] = before[k : k + m] + push
+            dv = dv + (after - (before[:n] + before[n:]))
             if potential is not None:
                 potential += wells
         return dv

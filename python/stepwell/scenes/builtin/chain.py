@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, count, number
-from ...errors import ArgumentError
+from ..._checks import Array, count, number, short
+from ...errors import ArgumentError, DTypeError
 from ...systems import Chain
 from ..base import Scene
 
@@ -26,8 +26,11 @@ def chain(n: Any = 8, modes: Mapping[int, float] | None = None) -> Scene:
     Raises:
         ArgumentError: what is wrong with which argument.
     """
-    n = count("n", n, 1)
+    system = Chain(n)
+    n = system.n
     modes = ({1: 1.0} | ({n: 0.05} if n > 1 else {})) if modes is None else modes
+    if not isinstance(modes, Mapping):
+        raise DTypeError(f"modes: expected a mapping of numbers of modes to amplitudes, got {short(modes)}")
     if not modes:
         raise ArgumentError("modes: expected the amplitude of at least one mode, got none")
     number_of = np.array([count("modes", j, 1, n) for j in modes])
@@ -46,7 +49,7 @@ def chain(n: Any = 8, modes: Mapping[int, float] | None = None) -> Scene:
         section="§3",
         description="Masses and springs in a slow mode with a little of the fastest, which alone limits the step.",
         error="as far from the true displacements or velocities as the largest true ones",
-        system=Chain(n),
+        system=system,
         v=v[0],
         y=y[0],
         dt=0.3,

@@ -11,6 +11,9 @@ from ...errors import ArgumentError
 from ...systems import Oscillator, Sinusoid
 from ..base import Scene
 
+#: Squares and products of the numbers stay finite.
+LARGEST = 1e100
+
 
 def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 1.0, drive: Any = 0.7, phase: Any = 0.5) -> Scene:
     """A damped oscillator from v = 0, y = 1, driven by amplitude·sin(drive·t + phase), over ten of its own periods.
@@ -35,6 +38,8 @@ def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 
     amplitude = number("amplitude", amplitude)
     drive = number("drive", drive, positive=True, unit="rad per unit of time")
     phase = number("phase", phase, unit="rad")
+    if (largest := max(omega, drive, abs(amplitude))) > LARGEST:
+        raise ArgumentError(f"omega, drive, amplitude: expected numbers of at most {LARGEST:g}, got {largest:g}")
     y0, v0 = 1.0, 0.0
 
     # y = Re(steady·exp(i·drive·t) + free·exp(decay·t)); sin is the real part of −i·exp.

@@ -13,7 +13,7 @@ from ...systems import NBody
 from ..base import Scene
 
 #: Newton's method from the far end needs this many steps at most, for any eccentricity below 1 that a float can tell.
-MOST = 100
+MAX_ITERATIONS = 100
 
 
 def kepler(e: Any = 0.9, share: Any = 0.5) -> Scene:
@@ -72,7 +72,7 @@ def eccentric_anomaly(t: Array, e: float) -> Array:
     mean = np.remainder(t + math.pi, 2.0 * math.pi) - math.pi
     wanted = np.abs(mean)
     angle = np.full_like(wanted, math.pi)
-    for _ in range(MOST):
+    for _ in range(MAX_ITERATIONS):
         # (1 − e)·E + e·(E − sin E) keeps its digits where e and 1 are close.
         excess = (1.0 - e) * angle + e * (angle - np.sin(angle)) - wanted
         nearer = np.maximum(angle - excess / (1.0 - e * np.cos(angle)), 0.0)

@@ -14,7 +14,7 @@ from ..base import Scene
 
 #: The arithmetic-geometric mean doubles its digits with every step; this many are enough for any amplitude that a float can tell
 #: from 180°.
-MOST = 40
+MAX_ITERATIONS = 40
 
 
 def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
@@ -78,7 +78,7 @@ def elliptic(u: Array, modulus: float, complement: float) -> tuple[Array, Array,
 def _means(complement: float) -> tuple[list[float], list[float]]:
     """The arithmetic means of 1 and k', and half the differences of what they are the means of."""
     a, b, means, halves = 1.0, complement, [1.0], [0.0]
-    for _ in range(MOST):
+    for _ in range(MAX_ITERATIONS):
         a, b, half = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
         means.append(a)
         halves.append(half)

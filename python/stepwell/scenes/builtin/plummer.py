@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, count, number
+from ..._checks import Array, count, fits, number
 from ...errors import ArgumentError
 from ...systems import NBody
 from ..base import Scene
@@ -33,6 +33,7 @@ def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
         ArgumentError: what is wrong with which argument.
     """
     n, seed = count("n", n, 2), count("seed", seed, 0)
+    fits("n: the pairs", 4 * n * n, (), "take fewer stars")
     softening = number("softening", softening)
     if softening < 0.0:
         raise ArgumentError(f"softening: expected a length of zero or more, got {softening:g}")
@@ -86,7 +87,8 @@ def _scale(masses: Array, y: Array, softening: float) -> float:
     product = masses[i] * masses[j]
 
     def depth(scale: float) -> float:
-        return float((product / np.sqrt(scale * scale * square + softening * softening)).sum())
+        with np.errstate(divide="ignore"):  # the square of a softening may be nothing
+            return float((product / np.sqrt(scale * scale * square + softening * softening)).sum())
 
     low, high = 0.0, 1.0
     if softening > 0.0 and depth(0.0) <= 0.5:

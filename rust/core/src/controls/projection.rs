@@ -79,7 +79,7 @@ impl<N: Number> System<N> for Projected<N> {
         self.system.record(quantity, v, y)
     }
 
-    fn settle(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
         let back = self.back(&v, &y);
         back.unwrap_or((v, y))
     }

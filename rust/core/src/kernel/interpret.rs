@@ -145,7 +145,7 @@ impl Task for Run<'_, '_> {
                     }
                     Op::Gather(_) => {
                         for l in 0..lanes {
-                            // A place that is none is a NaN's: what comes of it is of no use to anybody.
+                            // An index out of range comes from a NaN; its result is discarded.
                             let place = scratch[of[0] + l] as usize + l;
                             scratch[*to + l] = tile.held.get(place).copied().unwrap_or(f64::NAN);
                         }
@@ -188,6 +188,9 @@ fn apply(op: Op, scratch: &mut [f64], to: usize, [a, b, c]: [usize; 3], lanes: u
         Op::Sub(..) => Op::Sub(ANY, ANY),
         Op::Mul(..) => Op::Mul(ANY, ANY),
         Op::Div(..) => Op::Div(ANY, ANY),
+        Op::MulAdd(..) => Op::MulAdd(ANY, ANY, ANY),
+        Op::MulSub(..) => Op::MulSub(ANY, ANY, ANY),
+        Op::SubMul(..) => Op::SubMul(ANY, ANY, ANY),
         Op::Sqrt(_) => Op::Sqrt(ANY),
         Op::Neg(_) => Op::Neg(ANY),
         Op::Floor(_) => Op::Floor(ANY),

@@ -21,6 +21,21 @@ pub use x86 as writer;
 
 use crate::tape::split::Body;
 
+/// How machine code goes through a tile, whatever the CPU: see the writer's `Shape`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Numbers in a vector.
+    pub width: usize,
+    /// Vectors that are stepped by one turn of the loop.
+    pub block_vectors: usize,
+    /// Turns of the loop that a tile takes.
+    pub blocks: usize,
+    /// Whether the state stays in registers over all steps.
+    pub resident: bool,
+    /// Vector registers that the CPU has at this level.
+    pub registers: usize,
+}
+
 /// What a kernel works on. Rows are `lanes` numbers long, one for each member, and follow each other.
 #[derive(Debug)]
 pub struct Tile<'a> {
@@ -59,7 +74,7 @@ pub trait Kernel: Send + Sync {
         0
     }
 
-    /// How many values are kept beside at most, because registers do not suffice.
+    /// How many values are spilled at most, because registers do not suffice.
     fn spills(&self) -> usize {
         0
     }

@@ -48,7 +48,7 @@ pub struct Frame {
     pub lanes: usize,
     /// The size of the pool.
     pub pool: usize,
-    /// How much is kept beside, from a multiple of 64 bytes on.
+    /// Size of the spill area, which begins at a multiple of 64 bytes.
     pub scratch: usize,
     /// A pool that is read by whole vectors of so many numbers is copied to where no vector lies across two lines of the cache.
     pub aligned_pool: bool,
@@ -76,6 +76,11 @@ impl Pages {
         let mut map = memmap2::MmapMut::map_anon(code.len()).ok()?;
         map.copy_from_slice(code);
         Some(Pages { map: map.make_exec().ok()?, frame })
+    }
+
+    /// Whether the system gives pages and lets them be executed: one is asked for.
+    pub(super) fn allowed() -> bool {
+        memmap2::MmapMut::map_anon(1).and_then(memmap2::MmapMut::make_exec).is_ok()
     }
 
     /// The code.

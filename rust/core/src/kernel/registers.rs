@@ -1,4 +1,4 @@
-//! Which value is in which register, and which one has to go when there are too few: the one that is needed again last (Belady).
+//! Register allocation: when there are too few, the value that is needed again last is spilled (Belady).
 //!
 //! Nothing here knows a CPU.
 

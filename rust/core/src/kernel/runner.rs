@@ -6,7 +6,7 @@ use std::sync::{
 };
 
 use super::{
-    Kernel,
+    Kernel, Layout,
     interpret::Interpreter,
     writer::{self, Shape},
 };
@@ -56,6 +56,11 @@ impl Runner {
     /// How long rows are.
     pub fn lanes(&self) -> usize {
         self.lanes
+    }
+
+    /// How machine code would go through a tile; none where there is none at this level.
+    pub fn layout(&self) -> Option<Layout> {
+        self.shape.as_ref().map(Shape::layout)
     }
 
     /// What it makes steps of.

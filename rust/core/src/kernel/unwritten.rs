@@ -1,6 +1,6 @@
 //! The kernel writer of a machine that has none: everything is interpreted.
 
-use super::interpret::Interpreter;
+use super::{Layout, interpret::Interpreter};
 use crate::{isa::Level, tape::split::Body};
 
 /// How a kernel goes through a tile. There is none.
@@ -10,6 +10,11 @@ pub enum Shape {}
 impl Shape {
     /// How long rows are.
     pub fn lanes(&self) -> usize {
+        match *self {}
+    }
+
+    /// The same in words that every CPU has.
+    pub fn layout(&self) -> Layout {
         match *self {}
     }
 }
@@ -27,4 +32,9 @@ pub fn choose_long(_: &Body, _: Level, _: usize) -> Option<Shape> {
 /// Writes a kernel, which cannot be.
 pub fn write(_: &Body, _: Shape) -> Option<Interpreter> {
     None
+}
+
+/// Whether the system lets machine code be run.
+pub fn allowed() -> bool {
+    false
 }

@@ -1,27 +1,34 @@
 //! Carries out a course: rates and passes over an arena.
 
+use std::sync::atomic::Ordering::Relaxed;
+
 use super::{
     Rates,
     course::{Act, Course, Rate},
 };
 use crate::{
     isa::Level,
-    run::stage::{Clock, Loaded},
+    run::{
+        crew::Stop,
+        stage::{Clock, PreparedStage},
+    },
     spec::Spec,
 };
 
 /// The passes of a course, ready for an arena.
 pub struct Executor {
     /// Of each act its kernel, if it is a pass.
-    passes: Vec<Option<Loaded>>,
+    passes: Vec<Option<PreparedStage>>,
     stride: usize,
+    /// When set, what is left is not done.
+    pub stop: Stop,
 }
 
 const VECTOR: usize = 8;
 
 /// How long rows are, with what fills the last vectors.
 pub fn stride(numbers: usize) -> usize {
-    // Four vectors go abreast if they can, for which there must be a multiple of four. Short rows would be half air.
+    // Four vectors are interleaved if they can be, for which there must be a multiple of four. Short rows would be half air.
     const TEAM: usize = 4 * VECTOR;
     if numbers <= 8 * TEAM {
         return numbers.next_multiple_of(if numbers <= TEAM { VECTOR } else { 2 * VECTOR }).max(VECTOR);
@@ -40,16 +47,19 @@ impl Executor {
     pub fn new(course: &Course, level: Level, stride: usize, clock: &Clock) -> Executor {
         let nobody = Spec::default();
         let pass = |act: &Act| match act {
-            Act::Pass(stage) => Some(Loaded::with(stage, stage.kit_of(level, stride), &nobody, clock, f64::INFINITY)),
+            Act::Pass(stage) => Some(PreparedStage::with(stage, stage.kit_of(level, stride), &nobody, clock, f64::INFINITY)),
             Act::Ask { .. } | Act::Both { .. } => None,
         };
-        Executor { passes: course.acts.iter().map(pass).collect(), stride }
+        Executor { passes: course.acts.iter().map(pass).collect(), stride, stop: Stop::default() }
     }
 
     /// Carries it out at time t, with the step h. Attempts are that long, too.
     pub fn run(&mut self, course: &Course, rates: &mut dyn Rates, sizes: [usize; 2], t: f64, h: f64, arena: &mut [f64]) {
         let stride = self.stride;
         for (act, pass) in course.acts.iter().zip(&mut self.passes) {
+            if self.stop.load(Relaxed) {
+                return;
+            }
             match (act, pass) {
                 (Act::Pass(stage), Some(pass)) => pass.advance_at(stage, h, arena),
                 (Act::Ask { rate, at, v, y, out }, _) => {

@@ -1,6 +1,6 @@
 //! A group of members of a large system.
 
-use std::sync::Arc;
+use std::sync::{Arc, atomic::Ordering::Relaxed};
 
 use super::{
     Facts, Rates,
@@ -11,7 +11,7 @@ use crate::{
     error::Error,
     isa::Level,
     program::{Block, Program},
-    run::{aligned::Aligned, group::Group, stage::Clock},
+    run::{aligned::Aligned, crew::Stop, group::Group, stage::Clock},
     spec::Spec,
     system::Shape,
     trace::{How, method},
@@ -104,6 +104,7 @@ pub struct LargeGroup {
     recorded: usize,
     /// Whether what was taken from the first member serves all.
     prepared: bool,
+    stop: Stop,
 }
 
 impl LargeGroup {
@@ -125,6 +126,7 @@ impl LargeGroup {
             finish: blocks.courses.finish.as_ref().map(executor),
             recorded,
             prepared: false,
+            stop: Stop::default(),
             blocks,
         }
     }
@@ -141,6 +143,14 @@ impl Group for LargeGroup {
             self.blocks.rates.prepare(spec, first, count);
         }
         self.blocks.rates.tally_mut().fill(0.0);
+    }
+
+    fn heed(&mut self, stop: &Stop) {
+        for executor in [Some(&mut self.step), self.start.as_mut(), self.finish.as_mut()].into_iter().flatten() {
+            executor.stop = Stop::clone(stop);
+        }
+        self.blocks.rates.heed(stop);
+        self.stop = Stop::clone(stop);
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -161,11 +171,14 @@ impl Group for LargeGroup {
 
     fn advance(&mut self, k: i64, n: i64) {
         for k in k..k + n {
+            if self.stop.load(Relaxed) {
+                return;
+            }
             let (t, h) = (self.clock.at(k), self.clock.h);
             let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
             self.step.run(&courses.step, rates.as_mut(), *sizes, t, h, arena);
             let (v, y) = arena.split_at_mut(*stride);
-            rates.settle(&mut v[..sizes[0]], &mut y[..sizes[1]]);
+            rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
         }
     }
 
@@ -174,7 +187,7 @@ impl Group for LargeGroup {
         let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
         if let (Some(executor), Some(course)) = (&mut self.finish, &courses.finish) {
             if self.recorded > 0 {
-                rates.foresee(&arena[*stride..][..sizes[1]]);
+                rates.cache_forces(&arena[*stride..][..sizes[1]]);
             }
             executor.run(course, rates.as_mut(), *sizes, t, h, arena);
         }
@@ -187,7 +200,7 @@ impl Group for LargeGroup {
     fn record(&mut self, rows: &mut [f64]) {
         let Blocks { rates, arena, sizes, stride, .. } = &mut self.blocks;
         let (v, y) = (&arena[..sizes[0]], &arena[*stride..][..sizes[1]]);
-        rates.foresee(y);
+        rates.cache_forces(y);
         rates.record(v, y, rows);
     }
 

@@ -3,6 +3,7 @@
 use super::{Asked, Facts, Rates};
 use crate::{
     controls::{self, energy, projection},
+    run::crew::Stop,
     spec::Spec,
 };
 
@@ -51,6 +52,10 @@ impl Rates for Held {
         self.rates.prepare(spec, first, count);
     }
 
+    fn heed(&mut self, stop: &Stop) {
+        self.rates.heed(stop);
+    }
+
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         let Keeps::Push { limited } = self.keeps else { return self.rates.dv(t, v, y, out) };
         let Some([kinetic, whole]) = self.rates.energies(v, y, out) else { return self.rates.dv(t, v, y, out) };
@@ -69,9 +74,9 @@ impl Rates for Held {
         self.rates.velocity(d, out);
     }
 
-    fn settle(&mut self, v: &mut [f64], y: &mut [f64]) {
+    fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
         let Keeps::Back { nacozy } = self.keeps else { return };
-        self.rates.foresee(y);
+        self.rates.cache_forces(y);
         let Some([kinetic, whole]) = self.rates.energies(v, y, &mut self.dv) else { return };
         let off = whole - self.target;
         if !nacozy {
@@ -89,8 +94,8 @@ impl Rates for Held {
         }
     }
 
-    fn foresee(&mut self, y: &[f64]) {
-        self.rates.foresee(y);
+    fn cache_forces(&mut self, y: &[f64]) {
+        self.rates.cache_forces(y);
     }
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {

@@ -1,8 +1,11 @@
 //! The rates of a large linear system ([`crate::systems::linear`]).
 
+use std::sync::atomic::AtomicBool;
+
 use super::{Asked, Facts, Rates, inputs::Inputs, panels::Panels};
 use crate::{
     isa::{Level, Task, with_isa},
+    run::crew::Stop,
     spec::Spec,
     system::Shape,
 };
@@ -16,10 +19,11 @@ struct Linear {
     inputs: Inputs,
     /// The inputs.
     x: Vec<f64>,
-    /// The time for which the inputs hold: both blocks ask at the same times, and a sine is dear.
+    /// The time for which the inputs hold: both blocks ask at the same times, and a sine is expensive.
     time: f64,
     /// h·ẏ of v = 1, in a second-order system.
     speed: f64,
+    stop: Stop,
 }
 
 /// The rates of a linear system.
@@ -35,6 +39,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         x: vec![0.0; asked.given.whole("inputs")],
         time: f64::NAN,
         speed: 0.0,
+        stop: Stop::default(),
     })
 }
 
@@ -42,13 +47,14 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
 struct Times<'a, const N: usize> {
     products: [(&'a Panels, &'a mut [f64]); N],
     parts: [&'a [f64]; 3],
+    stop: &'a AtomicBool,
 }
 
 impl<const N: usize> Task for Times<'_, N> {
     #[inline(always)]
     fn run(self) {
         for (panels, out) in self.products {
-            panels.times(self.parts, out);
+            panels.times(self.parts, out, self.stop);
         }
     }
 }
@@ -78,21 +84,25 @@ impl Rates for Linear {
         self.time = f64::NAN;
     }
 
+    fn heed(&mut self, stop: &Stop) {
+        self.stop = Stop::clone(stop);
+    }
+
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         self.look(t);
-        let task = Times { products: [(&self.of_v, out)], parts: [v, y, &self.x] };
+        let task = Times { products: [(&self.of_v, out)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         self.look(t);
-        let task = Times { products: [(&self.of_y, out)], parts: [v, y, &self.x] };
+        let task = Times { products: [(&self.of_y, out)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
         self.look(t);
-        let task = Times { products: [(&self.of_v, dv), (&self.of_y, dy)], parts: [v, y, &self.x] };
+        let task = Times { products: [(&self.of_v, dv), (&self.of_y, dy)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }
 

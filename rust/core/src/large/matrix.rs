@@ -1,12 +1,14 @@
 //! The transition-matrix form (Appendix B) of a large system: s ← P·s + Σ Q·u, one member at a time.
 
+use std::sync::atomic::Ordering::Relaxed;
+
 use super::{
     inputs::Inputs,
     panels::{Panels, filled},
 };
 use crate::{
     isa::{Level, Task, with_isa},
-    run::{aligned::Aligned, group::Group, stage::Clock},
+    run::{aligned::Aligned, crew::Stop, group::Group, stage::Clock},
     spec::Spec,
     system::Shape,
     trace::How,
@@ -29,6 +31,7 @@ pub struct Matrix {
     next: Aligned,
     /// Whether what was taken from the first member serves all.
     prepared: bool,
+    stop: Stop,
 }
 
 impl Matrix {
@@ -51,6 +54,7 @@ impl Matrix {
             state: Aligned::new(filled(n)),
             next: Aligned::new(filled(n)),
             prepared: false,
+            stop: Stop::default(),
         }
     }
 }
@@ -64,13 +68,16 @@ struct Steps<'a> {
 impl Task for Steps<'_> {
     #[inline(always)]
     fn run(self) {
-        let Matrix { shape, clock, nodes, pq, inputs, count, u, state, next, .. } = self.of;
+        let Matrix { shape, clock, nodes, pq, inputs, count, u, state, next, stop, .. } = self.of;
         for k in self.k..self.k + self.n {
             let t = clock.at(k);
             for (node, u) in nodes.iter().zip(u.chunks_exact_mut((*count).max(1))) {
                 inputs.fill(t + node * clock.h, u);
             }
-            pq.times([&state[..shape.v + shape.y], u, &[]], next);
+            if stop.load(Relaxed) {
+                return;
+            }
+            pq.times([&state[..shape.v + shape.y], u, &[]], next, stop);
             std::mem::swap(state, next);
         }
     }
@@ -91,6 +98,10 @@ impl Group for Matrix {
         let place = |i: usize, j: usize| if j < n { p + i * n + j } else { q + (j - n) * n + i };
         self.pq = Panels::new(n, n + self.u.len(), |i, j| spec.rows[place(i, j)].at(first));
         self.inputs = Inputs::new(spec, first);
+    }
+
+    fn heed(&mut self, stop: &Stop) {
+        self.stop = Stop::clone(stop);
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {

@@ -10,6 +10,7 @@
 //!
 //! Neither knows of the methods, and no method knows of them.
 
+pub mod adaptive;
 pub mod bodies;
 pub mod chain;
 pub mod course;
@@ -19,12 +20,11 @@ pub mod held;
 mod inputs;
 pub mod linear;
 pub mod matrix;
-pub mod paced;
 mod panels;
 pub mod tapes;
 
 use crate::{
-    run::Machine,
+    run::{Machine, crew::Stop},
     spec::{Given, Spec},
     system::Shape,
 };
@@ -57,6 +57,9 @@ pub trait Rates: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
+    /// Stops within a rate, too, if it may take long.
+    fn heed(&mut self, _stop: &Stop) {}
+
     /// h·v̇
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]);
 
@@ -72,11 +75,11 @@ pub trait Rates: Send + Sync {
     /// The velocity whose increment of y this is; not asked for in a second-order system.
     fn velocity(&mut self, _d: &[f64], _out: &mut [f64]) {}
 
-    /// Corrects the state after a step.
-    fn settle(&mut self, _v: &mut [f64], _y: &mut [f64]) {}
+    /// Projects the state after a step onto what should be constant.
+    fn project(&mut self, _v: &mut [f64], _y: &mut [f64]) {}
 
-    /// Gets ready to be asked for the energy, for quantities and for the rate of v of these coordinates, if that can be done at once.
-    fn foresee(&mut self, _y: &[f64]) {}
+    /// Computes the forces of these coordinates ahead, if the same pass finds the energy and the quantities that will be asked for.
+    fn cache_forces(&mut self, _y: &[f64]) {}
 
     /// Fills rows with the recorded quantities of a state.
     fn record(&mut self, _v: &[f64], _y: &[f64], _rows: &mut [f64]) {}
@@ -122,13 +125,13 @@ pub struct Asked<'a> {
 pub struct Long {
     /// Operations of the rates, or of a step, from which on it is quicker than machine code for one number at a time.
     pub from: (usize, usize),
-    /// Operations of the rates from which on members one by one are as quick as several side by side with tapes for the rates.
-    pub beside: usize,
+    /// Operations of the rates from which on it is as fast as tapes for several members side by side.
+    pub from_batch: usize,
     /// Makes them, without control.
     pub make: fn(&Asked) -> Box<dyn Rates>,
 }
 
 /// Rates of one member by the kernel of the system, under the control that is given.
-pub fn lone(long: Long, asked: &Asked) -> Box<dyn Rates> {
+pub fn single(long: Long, asked: &Asked) -> Box<dyn Rates> {
     held::wrap((long.make)(asked), asked)
 }

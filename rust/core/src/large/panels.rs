@@ -4,6 +4,8 @@
 //! side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the order in
 //! which they are used; rows of zeros fill the last. No sum changes by that.
 
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
 use crate::run::aligned::Aligned;
 
 /// A matrix, by panels.
@@ -23,11 +25,19 @@ pub fn filled(rows: usize) -> usize {
 
 /// The sums of all rows that fill panels of `R`; what is left of entries and rows.
 #[inline(always)]
-fn panels<'a, const R: usize>(entries: &'a [f64], out: &'a mut [f64], parts: [&[f64]; 3]) -> (&'a [f64], &'a mut [f64]) {
+fn panels<'a, const R: usize>(
+    entries: &'a [f64],
+    out: &'a mut [f64],
+    parts: [&[f64]; 3],
+    stop: &AtomicBool,
+) -> (&'a [f64], &'a mut [f64]) {
     let size = R * parts.iter().map(|part| part.len()).sum::<usize>();
     let (out, rest) = out.as_chunks_mut::<R>();
     let mut left = entries;
     for now in out {
+        if stop.load(Relaxed) {
+            break;
+        }
         let (panel, later) = left.split_at(size);
         *now = sums(panel.as_chunks().0, parts);
         left = later;
@@ -71,11 +81,12 @@ impl Panels {
         Panels { entries, filled }
     }
 
-    /// `out` = the matrix times the numbers of all parts, one part after the other; it has room for [`filled`] numbers.
+    /// `out` = the matrix times the numbers of all parts, one part after the other; it has room for [`filled`] numbers. When `stop` is
+    /// set, nothing more is done, and what was done is of no use.
     #[inline(always)]
-    pub fn times(&self, parts: [&[f64]; 3], out: &mut [f64]) {
-        let rest = panels::<{ HEIGHTS[0] }>(&self.entries, &mut out[..self.filled], parts);
-        let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, parts);
-        panels::<{ HEIGHTS[2] }>(rest.0, rest.1, parts);
+    pub fn times(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
+        let rest = panels::<{ HEIGHTS[0] }>(&self.entries, &mut out[..self.filled], parts, stop);
+        let rest = panels::<{ HEIGHTS[1] }>(rest.0, rest.1, parts, stop);
+        panels::<{ HEIGHTS[2] }>(rest.0, rest.1, parts, stop);
     }
 }

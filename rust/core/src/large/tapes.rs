@@ -10,7 +10,7 @@ use crate::{
     number::{Symbol, record},
     run::{
         aligned::Aligned,
-        stage::{Clock, Loaded, Stage},
+        stage::{Clock, PreparedStage, Stage},
     },
     spec::{Given, Spec},
     system::{Block, Kind, Shape, System},
@@ -28,7 +28,7 @@ pub struct Rated {
     dy: Option<Stage>,
     velocity: Option<Stage>,
     /// Those that say so make the rate of v of their coordinates, too.
-    settle: Option<(Stage, bool)>,
+    project: Option<(Stage, bool)>,
     record: Option<(Stage, bool)>,
 }
 
@@ -91,21 +91,21 @@ impl Rated {
         let is_of_y = !reads_v && !reads(&|op| op == Op::Time);
         let velocity =
             (!second_order && shape.v == shape.y).then(|| rate(kind, given, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
-        // What stands beside a state and takes the forces along, costs hardly more than the forces: so it finds them for the next step.
+        // Where a tape that also computes h·v̇ costs hardly more than without, it does so, and the next step uses it.
         let work = |(tape, next): &(Tape, Vec<Id>)| tape.needed(next.iter().copied()).iter().filter(|needed| **needed).count();
-        let along = |trace: &dyn Fn(bool) -> (Tape, Vec<Id>)| {
+        let with_rate = |trace: &dyn Fn(bool) -> (Tape, Vec<Id>)| {
             let (alone, both) = (trace(false), trace(is_of_y));
             let is_cheap = is_of_y && 4 * work(&both) <= 4 * work(&alone) + work(&dv);
             (cut(given, if is_cheap { &both } else { &alone }), is_cheap)
         };
-        let settle = |with_dv: bool| {
+        let project = |with_dv: bool| {
             rate(kind, given, shape, |s, v, y| {
-                let (v, y) = s.settle(v, y);
+                let (v, y) = s.project(v, y);
                 (with_dv.then(|| s.dv(time(), &v, &y)), v, y)
             })
         };
-        let (tape, next) = settle(false);
-        let settles = next.iter().enumerate().any(|(i, id)| tape.op(*id) != Op::State(i as u32));
+        let (tape, next) = project(false);
+        let projects = next.iter().enumerate().any(|(i, id)| tape.op(*id) != Op::State(i as u32));
         let quantities = |with_dv: bool| {
             record(Tape::default(), || {
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
@@ -124,15 +124,15 @@ impl Rated {
             dv: if shape.v > 0 { stage(&dv) } else { None },
             dy: if second_order { None } else { stage(&dy) },
             velocity: velocity.as_ref().and_then(stage),
-            settle: settles.then(|| along(&settle)),
-            record: (!names.is_empty()).then(|| along(&quantities)),
+            project: projects.then(|| with_rate(&project)),
+            record: (!names.is_empty()).then(|| with_rate(&quantities)),
         })
     }
 
     /// Operations of all its bodies.
     pub fn size(&self) -> usize {
         let rates = [&self.dv, &self.dy, &self.velocity].into_iter().flatten();
-        let others = [&self.settle, &self.record].into_iter().flatten().map(|(stage, _)| stage);
+        let others = [&self.project, &self.record].into_iter().flatten().map(|(stage, _)| stage);
         rates.chain(others).map(Stage::size).sum::<usize>()
     }
 }
@@ -146,14 +146,14 @@ pub fn lanes(level: Level) -> usize {
 pub struct TapeRates {
     rated: Arc<Rated>,
     lanes: usize,
-    dv: Option<Loaded>,
-    dy: Option<Loaded>,
-    velocity: Option<Loaded>,
-    settle: Option<Loaded>,
-    record: Option<Loaded>,
+    dv: Option<PreparedStage>,
+    dy: Option<PreparedStage>,
+    velocity: Option<PreparedStage>,
+    project: Option<PreparedStage>,
+    record: Option<PreparedStage>,
     state: Aligned,
     /// The state of what is recorded.
-    aside: Vec<f64>,
+    record_state: Vec<f64>,
     /// The rate of v of these coordinates is known until others are asked for.
     at_hand: bool,
     y: Vec<f64>,
@@ -170,19 +170,19 @@ impl TapeRates {
     pub fn new(rated: Arc<Rated>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
         let load = |stage: &Stage| {
             let kit = stage.kit_of(level, lanes);
-            kit.runner.write(); // who takes the trouble to trace rates is going to need them often
-            Loaded::with(stage, kit, spec, clock, f64::INFINITY)
+            kit.runner.write(); // rates that are traced are going to be evaluated often
+            PreparedStage::with(stage, kit, spec, clock, f64::INFINITY)
         };
-        let aside = rated.record.as_ref().map_or(0, |(stage, _)| stage.split.body.next.len());
+        let record_state = rated.record.as_ref().map_or(0, |(stage, _)| stage.split.body.next.len());
         TapeRates {
             lanes,
             dv: rated.dv.as_ref().map(load),
             dy: rated.dy.as_ref().map(load),
             velocity: rated.velocity.as_ref().map(load),
-            settle: rated.settle.as_ref().map(|(stage, _)| load(stage)),
+            project: rated.project.as_ref().map(|(stage, _)| load(stage)),
             record: rated.record.as_ref().map(|(stage, _)| load(stage)),
             state: Aligned::new((behind(rated.shape) + 1) * lanes),
-            aside: vec![0.0; aside * lanes],
+            record_state: vec![0.0; record_state * lanes],
             at_hand: false,
             y: Vec::new(),
             known: Vec::new(),
@@ -194,14 +194,14 @@ impl TapeRates {
         (self.rated.shape.v * self.lanes, self.rated.shape.y * self.lanes)
     }
 
-    /// Puts a state where tapes find it.
-    fn sit(&mut self, v: &[f64], y: &[f64]) {
+    /// Copies a state to where the tapes read it.
+    fn set_state(&mut self, v: &[f64], y: &[f64]) {
         let at = self.sizes().0;
         self.state[..v.len()].copy_from_slice(v);
         self.state[at..at + y.len()].copy_from_slice(y);
     }
 
-    /// Gives what was made by the last rate, or more that is nobody's.
+    /// Copies the result of the last rate; what fills the last vectors beyond it is arbitrary.
     fn give(&self, out: &mut [f64]) {
         let (v, y) = self.sizes();
         let made = &self.state[v + y..behind(self.rated.shape) * self.lanes];
@@ -220,17 +220,17 @@ impl Rates for TapeRates {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        let TapeRates { rated, dv, dy, velocity, settle, record, .. } = self;
+        let TapeRates { rated, dv, dy, velocity, project, record, .. } = self;
         let all = [
             (dv, rated.dv.as_ref()),
             (dy, rated.dy.as_ref()),
             (velocity, rated.velocity.as_ref()),
-            (settle, rated.settle.as_ref().map(|(stage, _)| stage)),
+            (project, rated.project.as_ref().map(|(stage, _)| stage)),
             (record, rated.record.as_ref().map(|(stage, _)| stage)),
         ];
-        for (loaded, stage) in all {
-            if let (Some(loaded), Some(stage)) = (loaded, stage) {
-                loaded.prepare(stage, spec, first, count);
+        for (prepared, stage) in all {
+            if let (Some(prepared), Some(stage)) = (prepared, stage) {
+                prepared.prepare(stage, spec, first, count);
             }
         }
     }
@@ -241,37 +241,37 @@ impl Rates for TapeRates {
             return;
         }
         self.at_hand = false;
-        self.sit(if self.rated.facts.reads_v { v } else { &[] }, y);
-        if let (Some(loaded), Some(stage)) = (&mut self.dv, &self.rated.dv) {
-            loaded.advance_at(stage, t, &mut self.state);
+        self.set_state(if self.rated.facts.reads_v { v } else { &[] }, y);
+        if let (Some(prepared), Some(stage)) = (&mut self.dv, &self.rated.dv) {
+            prepared.advance_at(stage, t, &mut self.state);
         }
         self.give(out);
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.sit(v, y);
-        if let (Some(loaded), Some(stage)) = (&mut self.dy, &self.rated.dy) {
-            loaded.advance_at(stage, t, &mut self.state);
+        self.set_state(v, y);
+        if let (Some(prepared), Some(stage)) = (&mut self.dy, &self.rated.dy) {
+            prepared.advance_at(stage, t, &mut self.state);
         }
         self.give(out);
     }
 
     fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
-        self.sit(&[], d);
-        if let (Some(loaded), Some(stage)) = (&mut self.velocity, &self.rated.velocity) {
-            loaded.advance_at(stage, 0.0, &mut self.state);
+        self.set_state(&[], d);
+        if let (Some(prepared), Some(stage)) = (&mut self.velocity, &self.rated.velocity) {
+            prepared.advance_at(stage, 0.0, &mut self.state);
         }
         self.give(out);
     }
 
-    fn settle(&mut self, v: &mut [f64], y: &mut [f64]) {
-        if self.settle.is_none() {
+    fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
+        if self.project.is_none() {
             return;
         }
-        self.sit(v, y);
+        self.set_state(v, y);
         let (sizes, mut gives) = (self.sizes(), false);
-        if let (Some(loaded), Some((stage, with_dv))) = (&mut self.settle, &self.rated.settle) {
-            loaded.advance_at(stage, 0.0, &mut self.state);
+        if let (Some(prepared), Some((stage, with_dv))) = (&mut self.project, &self.rated.project) {
+            prepared.advance_at(stage, 0.0, &mut self.state);
             gives = *with_dv;
         }
         let (new_v, rest) = self.state.split_at(sizes.0);
@@ -288,12 +288,12 @@ impl Rates for TapeRates {
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
         let Some((stage, gives)) = &self.rated.record else { return };
         let before = v.len() + y.len();
-        self.aside[..v.len()].copy_from_slice(v);
-        self.aside[v.len()..before].copy_from_slice(y);
-        if let Some(loaded) = &mut self.record {
-            loaded.advance_at(stage, 0.0, &mut self.aside);
+        self.record_state[..v.len()].copy_from_slice(v);
+        self.record_state[v.len()..before].copy_from_slice(y);
+        if let Some(prepared) = &mut self.record {
+            prepared.advance_at(stage, 0.0, &mut self.record_state);
         }
-        let (quantities, dv) = self.aside[before..].split_at(rows.len());
+        let (quantities, dv) = self.record_state[before..].split_at(rows.len());
         rows.copy_from_slice(quantities);
         if *gives {
             keep(&mut self.y, y);

@@ -4,7 +4,8 @@ use std::{sync::Arc, thread, time::Instant};
 
 use super::{
     Machine, Model,
-    crew::{self, POLL},
+    columns::{Columns, cut},
+    crew::{self, Crew, POLL, Stop},
     group::Group,
     stage::Clock,
 };
@@ -49,13 +50,13 @@ pub struct Arrays<'a> {
     pub saved_v: &'a mut [f64],
     /// What is kept of y.
     pub saved_y: &'a mut [f64],
-    /// What is recorded beside each kept state.
+    /// What is recorded beside each saved state.
     pub recorded: &'a mut [f64],
-    /// What the systems added up, one number per member; empty if nobody asks.
+    /// What the systems added up, one number per member; empty if not asked for.
     pub tally: &'a mut [f64],
-    /// The v slot at the end; empty if nobody asks.
+    /// The v slot at the end; empty if not asked for.
     pub carry: &'a mut [f64],
-    /// Per member, the number of the first step that is not finite, or −1; members that have one are not looked at.
+    /// Per member, the number of the first step that is not finite, or −1; members that have one are not checked.
     pub first_bad: &'a mut [i64],
 }
 
@@ -67,36 +68,33 @@ pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
     (from..=steps).step_by(step as usize).chain(last)
 }
 
-/// Between two looks at whether everything is finite.
-const LOOK: i64 = 1024;
-/// About how many numbers to step between two looks at the clock; some milliseconds of the slowest system.
-const PATIENCE: i64 = 1 << 20;
+/// How many states a run keeps.
+pub fn kept(steps: i64, every: Option<i64>) -> usize {
+    every.map_or(1, |every| steps.div_euclid(every.max(1)) + i64::from(steps % every.max(1) != 0) + 1) as usize
+}
+
+/// Steps between two looks at the clock, and at whether everything is finite, at most; and about how many numbers are stepped until the
+/// first look, and between later ones at most.
+const LOOK: i64 = 1 << 14;
+const FIRST: i64 = 1 << 19;
+const PATIENCE: i64 = 1 << 23;
+/// Who has more numbers than that begins with one step, and shows how long it takes: a step of many bodies costs more than they tell.
+const LARGE: i64 = 1 << 16;
+/// Where somebody diverged between two looks is found by as many looks in between, and so on.
+const LOOKS_BETWEEN: i64 = 16;
 /// Numbers × steps below which a second thread costs more than it brings.
 const WORTH_A_THREAD: f64 = 3e6;
 
 /// One thread's share of the members, as slices of every row.
 struct Part<'a> {
     first: usize,
-    saved_v: Vec<&'a mut [f64]>,
-    saved_y: Vec<&'a mut [f64]>,
-    recorded: Vec<&'a mut [f64]>,
-    tally: Vec<&'a mut [f64]>,
-    carry: Vec<&'a mut [f64]>,
+    count: usize,
+    saved_v: Columns<'a, f64>,
+    saved_y: Columns<'a, f64>,
+    recorded: Columns<'a, f64>,
+    tally: Columns<'a, f64>,
+    carry: Columns<'a, f64>,
     first_bad: &'a mut [i64],
-}
-
-/// Cuts every row of `width` numbers at the same places: one list of row slices per share.
-pub(crate) fn cut<'a, T>(data: &'a mut [T], width: usize, shares: &[usize]) -> Vec<Vec<&'a mut [T]>> {
-    let rows = data.len().checked_div(width).unwrap_or(0);
-    let mut parts: Vec<_> = shares.iter().map(|_| Vec::with_capacity(rows)).collect();
-    for mut row in data.chunks_exact_mut(width.max(1)) {
-        for (part, share) in parts.iter_mut().zip(shares) {
-            let (mine, rest) = row.split_at_mut(*share);
-            part.push(mine);
-            row = rest;
-        }
-    }
-    parts
 }
 
 pub(crate) fn expect(what: &'static str, expected: usize, got: usize) -> Result<(), Error> {
@@ -109,7 +107,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let b = plan.members;
     let traced = plan.model.traced()?;
     let (p, q) = (traced.shape.v, traced.shape.y);
-    let kept = saves(plan.steps, plan.every).count();
+    let kept = kept(plan.steps, plan.every);
     expect("v", p, plan.v.len())?;
     expect("y", q, plan.y.len())?;
     expect("saved_v", kept * p * b, arrays.saved_v.len())?;
@@ -140,6 +138,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         n => n,
     };
     let threads = threads.min(groups).max(1);
+    plan.model.room(traced.shape, threads)?;
     // A group alone may have all threads for itself; it knows whether they pay.
     let machine = Machine { threads: if groups == 1 { plan.machine.threads } else { 1 }, ..plan.machine };
     // Several shares a thread, so that one that is late does not keep the others waiting.
@@ -151,31 +150,35 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         })
         .collect();
 
+    let Arrays { saved_v, saved_y, recorded, tally, carry, first_bad } = arrays;
+    let numbers = [saved_v, saved_y, recorded, tally, carry].map(|array| cut(array, b, &shares).into_iter());
+    let [mut saved_v, mut saved_y, mut recorded, mut tally, mut carry] = numbers;
     let mut first = 0;
+    let mut left = first_bad;
     let mut parts = Vec::with_capacity(shares.len());
-    let numbers = [arrays.saved_v, arrays.saved_y, arrays.recorded, arrays.tally, arrays.carry].map(|a| cut(a, b, &shares));
-    let [mut saved_v, mut saved_y, mut recorded, mut tally, mut carry] = numbers.map(Vec::into_iter);
-    let next = |of: &mut std::vec::IntoIter<_>| of.next().unwrap_or_default();
-    for first_bad in cut(arrays.first_bad, b, &shares) {
-        let (saved_v, saved_y) = (next(&mut saved_v), next(&mut saved_y));
-        let (recorded, tally, carry) = (next(&mut recorded), next(&mut tally), next(&mut carry));
-        if let Some(first_bad) = first_bad.into_iter().next() {
-            let count = first_bad.len();
-            parts.push(Part { first, saved_v, saved_y, recorded, tally, carry, first_bad });
-            first += count;
+    for count in shares {
+        let numbers = [&mut saved_v, &mut saved_y, &mut recorded, &mut tally, &mut carry].map(Iterator::next);
+        let (first_bad, later) = std::mem::take(&mut left).split_at_mut(count);
+        if let [Some(saved_v), Some(saved_y), Some(recorded), Some(tally), Some(carry)] = numbers {
+            parts.push(Part { first, count, saved_v, saved_y, recorded, tally, carry, first_bad });
         }
+        (first, left) = (first + count, later);
     }
 
-    let worker = || Worker::new(plan, &traced, machine);
-    crew::share(parts, threads, total, monitor, worker(), || Ok(worker()), Worker::part)
+    let crew = Crew { threads, background: traced.is_long(lanes), total, stop: Stop::default() };
+    let worker = || Worker::new(plan, &traced, machine, &crew.stop);
+    crew::share(parts, &crew, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots and the tally when everybody was last looked at.
+/// Both slots and the tally when everybody was last looked at, and room for what is carried while the v slot holds velocities and for what
+/// is recorded.
 #[derive(Default)]
 struct Good {
     v: Vec<f64>,
     y: Vec<f64>,
     tally: Vec<f64>,
+    carried: Vec<f64>,
+    recorded: Vec<f64>,
 }
 
 /// One thread's groups, and where it stands.
@@ -187,16 +190,21 @@ struct Worker<'a> {
     full: Option<Box<dyn Group>>,
     rest: Option<(usize, Box<dyn Group>)>,
     good: Good,
+    stop: &'a Stop,
 }
 
 impl<'a> Worker<'a> {
-    fn new(plan: &'a Plan<'a>, traced: &'a Arc<Traced>, machine: Machine) -> Self {
-        Worker { plan, traced, machine, full: None, rest: None, good: Good::default() }
+    fn new(plan: &'a Plan<'a>, traced: &'a Arc<Traced>, machine: Machine, stop: &'a Stop) -> Self {
+        Worker { plan, traced, machine, full: None, rest: None, good: Good::default(), stop }
     }
 
     /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
     fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
-        let make = |members| self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total());
+        let make = |members| -> Result<_, Error> {
+            let mut group = self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
+            group.heed(self.stop);
+            Ok(group)
+        };
         if left >= lanes {
             let full = match self.full.take() {
                 Some(full) => full,
@@ -212,14 +220,14 @@ impl<'a> Worker<'a> {
     }
 
     fn part(&mut self, mut part: Part, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
-        let (plan, carries, members) = (self.plan, self.traced.carries, part.first_bad.len());
+        let (plan, carries, members) = (self.plan, self.traced.carries, part.count);
         let lanes = plan.model.lanes(self.traced, self.machine, plan.members, plan.total())?;
         let mut from = 0;
         while from < members {
             let mut good = std::mem::take(&mut self.good);
             let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
-            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good };
+            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, looked: plan.first };
             let ran = job.run(go_on);
             self.good = good;
             if !ran {
@@ -241,12 +249,19 @@ struct Job<'a, 'b> {
     from: usize,
     count: usize,
     good: &'a mut Good,
+    /// The step of the state that is remembered there.
+    looked: i64,
 }
 
-/// Copies the rows of a group into row slices.
-fn put(rows: &mut [&mut [f64]], from: usize, count: usize, slot: &[f64], lanes: usize) {
-    for (row, slot) in rows.iter_mut().zip(slot.chunks_exact(lanes)) {
-        row[from..from + count].copy_from_slice(&slot[..count]);
+/// Copies the rows of a group into those from the `at`-th on, as far as there are any.
+#[inline]
+fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f64], lanes: usize) {
+    for (i, slot) in (at..rows.rows()).zip(slot.chunks_exact(lanes)) {
+        match (rows.row(i), slot) {
+            // A call that copies one number takes longer than the number.
+            (row, [number]) => row[from] = *number,
+            (row, slot) => row[from..from + count].copy_from_slice(&slot[..count]),
+        }
     }
 }
 
@@ -261,110 +276,205 @@ impl Job<'_, '_> {
                 row.fill(self.part.first + self.from, self.count, slot);
             }
         }
-        let at_once = (PATIENCE / (v.len() + y.len()).max(1) as i64).clamp(1, LOOK);
+        let numbers = (v.len() + y.len()).max(1) as i64;
         if !plan.carried {
             self.group.start(plan.first);
         }
-        self.remember();
+        self.remember(plan.first);
 
-        let (mut k, mut looked, mut told) = (plan.first, plan.first, plan.first);
-        // A step of many bodies costs more than their numbers tell: whoever is large begins with one and shows how long it takes.
-        let mut piece = if at_once < LOOK { 1 } else { at_once };
-        for (i, save) in saves(plan.steps, plan.every).enumerate() {
+        let mut k = plan.first;
+        let longest = (PATIENCE / numbers).clamp(1, LOOK);
+        let mut piece = if numbers > LARGE { 1 } else { (FIRST / numbers).clamp(1, LOOK) };
+        let mut began = Instant::now();
+        // A run that keeps every state makes several steps at once where it can.
+        let keeps_all = plan.every == Some(1) && !self.carries && self.group.recorded() == 0;
+        let trail = if keeps_all { self.group.trail() as i64 } else { 0 };
+        let mut saves = saves(plan.steps, plan.every).enumerate();
+        while let Some((i, save)) = saves.next() {
             let until = plan.first + save;
+            let room = (self.looked + piece).min(plan.first + plan.steps) - k;
+            if i > 0 && trail > 0 && trail <= room && k % trail == 0 {
+                self.save_trail(i, k);
+                k += trail;
+                saves.nth(trail as usize - 2); // a trail has several steps
+                continue;
+            }
             while k < until {
-                let n = (until - k).min(looked + at_once - k).min(piece);
-                let began = Instant::now();
+                let n = (until - k).min(self.looked + piece - k);
                 self.group.advance(k, n);
                 k += n;
-                piece = if began.elapsed() > POLL { (n / 2).max(1) } else { at_once.min(2 * piece) };
-                if k - looked == at_once {
-                    self.look(looked, k);
-                    looked = k;
-                }
-                if k == looked || piece < LOOK {
-                    if !go_on(((k - told) * self.count as i64) as u64) {
+                if k - self.looked >= piece {
+                    let done = k - self.looked;
+                    self.look(k);
+                    let now = Instant::now();
+                    piece = if now - began > POLL { (piece / 2).max(1) } else { longest.min(4 * piece) };
+                    began = now;
+                    if !go_on((done * self.count as i64) as u64) {
                         return false;
                     }
-                    told = k;
                 }
             }
             self.save(i, k);
         }
-        if k > looked {
-            self.look(looked, k);
+        let left = k - self.looked;
+        if left > 0 && self.is_suspect() {
+            self.retrace(k);
         }
-        if k > told && !go_on(((k - told) * self.count as i64) as u64) {
+        if left > 0 && !go_on((left * self.count as i64) as u64) {
             return false;
         }
-        put(&mut self.part.carry, self.from, self.count, self.group.slots().0, lanes);
-        put(&mut self.part.tally, self.from, self.count, self.group.tally(), lanes);
+        put(&mut self.part.carry, 0, self.from, self.count, self.group.slots().0, lanes);
+        put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         true
     }
 
     fn save(&mut self, i: usize, k: i64) {
         let lanes = self.group.lanes();
         let (p, q) = (self.plan.v.len(), self.plan.y.len());
-        let carried = self.carries.then(|| self.group.slots().0.to_vec());
-        if carried.is_some() {
-            self.group.finish(k);
-        }
+        self.finish(k);
         let (v, y) = self.group.slots();
-        put(&mut self.part.saved_v[i * p..(i + 1) * p], self.from, self.count, v, lanes);
-        put(&mut self.part.saved_y[i * q..(i + 1) * q], self.from, self.count, y, lanes);
+        put(&mut self.part.saved_v, i * p, self.from, self.count, v, lanes);
+        put(&mut self.part.saved_y, i * q, self.from, self.count, y, lanes);
         let recorded = self.group.recorded();
         if recorded > 0 {
-            let mut rows = vec![0.0; recorded * lanes];
-            self.group.record(&mut rows);
-            put(&mut self.part.recorded[i * recorded..(i + 1) * recorded], self.from, self.count, &rows, lanes);
+            let rows = &mut self.good.recorded;
+            rows.resize(recorded * lanes, 0.0);
+            self.group.record(rows);
+            put(&mut self.part.recorded, i * recorded, self.from, self.count, rows, lanes);
         }
-        if let Some(carried) = carried {
-            self.group.slots_mut().0.copy_from_slice(&carried);
-        }
-    }
-
-    /// Keeps the present state to come back to.
-    fn remember(&mut self) {
-        let (v, y) = self.group.slots();
-        for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
-            good.clear();
-            good.extend_from_slice(now);
+        let diverged = self.carries && self.any_new(f64::INFINITY);
+        self.unfinish();
+        if diverged {
+            self.retrace(k);
         }
     }
 
-    /// Whether a member that was finite so far no longer is; infinities and NaN stay, so looking now and then is enough.
-    fn newly_bad(&self) -> bool {
-        let (v, y) = self.group.slots();
-        let finite = |x: &f64| x.is_finite();
-        if v.iter().all(finite) && y.iter().all(finite) {
-            return false;
-        }
-        (0..self.count).any(|l| self.is_new(l))
-    }
-
-    fn is_new(&self, l: usize) -> bool {
+    /// Makes the steps of a trail from step `k`, and keeps the states after them, the first of which is the `i`-th.
+    fn save_trail(&mut self, i: usize, k: i64) {
         let lanes = self.group.lanes();
-        let (v, y) = self.group.slots();
-        let bad = |slot: &[f64]| slot.iter().skip(l).step_by(lanes).any(|x| !x.is_finite());
-        self.part.first_bad[self.from + l] < 0 && (bad(v) || bad(y))
-    }
-
-    /// If somebody diverged since the last look, goes back to it and steps again, one by one, to see who and when.
-    fn look(&mut self, looked: i64, k: i64) {
-        if self.newly_bad() {
-            let (v, y) = self.group.slots_mut();
-            v.copy_from_slice(&self.good.v);
-            y.copy_from_slice(&self.good.y);
-            self.group.tally_mut().copy_from_slice(&self.good.tally);
-            for at in looked..k {
-                self.group.advance(at, 1);
-                for l in 0..self.count {
-                    if self.is_new(l) {
-                        self.part.first_bad[self.from + l] = at + 1;
-                    }
+        let (p, q) = (self.plan.v.len(), self.plan.y.len());
+        let steps = self.group.trail();
+        let (from, count) = (self.from, self.count);
+        let states = self.group.advance_on_trail(k);
+        let numbers = states.len() / steps;
+        let whole = (self.part.saved_v.whole(i * p, steps * p), self.part.saved_y.whole(i * q, steps * q));
+        if let (1, 1, (Some(v), Some(y))) = (lanes, self.part.count, whole) {
+            for (rows, first, size) in [(v, 0, p), (y, p, q)] {
+                // Number after number: a call that copies one or two takes longer than they do.
+                for i in 0..size {
+                    let of_states = states[first + i..].iter().step_by(numbers);
+                    rows[i..].iter_mut().step_by(size).zip(of_states).for_each(|(to, from)| *to = *from);
                 }
             }
+            return;
         }
-        self.remember();
+        for (s, state) in states.chunks_exact(numbers).enumerate() {
+            put(&mut self.part.saved_v, (i + s) * p, from, count, &state[..p * lanes], lanes);
+            put(&mut self.part.saved_y, (i + s) * q, from, count, &state[p * lanes..(p + q) * lanes], lanes);
+        }
+    }
+
+    /// From now on the v slot holds velocities, until `unfinish`.
+    fn finish(&mut self, k: i64) {
+        if self.carries {
+            keep(&mut self.good.carried, self.group.slots().0);
+            self.group.finish(k);
+        }
+    }
+
+    fn unfinish(&mut self) {
+        if self.carries {
+            self.group.slots_mut().0.copy_from_slice(&self.good.carried);
+        }
+    }
+
+    /// Keeps the state of step `k` to come back to.
+    fn remember(&mut self, k: i64) {
+        let (v, y) = self.group.slots();
+        for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
+            keep(good, now);
+        }
+        self.looked = k;
+    }
+
+    /// Whether a member that was finite so far has a number in its slots that is not below this size.
+    fn any_new(&self, size: f64) -> bool {
+        let (v, y) = self.group.slots();
+        // All of a chunk are looked at, which is vector code; who it is is asked only if there is one.
+        let all_below = |slot: &[f64]| slot.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)));
+        !(all_below(v) && all_below(y)) && (0..self.count).any(|l| self.is_new(l, size))
+    }
+
+    fn is_new(&self, l: usize, size: f64) -> bool {
+        let lanes = self.group.lanes();
+        let (v, y) = self.group.slots();
+        let all_below = |slot: &[f64]| slot.iter().skip(l).step_by(lanes).all(|x| is_below(*x, size));
+        self.part.first_bad[self.from + l] < 0 && !(all_below(v) && all_below(y))
+    }
+
+    /// Infinities and NaN stay in the slots, so it is enough to look now and then. Velocities that are made of what a method carries may
+    /// be infinite and finite again, but only of numbers that are [`HUGE`].
+    fn is_suspect(&self) -> bool {
+        let most = if self.carries { HUGE * self.plan.clock.h.min(1.0) } else { f64::INFINITY };
+        self.any_new(most)
+    }
+
+    fn look(&mut self, k: i64) {
+        if self.is_suspect() {
+            self.retrace(k);
+        } else {
+            self.remember(k);
+        }
+    }
+
+    /// Finds out who diverged since the last look and when, and looks at step `k`, in whose state the group is.
+    fn retrace(&mut self, k: i64) {
+        let steps = k - self.looked;
+        if steps == 1 {
+            self.note(k);
+            self.finish(k);
+            if self.carries {
+                self.note(k);
+            }
+            self.unfinish();
+            return self.remember(k);
+        }
+        // Back to the last look, and on in shorter pieces.
+        let (v, y) = self.group.slots_mut();
+        v.copy_from_slice(&self.good.v);
+        y.copy_from_slice(&self.good.y);
+        self.group.tally_mut().copy_from_slice(&self.good.tally);
+        let piece = (steps as u64).div_ceil(LOOKS_BETWEEN as u64) as i64;
+        let mut at = self.looked;
+        while at < k {
+            let n = piece.min(k - at);
+            self.group.advance(at, n);
+            at += n;
+            self.look(at);
+        }
+    }
+
+    /// Notes who has a number in the slots that is not finite after step `k`.
+    fn note(&mut self, k: i64) {
+        for l in 0..self.count {
+            if self.is_new(l, f64::INFINITY) {
+                self.part.first_bad[self.from + l] = k;
+            }
+        }
     }
 }
+
+/// Whether a number is smaller than a size; a NaN is not.
+fn is_below(x: f64, size: f64) -> bool {
+    x.abs() < size
+}
+
+fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
+    to.clear();
+    to.extend_from_slice(numbers);
+}
+
+/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method that carries something
+/// else are looked at after every step. The difference of two coordinates over the step overflows only beyond 2¹⁰²³ times the step, so that
+/// such a one between two looks at smaller numbers would have to grow by 2⁶⁰ and shrink again within [`LOOK`] steps.
+const HUGE: f64 = f64::from_bits((1023 + 960) << 52);

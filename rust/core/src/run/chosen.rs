@@ -1,12 +1,13 @@
-//! The driver of steps of chosen length: every member goes at its own pace, and a lane that is done takes the next member.
+//! The driver of adaptive steps: every member has its own time and step, and when one is done its lane takes the next.
 
 use std::{ops::Range, sync::Arc, thread};
 
 use super::{
     Machine, Model,
-    batch::{cut, expect},
-    crew::{self, GoOn},
-    paced::Paced,
+    adaptive::AdaptiveBatch,
+    batch::expect,
+    columns::{Columns, cut},
+    crew::{self, Crew, GoOn, Stop},
 };
 use crate::{error::Error, pace::Pace, spec::Row, trace::Traced};
 
@@ -17,16 +18,10 @@ pub struct Plan<'a> {
     pub model: Model<'a>,
     /// What hot loops may use.
     pub machine: Machine,
-    /// Time of the start.
-    pub t0: f64,
-    /// Times to reach exactly and to keep the state at, ascending.
+    /// Times to keep the state at, ascending.
     pub at: &'a [f64],
-    /// The step to try first.
-    pub first: Row<'a>,
-    /// Tolerated error of a step, relative to the length of a block.
-    pub relative: Row<'a>,
-    /// Tolerated error of a step beside the relative one.
-    pub absolute: Row<'a>,
+    /// Where members stand at the start, by rows, in the order of [`Pace::numbers`].
+    pub paces: Vec<Row<'a>>,
     /// The most attempts of a member.
     pub budget: i64,
     /// Velocities at the start, by rows.
@@ -57,14 +52,17 @@ pub struct Arrays<'a> {
     pub saved_v: &'a mut [f64],
     /// Likewise the coordinates.
     pub saved_y: &'a mut [f64],
-    /// Two rows: the time that a member reached, and the step that it would try next.
-    pub reached: &'a mut [f64],
-    /// Three rows: accepted and rejected attempts, and the status.
-    pub counts: &'a mut [i64],
+    /// Rows of the state where members stand at the end, v and y: that before the step in which the last time is.
+    pub state: &'a mut [f64],
+    /// Where they stand, by rows.
+    pub paces: &'a mut [f64],
+    /// One row: the status.
+    pub status: &'a mut [i64],
 }
 
-/// Attempts between two looks at the lanes; of a large member a single one, which may take long.
+/// Attempts between two checks of the lanes, and while some make extra steps; of a large member a single one, which may take long.
 const LOOK: usize = 16;
+const SHORT_LOOK: usize = 4;
 /// Numbers of a lane above which it is large.
 const LARGE: usize = 1000;
 /// Members below which a second thread costs more than it brings, for a small system.
@@ -73,10 +71,11 @@ const WORTH_A_THREAD: usize = 256;
 struct Part<'a> {
     first: usize,
     count: usize,
-    saved_v: Vec<&'a mut [f64]>,
-    saved_y: Vec<&'a mut [f64]>,
-    reached: Vec<&'a mut [f64]>,
-    counts: Vec<&'a mut [i64]>,
+    saved_v: Columns<'a, f64>,
+    saved_y: Columns<'a, f64>,
+    state: Columns<'a, f64>,
+    paces: Columns<'a, f64>,
+    status: Columns<'a, i64>,
 }
 
 /// Makes the run. The monitor is as that of [`crate::batch::run`].
@@ -88,16 +87,20 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("y", q, plan.y.len())?;
     expect("saved_v", plan.at.len() * p * b, arrays.saved_v.len())?;
     expect("saved_y", plan.at.len() * q * b, arrays.saved_y.len())?;
-    expect("reached", 2 * b, arrays.reached.len())?;
-    expect("counts", 3 * b, arrays.counts.len())?;
-    let several = [plan.first, plan.relative, plan.absolute];
-    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&several) {
+    expect("state", (p + q) * b, arrays.state.len())?;
+    expect("paces", Pace::<f64>::NUMBERS, plan.paces.len())?;
+    expect("paces", Pace::<f64>::NUMBERS * b, arrays.paces.len())?;
+    expect("status", b, arrays.status.len())?;
+    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces) {
         if row.0.len() != 1 {
             expect("a row", b, row.0.len())?;
         }
     }
 
-    let mine = Worker::new(plan, &traced)?;
+    plan.model.room(traced.shape, 1)?;
+    let stop = Stop::default();
+    let worker = || Worker::new(plan, &traced, &stop);
+    let mine = worker()?;
     let lanes = mine.group.lanes();
     let threads = match plan.machine.threads {
         0 if lanes > 1 && b < WORTH_A_THREAD => 1,
@@ -105,57 +108,76 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         n => n,
     };
     let threads = threads.min(b.div_ceil(lanes)).max(1);
+    plan.model.room(traced.shape, threads)?;
     // Few shares, since lanes run empty at the end of each; but some, so that one that is late does not keep the others waiting.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
-    let mut counts = cut(arrays.counts, b, &shares).into_iter();
-    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.reached].map(|a| cut(a, b, &shares).into_iter());
+    let mut status = cut(arrays.status, b, &shares).into_iter();
+    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces].map(|a| cut(a, b, &shares).into_iter());
     let mut parts = Vec::with_capacity(shares.len());
     let mut first = 0;
     for count in shares {
-        let [saved_v, saved_y, reached] = rows.each_mut().map(|r| r.next().unwrap_or_default());
-        parts.push(Part { first, count, saved_v, saved_y, reached, counts: counts.next().unwrap_or_default() });
+        if let ([Some(saved_v), Some(saved_y), Some(state), Some(paces)], Some(status)) =
+            (rows.each_mut().map(Iterator::next), status.next())
+        {
+            parts.push(Part { first, count, saved_v, saved_y, state, paces, status });
+        }
         first += count;
     }
-    let total = b as f64;
-    crew::share(parts, threads, total, monitor, mine, || Worker::new(plan, &traced), Worker::part)
+    let crew = Crew { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
+    crew::share(parts, &crew, monitor, mine, worker, Worker::part)
 }
 
-/// Who is in a lane: a member of the part, and which of the asked times is next.
-#[derive(Clone, Copy)]
-struct Seat {
+/// Which member of the part a lane steps, and which of the saved times is next.
+struct Assignment {
     member: usize,
     next: usize,
+    /// While an extra step is made: the state that it starts from, which has to be put back.
+    origin: Option<Vec<f64>>,
 }
 
 struct Worker<'a> {
     plan: &'a Plan<'a>,
-    group: Box<dyn Paced>,
+    group: Box<dyn AdaptiveBatch>,
 }
 
 impl<'a> Worker<'a> {
-    fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>) -> Result<Self, Error> {
+    fn new(plan: &'a Plan<'a>, traced: &Arc<Traced>, stop: &Stop) -> Result<Self, Error> {
         let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
         let machine = Machine { threads, ..plan.machine };
-        Ok(Worker { plan, group: plan.model.paced(traced, machine, plan.members, plan.budget as f64)? })
+        let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
+        group.heed(stop);
+        Ok(Worker { plan, group })
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
         let mut waiting = 0..part.count;
-        let mut seats: Vec<Option<Seat>> = vec![None; self.group.lanes()];
-        for (lane, seat) in seats.iter_mut().enumerate() {
-            // A lane that nobody takes still needs parameters that are numbers; its pace never runs.
-            self.sit(&part, lane, part.count - 1);
-            *seat = waiting.next().map(|member| self.sit(&part, lane, member));
+        let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
+        for (lane, assigned) in assignments.iter_mut().enumerate() {
+            // A lane without a member still needs parameters that are numbers; its pace never runs.
+            self.assign_member(&part, lane, part.count - 1);
+            let pace = self.group.pace(lane);
+            self.group.set_pace(lane, pace.idle());
+            *assigned = waiting.next().map(|member| self.assign_member(&part, lane, member));
         }
-        while seats.iter().any(Option::is_some) {
-            for (lane, seat) in seats.iter_mut().enumerate() {
-                if let Some(taken) = *seat {
-                    *seat = self.tend(&mut part, lane, taken, &mut waiting, go_on)?;
+        while assignments.iter().any(Option::is_some) {
+            for (lane, assigned) in assignments.iter_mut().enumerate() {
+                if let Some(taken) = assigned.take() {
+                    *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
             let numbers = self.plan.v.len() + self.plan.y.len();
-            self.group.attempt(if numbers > LARGE { 1 } else { LOOK });
+            // A member that makes an extra step makes only that before the next check.
+            let (taken, extra) =
+                assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
+            let look = if numbers > LARGE || 2 * extra > taken {
+                1
+            } else if extra > 0 {
+                SHORT_LOOK
+            } else {
+                LOOK
+            };
+            self.group.attempt(look);
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }
@@ -163,58 +185,71 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// A member takes a lane, at the start.
-    fn sit(&mut self, part: &Part, lane: usize, member: usize) -> Seat {
+    /// Puts a member into a lane, at its start.
+    fn assign_member(&mut self, part: &Part, lane: usize, member: usize) -> Assignment {
         let (plan, at) = (self.plan, part.first + member);
         self.group.prepare_lane(&plan.model.spec, lane, at);
         let state: Vec<f64> = plan.v.iter().chain(&plan.y).map(|row| row.at(at)).collect();
-        self.group.sit(lane, &state);
-        let (first, relative, absolute) = (plan.first.at(at), plan.relative.at(at), plan.absolute.at(at));
-        self.group.set_pace(lane, Pace::new(plan.t0, first, relative, absolute));
-        Seat { member, next: 0 }
+        self.group.set_state(lane, &state);
+        let pace = Pace::of(std::array::from_fn(|i| plan.paces[i].at(at)));
+        self.group.set_pace(lane, Pace { target: pace.t, ..pace });
+        Assignment { member, next: 0, origin: None }
     }
 
-    /// Brings a lane to where it has something to do: keeps what it has reached, sets its next time, ends its member and seats the
-    /// next. None if there is nobody left.
-    fn tend(
+    /// Brings a lane to its next attempt: saves the states that it has reached and sets its next time, or ends its member and assigns
+    /// the next. None if no member is left.
+    fn update_lane(
         &mut self,
         part: &mut Part,
         lane: usize,
-        mut seat: Seat,
+        mut assigned: Assignment,
         waiting: &mut Range<usize>,
         go_on: GoOn,
-    ) -> Result<Option<Seat>, Error> {
-        let plan = self.plan;
+    ) -> Result<Option<Assignment>, Error> {
+        let (plan, budget) = (self.plan, self.plan.budget as f64);
         loop {
+            if let Some(origin) = assigned.origin.take() {
+                self.save(part, lane, &assigned);
+                assigned.next += 1;
+                self.group.set_state(lane, &origin);
+            }
             let mut pace = self.group.pace(lane);
-            while let Some(&target) = plan.at.get(seat.next) {
+            while let Some(&target) = plan.at.get(assigned.next) {
                 pace.target = target;
                 if pace.t < target {
                     break;
                 }
-                self.keep(part, lane, seat);
-                seat.next += 1;
+                self.save(part, lane, &assigned);
+                assigned.next += 1;
             }
-            if seat.next < plan.at.len() && pace.runs(plan.budget as f64) {
-                self.group.set_pace(lane, pace);
-                return Ok(Some(seat));
+            if assigned.next < plan.at.len() {
+                if pace.holds() {
+                    pace.extra = pace.target - pace.t;
+                    assigned.origin = Some(self.group.state(lane));
+                } else {
+                    pace.held = 0.0;
+                }
+                if pace.extra > 0.0 || pace.runs(budget) {
+                    self.group.set_pace(lane, pace);
+                    return Ok(Some(assigned));
+                }
             }
-            self.end(part, seat, &pace);
+            self.end(part, lane, &assigned, &pace);
             if !go_on(1) {
                 return Err(Error::Interrupted);
             }
             let Some(member) = waiting.next() else {
-                self.group.set_pace(lane, Pace { target: pace.t, ..pace }); // nothing runs in an empty lane
+                self.group.set_pace(lane, pace.idle()); // nothing runs in an empty lane
                 return Ok(None);
             };
-            seat = self.sit(part, lane, member);
+            assigned = self.assign_member(part, lane, member);
         }
     }
 
     /// Notes how a member ended.
-    fn end(&self, part: &mut Part, seat: Seat, pace: &Pace<f64>) {
+    fn end(&self, part: &mut Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>) {
         let times = self.plan.at.len();
-        let status = if seat.next == times {
+        let status = if assigned.next == times {
             Status::Ok
         } else if pace.accepted + pace.rejected >= self.plan.budget as f64 {
             Status::Budget
@@ -224,25 +259,28 @@ impl<'a> Worker<'a> {
             Status::NotFinite
         };
         for rows in [&mut part.saved_v, &mut part.saved_y] {
-            let block = rows.len() / times.max(1);
-            for row in &mut rows[seat.next * block..] {
-                row[seat.member] = f64::NAN;
+            let block = rows.rows() / times.max(1);
+            for row in assigned.next * block..rows.rows() {
+                rows.row(row)[assigned.member] = f64::NAN;
             }
         }
-        for (row, number) in part.reached.iter_mut().zip([pace.t, pace.h]) {
-            row[seat.member] = number;
+        for (row, number) in self.group.state(lane).into_iter().enumerate() {
+            part.state.row(row)[assigned.member] = number;
         }
-        for (row, number) in part.counts.iter_mut().zip([pace.accepted as i64, pace.rejected as i64, status as i64]) {
-            row[seat.member] = number;
+        for (row, number) in pace.numbers().into_iter().enumerate() {
+            part.paces.row(row)[assigned.member] = number;
+        }
+        for row in 0..part.status.rows() {
+            part.status.row(row)[assigned.member] = status as i64;
         }
     }
 
-    fn keep(&self, part: &mut Part, lane: usize, seat: Seat) {
+    fn save(&self, part: &mut Part, lane: usize, assigned: &Assignment) {
         let state = self.group.state(lane);
         let (v, y) = state.split_at(self.plan.v.len());
         for (rows, block) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
-            for (row, number) in rows[seat.next * block.len()..].iter_mut().zip(block) {
-                row[seat.member] = *number;
+            for (i, number) in block.iter().enumerate() {
+                rows.row(assigned.next * block.len() + i)[assigned.member] = *number;
             }
         }
     }

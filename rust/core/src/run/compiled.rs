@@ -5,18 +5,26 @@ use std::time::{Duration, Instant};
 use super::{Machine, Model, Way};
 use crate::{
     error::Error,
-    tape::{Counts, split::Body},
+    kernel::{Layout, writer},
+    tape::{
+        Counts,
+        split::{Body, Split},
+    },
 };
 
 /// A step that is one tape, and its kernel.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Compiled {
-    /// Operations as the document writes them.
+    /// Operations before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
     /// Operations that every member makes in every step.
     pub computed: Counts,
     /// Operations that are made once a run, once for each member, and once for each step.
     pub before: [usize; 3],
+    /// The operations themselves.
+    pub split: Split,
+    /// How the machine code goes through a tile, or why there is none.
+    pub layout: Result<Layout, Interpreted>,
     /// How many members the kernel steps together.
     pub lanes: usize,
     /// How long its machine code is; zero where it is interpreted.
@@ -27,6 +35,28 @@ pub struct Compiled {
     pub trace: Duration,
     /// How long writing the code took, with choosing its shape, and preparing what is interpreted before it.
     pub compile: Duration,
+}
+
+/// Why a step is interpreted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpreted {
+    /// At this level no machine code is written: this CPU has none, or it was asked for.
+    Level,
+    /// The system does not let pages be executed.
+    Pages,
+    /// The writer has no code for this step.
+    Writer,
+}
+
+impl Interpreted {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Interpreted::Level => "level",
+            Interpreted::Pages => "pages",
+            Interpreted::Writer => "writer",
+        }
+    }
 }
 
 fn counts(body: &Body) -> Counts {
@@ -49,17 +79,48 @@ impl Model<'_> {
         let began = Instant::now();
         let kit = tapes.step.kit(machine.level, members);
         let runner = &kit.runner;
-        let (bytes, spills) = runner.write().map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
+        let written = runner.write();
+        let (bytes, spills) = written.map_or((0, 0), |kernel| (kernel.bytes(), kernel.spills()));
+        let layout = match (runner.layout(), written) {
+            (None, _) => Err(Interpreted::Level),
+            (Some(layout), Some(_)) => Ok(layout),
+            (Some(_), None) if !writer::allowed() => Err(Interpreted::Pages),
+            (Some(_), None) => Err(Interpreted::Writer),
+        };
         let compile = began.elapsed();
         Ok(Some(Compiled {
             written: tapes.written,
             computed: counts(&split.body),
             before: [&split.run, &split.member, &split.step].map(Body::work),
+            split: split.clone(),
+            layout,
             lanes: runner.lanes(),
             bytes,
             spills,
             trace,
             compile,
         }))
+    }
+
+    /// By what a step is made that is too long for one tape, about how many operations it has, and how many members go together: by tapes
+    /// of the rates ("rates"), by a kernel for one member that is written by hand ("hand"), or by one for products of matrices ("matrix").
+    /// None if it is one tape. `paced`: at adaptive steps.
+    pub fn in_parts(&self, machine: Machine, members: usize, paced: bool) -> Result<Option<(&'static str, usize, usize)>, Error> {
+        let traced = self.traced()?;
+        let steps = if paced { 0.0 } else { f64::INFINITY };
+        let mut way = self.way(&traced, machine, members, steps);
+        if paced && !matches!(way, Way::Tape | Way::Map) {
+            way = match (way, self.way(&traced, machine, 1, steps)) {
+                (Way::Long(long), _) | (_, Way::Long(long)) => Way::Long(long),
+                _ => Way::Rates(1),
+            };
+        }
+        Ok(match way {
+            Way::Tape => None,
+            Way::Map if paced => None,
+            Way::Rates(lanes) => Some(("rates", traced.operations.1, lanes)),
+            Way::Long(_) => Some(("hand", traced.operations.1, 1)),
+            Way::Map => Some(("matrix", traced.operations.1, 1)),
+        })
     }
 }

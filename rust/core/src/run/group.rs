@@ -1,10 +1,11 @@
-//! Groups: a handful of members stepped together, whatever they are made of.
+//! Groups: members stepped together, by a tape or, large ones, by their kernels.
 
 use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, Kit, Loaded, Stage},
+    crew::Stop,
+    stage::{Clock, Kit, PreparedStage, Stage},
 };
 use crate::{
     error::Error,
@@ -14,7 +15,7 @@ use crate::{
     trace::{Tapes, Traced},
 };
 
-/// A handful of members stepped together.
+/// Members stepped together.
 ///
 /// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
 /// method carries between steps, which is the velocity for all but the methods that say otherwise in their record.
@@ -25,8 +26,11 @@ pub trait Group: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
-    /// Makes now what would be made when it pays: for a loop that cannot wait.
-    fn settle(&mut self) {}
+    /// Compiles now what would be compiled later, when it pays: for real-time loops.
+    fn compile_now(&mut self) {}
+
+    /// Stops within a step, too, if it may take long.
+    fn heed(&mut self, _stop: &Stop) {}
 
     /// Both slots.
     fn slots(&self) -> (&[f64], &[f64]);
@@ -39,6 +43,16 @@ pub trait Group: Send + Sync {
 
     /// `n` steps from step `k`.
     fn advance(&mut self, k: i64, n: i64);
+
+    /// How many steps can be made at once so that the state after each is kept; none if that is not quicker than step by step.
+    fn trail(&self) -> usize {
+        0
+    }
+
+    /// So many steps from step `k`, a multiple of them: the states after each, one after the other, v slots and y together.
+    fn advance_on_trail(&mut self, _k: i64) -> &[f64] {
+        &[]
+    }
 
     /// Turns what the method carries into velocities, at step `k`: the inverse of `start`.
     fn finish(&mut self, k: i64);
@@ -56,24 +70,24 @@ pub trait Group: Send + Sync {
     fn tally_mut(&mut self) -> &mut [f64];
 }
 
-/// A stage that is run once in a while, over a state of its own.
-struct Aside {
-    loaded: Loaded,
+/// A stage outside the steps (start, finish or record), over a state of its own.
+struct SideStage {
+    prepared: PreparedStage,
     /// The state, with what the stage makes behind it.
     state: Vec<f64>,
 }
 
-impl Aside {
-    fn new(stage: &Stage, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> Aside {
-        let loaded = Loaded::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
-        Aside { loaded, state: vec![0.0; stage.split.body.next.len() * lanes] }
+impl SideStage {
+    fn new(stage: &Stage, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> SideStage {
+        let prepared = PreparedStage::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
+        SideStage { prepared, state: vec![0.0; stage.split.body.next.len() * lanes] }
     }
 
     /// Runs the stage once over a state, and gives what it makes of it.
     fn run(&mut self, stage: &Stage, clock: &Clock, k: i64, from: &[f64]) -> &[f64] {
         let shared = from.len().min(self.state.len());
         self.state[..shared].copy_from_slice(&from[..shared]);
-        self.loaded.advance(stage, clock, k, 1, &mut self.state);
+        self.prepared.advance(stage, clock, k, 1, &mut self.state);
         &self.state
     }
 }
@@ -83,11 +97,12 @@ pub struct Lanes {
     tapes: Arc<Tapes>,
     shape: Shape,
     recorded: usize,
+    level: Level,
     clock: Clock,
-    step: Loaded,
-    start: Option<Aside>,
-    finish: Option<Aside>,
-    record: Option<Aside>,
+    step: PreparedStage,
+    start: Option<SideStage>,
+    finish: Option<SideStage>,
+    record: Option<SideStage>,
     state: Aligned,
 }
 
@@ -100,16 +115,17 @@ impl Lanes {
 
     fn with(traced: &Traced, kit: Arc<Kit>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes, Error> {
         let tapes = traced.tapes()?;
-        let step = Loaded::with(&tapes.step, kit, spec, clock, f64::INFINITY);
+        let step = PreparedStage::with(&tapes.step, kit, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
         let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
-        let aside = |stage: &Option<Stage>| stage.as_ref().map(|stage| Aside::new(stage, spec, level, lanes, clock));
+        let side = |stage: &Option<Stage>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
         Ok(Lanes {
             state: Aligned::new(numbers * lanes),
+            level,
             clock: *clock,
-            start: aside(&tapes.start),
-            finish: aside(&tapes.finish),
-            record: aside(&tapes.record),
+            start: side(&tapes.start),
+            finish: side(&tapes.finish),
+            record: side(&tapes.record),
             step,
             tapes,
             shape: traced.shape,
@@ -117,11 +133,11 @@ impl Lanes {
         })
     }
 
-    /// The stages that are run once in a while.
-    fn asides(&mut self) -> impl Iterator<Item = (&mut Aside, &Stage)> {
+    /// The stages outside the steps.
+    fn side_stages(&mut self) -> impl Iterator<Item = (&mut SideStage, &Stage)> {
         let Lanes { tapes, start, finish, record, .. } = self;
         let all = [(start, &tapes.start), (finish, &tapes.finish), (record, &tapes.record)];
-        all.into_iter().filter_map(|(aside, stage)| Some((aside.as_mut()?, stage.as_ref()?)))
+        all.into_iter().filter_map(|(side, stage)| Some((side.as_mut()?, stage.as_ref()?)))
     }
 
     /// Numbers of both slots.
@@ -138,15 +154,15 @@ impl Group for Lanes {
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         self.step.prepare(&self.tapes.step, spec, first, count);
-        for (aside, stage) in self.asides() {
-            aside.loaded.prepare(stage, spec, first, count);
+        for (side, stage) in self.side_stages() {
+            side.prepared.prepare(stage, spec, first, count);
         }
         self.tally_mut().fill(0.0);
     }
 
-    fn settle(&mut self) {
-        self.step.settle();
-        self.asides().for_each(|(aside, _)| aside.loaded.settle());
+    fn compile_now(&mut self) {
+        self.step.compile_now();
+        self.side_stages().for_each(|(side, _)| side.prepared.compile_now());
     }
 
     fn slots(&self) -> (&[f64], &[f64]) {
@@ -161,8 +177,8 @@ impl Group for Lanes {
 
     fn start(&mut self, k: i64) {
         let v = self.sizes().0;
-        if let (Some(aside), Some(stage)) = (&mut self.start, &self.tapes.start) {
-            let made = aside.run(stage, &self.clock, k, &self.state);
+        if let (Some(side), Some(stage)) = (&mut self.start, &self.tapes.start) {
+            let made = side.run(stage, &self.clock, k, &self.state);
             self.state[..v].copy_from_slice(&made[..v]);
         }
     }
@@ -171,10 +187,18 @@ impl Group for Lanes {
         self.step.advance(&self.tapes.step, &self.clock, k, n as usize, &mut self.state);
     }
 
+    fn trail(&self) -> usize {
+        self.step.trail(&self.tapes.step, self.level)
+    }
+
+    fn advance_on_trail(&mut self, k: i64) -> &[f64] {
+        self.step.advance_on_trail(&self.tapes.step, &self.clock, k, &mut self.state)
+    }
+
     fn finish(&mut self, k: i64) {
         let v = self.sizes().0;
-        if let (Some(aside), Some(stage)) = (&mut self.finish, &self.tapes.finish) {
-            let made = aside.run(stage, &self.clock, k, &self.state);
+        if let (Some(side), Some(stage)) = (&mut self.finish, &self.tapes.finish) {
+            let made = side.run(stage, &self.clock, k, &self.state);
             self.state[..v].copy_from_slice(&made[..v]);
         }
     }
@@ -185,8 +209,8 @@ impl Group for Lanes {
 
     fn record(&mut self, rows: &mut [f64]) {
         let (v, y) = self.sizes();
-        if let (Some(aside), Some(stage)) = (&mut self.record, &self.tapes.record) {
-            let made = aside.run(stage, &self.clock, 0, &self.state[..v + y]);
+        if let (Some(side), Some(stage)) = (&mut self.record, &self.tapes.record) {
+            let made = side.run(stage, &self.clock, 0, &self.state[..v + y]);
             rows.copy_from_slice(&made[v + y..]);
         }
     }

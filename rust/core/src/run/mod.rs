@@ -1,20 +1,21 @@
 //! The driver: many members, some threads, what to keep, and who diverged. It knows nothing of the systems that it steps.
 
 pub use stepwell_base::aligned;
+pub mod adaptive;
 pub mod batch;
 pub mod chosen;
+mod columns;
 pub mod compiled;
 pub mod crew;
 pub mod group;
-pub mod paced;
 pub mod stage;
 pub mod world;
 
 use std::sync::Arc;
 
 use self::{
+    adaptive::{AdaptiveBatch, AdaptiveLanes, NO_CLOCK},
     group::{Group, Lanes},
-    paced::{NO_CLOCK, Paced, PacedLanes},
     stage::Clock,
 };
 use crate::{
@@ -22,9 +23,9 @@ use crate::{
     isa::Level,
     large::{
         self, Asked, Long, Rates, STRAIGHT,
+        adaptive::LargeAdaptive,
         group::LargeGroup,
         matrix::Matrix,
-        paced::LargePaced,
         tapes::{self, TapeRates},
     },
     spec::Spec,
@@ -51,6 +52,16 @@ pub struct Machine {
 }
 
 impl Model<'_> {
+    /// An error if there is no room for what so many threads keep of a system beside the results. To ask is quicker than to stop in the
+    /// middle, where nobody could go on.
+    pub fn room(&self, shape: system::Shape, threads: usize) -> Result<(), Error> {
+        let samples = self.spec.tables.iter().map(|table| table.samples.len()).sum::<usize>();
+        let given = (self.spec.rows.len() + samples).saturating_mul(OF_A_PARAMETER);
+        let bytes = (shape.v + shape.y).saturating_mul(OF_A_NUMBER).saturating_add(given).saturating_mul(threads);
+        let has_room = bytes < UNCHECKED_BYTES || Vec::<u8>::new().try_reserve_exact(bytes).is_ok();
+        if has_room { Ok(()) } else { Err(Error::Memory { bytes }) }
+    }
+
     /// Its tapes.
     pub fn traced(&self) -> Result<Arc<Traced>, Error> {
         self.scene.traced()
@@ -59,10 +70,13 @@ impl Model<'_> {
     /// By what so many members are stepped, if so many steps of members are to be made in all.
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
-        let lone = members == 1;
+        let single = members == 1;
+        if self.scene.fused {
+            return Way::Tape; // what is fused is decided on the tape of the whole step
+        }
         if let How::Matrix { .. } = &self.scene.how {
             // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-            return if rates >= if members <= ALONE { LONE_MAP } else { MAP } { Way::Map } else { Way::Tape };
+            return if rates >= if members <= ALONE { SINGLE_MAP } else { MAP } { Way::Map } else { Way::Tape };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
         let large = step > STRAIGHT;
@@ -70,9 +84,9 @@ impl Model<'_> {
         let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64 || traced.is_rated();
         let is_long = |long: Long| rates >= long.from.0 || step >= long.from.1;
         match long {
-            Some(long) if lone && is_long(long) => Way::Long(long),
-            Some(long) if large && (rates >= long.beside || members <= ALONE && is_long(long) || !pays()) => Way::Long(long),
-            _ if large => Way::Rates(if lone { 1 } else { tapes::lanes(machine.level) }),
+            Some(long) if single && is_long(long) => Way::Long(long),
+            Some(long) if large && (rates >= long.from_batch || members <= ALONE && is_long(long) || !pays()) => Way::Long(long),
+            _ if large => Way::Rates(if single { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
     }
@@ -103,28 +117,40 @@ impl Model<'_> {
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, steps) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
             Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
-            Way::Long(long) => large::lone(long, &self.asked(traced, machine, clock.h)),
+            Way::Long(long) => large::single(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
         };
         let courses = traced.courses(rates.facts())?;
         Ok(Box::new(LargeGroup::new(courses, rates, shape, traced.recorded, level, clock)))
     }
 
-    /// A group whose members go at a pace of their own each.
-    pub fn paced(&self, traced: &Traced, machine: Machine, members: usize, budget: f64) -> Result<Box<dyn Paced>, Error> {
+    /// A batch of members with adaptive steps.
+    pub fn adaptive(
+        &self,
+        traced: &Traced,
+        machine: Machine,
+        members: usize,
+        budget: f64,
+    ) -> Result<Box<dyn AdaptiveBatch>, Error> {
         let (spec, level) = (&self.spec, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
-            Way::Tape | Way::Map => return Ok(Box::new(PacedLanes::new(traced, spec, level, members, budget)?)),
+            Way::Tape | Way::Map => return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
             way => match (way, self.way(traced, machine, 1, 0.0)) {
-                (Way::Long(long), _) | (_, Way::Long(long)) => large::lone(long, &self.asked(traced, machine, NO_CLOCK.h)),
+                (Way::Long(long), _) | (_, Way::Long(long)) => large::single(long, &self.asked(traced, machine, NO_CLOCK.h)),
                 _ => Box::new(TapeRates::new(traced.rated()?, spec, level, 1, &NO_CLOCK)),
             },
         };
         let courses = traced.courses(rates.facts())?;
-        Ok(Box::new(LargePaced::new(courses, rates, traced, level, budget)?))
+        Ok(Box::new(LargeAdaptive::new(courses, rates, traced, level, budget)?))
     }
 }
+
+/// Bytes that a thread keeps of each number of a state at most, DOP853's stages among them, and of each parameter or sample.
+const OF_A_NUMBER: usize = 160;
+const OF_A_PARAMETER: usize = 32;
+/// Up to so many bytes it is not checked whether there is room.
+const UNCHECKED_BYTES: usize = 1 << 24;
 
 /// By what a group is stepped.
 #[derive(Clone, Copy)]
@@ -133,17 +159,17 @@ enum Way {
     Tape,
     /// Tapes for the rates, with so many lanes.
     Rates(usize),
-    /// A kernel that is written by hand, for a lone member.
+    /// A kernel that is written by hand, for a single member.
     Long(Long),
     /// A large matrix.
     Map,
 }
 
-/// Operations of the matrix form of a lone member from which on a kernel that is written by hand is quicker than a tape, and those of several
-/// members, one by one.
-const LONE_MAP: usize = 2 * 9 * 9;
+/// Operations of the matrix form from which on a kernel that is written by hand is faster than a tape: of a single member, and of
+/// several, one by one.
+const SINGLE_MAP: usize = 2 * 9 * 9;
 const MAP: usize = 2 * 24 * 24;
-/// Tapes of rates pay if rates are asked for so often for each of their operations, by all members together.
+/// Tapes of rates pay from so many evaluations for each of their operations on, by all members together.
 const WORTH_A_TAPE: usize = 1;
-/// So many members of a large system are as quick one by one as side by side.
+/// Up to so many members of a large system are as fast one by one as side by side.
 const ALONE: usize = 4;

@@ -1,6 +1,6 @@
 //! A cut tape, ready to be run over tiles: the hot loop, and what is computed before it.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::aligned::Aligned;
 use crate::{
@@ -30,11 +30,36 @@ pub struct Kit {
     /// Once for each member.
     member: Interpreter,
     /// Once for each member that takes a lane by itself.
-    lone: Interpreter,
+    single: Interpreter,
     /// Once for each step.
     step: Runner,
     /// Once for each time that comes alone.
     moment: Runner,
+    /// Several steps, with the states between; none where it does not pay.
+    trail: OnceLock<Option<Trail>>,
+}
+
+/// Several steps at once that keep the state after each, for a run that keeps them all.
+struct Trail {
+    runner: Runner,
+    steps: usize,
+}
+
+/// Operations of a trail, at most: its code has to stay in the cache of instructions.
+const TRAIL_OPERATIONS: usize = 2000;
+/// Steps of a trail at least, and at most. They divide those of a table.
+const TRAIL_STEPS: [usize; 2] = [4, 64];
+/// Lanes of a trail at most. A batch of many is written no quicker than memory allows as it is.
+const TRAIL_LANES: usize = 16;
+
+impl Trail {
+    fn new(split: &Split, level: Level, lanes: usize) -> Option<Trail> {
+        let [least, most] = TRAIL_STEPS;
+        let steps = (TRAIL_OPERATIONS / split.body.work().max(1)).clamp(1, most);
+        let steps = 1 << steps.ilog2();
+        let pays = steps >= least && lanes <= TRAIL_LANES;
+        pays.then(|| Trail { runner: Runner::long(&split.body.trail(steps), level, lanes), steps })
+    }
 }
 
 impl Kit {
@@ -42,9 +67,10 @@ impl Kit {
         Arc::new(Kit {
             run: Interpreter::new(&split.run, 1, Level::Baseline),
             member: Interpreter::new(&split.member, runner.lanes(), level),
-            lone: Interpreter::new(&split.member, 1, Level::Baseline),
+            single: Interpreter::new(&split.member, 1, Level::Baseline),
             step: Runner::long(&split.step, level, STEPS_AT_ONCE as usize),
             moment: Runner::long(&split.step, Level::Baseline, 1),
+            trail: OnceLock::new(),
             runner,
         })
     }
@@ -65,7 +91,7 @@ impl Stage {
     /// What makes its steps in a run of so many members.
     pub fn kit(&self, level: Level, members: usize) -> Arc<Kit> {
         // Some more or fewer of many members are no reason for another tile.
-        let members = if members > MANY { usize::MAX } else { members };
+        let members = if members > MANY_MEMBERS { usize::MAX } else { members };
         self.kept(&self.kits, level, members, |body| Runner::new(body, level, members))
     }
 
@@ -96,8 +122,8 @@ impl Stage {
     }
 }
 
-/// Members above which their number says nothing about the best tile: it holds some hundreds.
-const MANY: usize = 1024;
+/// Above so many members the best tile, of some hundreds, does not depend on their number.
+const MANY_MEMBERS: usize = 1024;
 /// Kernels of different lengths that are kept for a stage.
 const MOST_KITS: usize = 16;
 
@@ -121,8 +147,8 @@ impl Clock {
 /// Tables of steps that are kept, in numbers: groups after the first find them there.
 const MOST_ENTRIES: usize = 1 << 16;
 
-/// A stage with the numbers of some members: all that its hot loop reads.
-pub struct Loaded {
+/// A stage with its kernel and the parameters and inputs of some members: all that its hot loop reads.
+pub struct PreparedStage {
     kit: Arc<Kit>,
     /// What is the same for all members, in the order of [`Split::given`].
     given: Vec<f64>,
@@ -152,16 +178,20 @@ pub struct Loaded {
     values: Vec<f64>,
     raw: Vec<f64>,
     scratch: Vec<f64>,
+    /// A state with a trail of states behind it, and the pool of its kernel.
+    trail: Aligned,
+    trail_pool: Aligned,
+    trail_pool_for: Option<bool>,
 }
 
-impl Loaded {
+impl PreparedStage {
     /// For a run of so many members. `budget` is the most attempts of a member, for those.
-    pub fn new(stage: &Stage, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> Loaded {
-        Loaded::with(stage, stage.kit(level, members), spec, clock, budget)
+    pub fn new(stage: &Stage, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> PreparedStage {
+        PreparedStage::with(stage, stage.kit(level, members), spec, clock, budget)
     }
 
     /// With a kernel that was chosen already.
-    pub fn with(stage: &Stage, kit: Arc<Kit>, spec: &Spec, clock: &Clock, budget: f64) -> Loaded {
+    pub fn with(stage: &Stage, kit: Arc<Kit>, spec: &Spec, clock: &Clock, budget: f64) -> PreparedStage {
         let (split, lanes) = (&stage.split, kit.runner.lanes());
         let last = |input: u32| spec.tables[input as usize].samples.len() as f64 - 1.0;
         let before = |input: u32| spec.tables[..input as usize].iter().map(|table| table.samples.len()).sum::<usize>();
@@ -181,7 +211,7 @@ impl Loaded {
         let tile = &mut Tile { state: &mut uniforms, rows: &[], pool: &given, steps: 1, per_step: &[], held: &[] };
         kit.run.run(tile, &mut scratch);
         let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
-        Loaded {
+        PreparedStage {
             given,
             given_pool: Vec::new(),
             given_for: None,
@@ -200,6 +230,9 @@ impl Loaded {
             values: Vec::new(),
             raw: vec![0.0; split.params.len() * lanes],
             scratch,
+            trail: Aligned::new(0),
+            trail_pool: Aligned::new(0),
+            trail_pool_for: None,
             kit,
         }
     }
@@ -227,7 +260,7 @@ impl Loaded {
         let raw: Vec<f64> = split.params.iter().map(|param| spec.rows[*param as usize].at(member)).collect();
         let mut made = vec![0.0; split.member.next.len()];
         let tile = &mut Tile { state: &mut made, rows: &raw, pool: &self.given, steps: 1, per_step: &[], held: &[] };
-        self.kit.lone.run(tile, &mut self.scratch);
+        self.kit.single.run(tile, &mut self.scratch);
         let lanes = self.lanes();
         for (row, number) in self.rows.chunks_exact_mut(lanes).zip(made) {
             row[lane] = number;
@@ -257,8 +290,8 @@ impl Loaded {
         }
     }
 
-    /// Writes now what would be written when it pays, and keeps no more than a loop needs that goes on and on.
-    pub fn settle(&mut self) {
+    /// Compiles now what would be compiled later, when it pays, and keeps one table of steps only, as real-time loops need no more.
+    pub fn compile_now(&mut self) {
         self.kit.runner.write();
         self.most_tables = 1;
     }
@@ -279,6 +312,44 @@ impl Loaded {
             self.tables[at].1 = table;
             k += n;
         }
+    }
+
+    /// How many steps a trail has; none if there is no trail.
+    pub fn trail(&self, stage: &Stage, level: Level) -> usize {
+        let make = || Trail::new(&stage.split, level, self.lanes());
+        self.kit.trail.get_or_init(make).as_ref().map_or(0, |trail| trail.steps)
+    }
+
+    /// The steps of a trail from step `k`, a multiple of them: the states after each, one after the other.
+    pub fn advance_on_trail(&mut self, stage: &Stage, clock: &Clock, k: i64, state: &mut [f64]) -> &[f64] {
+        let kit = Arc::clone(&self.kit);
+        let Some(Some(trail)) = kit.trail.get() else { return &[] };
+        let numbers = state.len();
+        if self.trail.is_empty() {
+            self.trail = Aligned::new(numbers * (trail.steps + 1));
+        }
+        let (entries, mut table) = (stage.split.entries.len(), Vec::new());
+        let mut from = (0, 0);
+        if entries > 0 {
+            let first = k.div_euclid(STEPS_AT_ONCE) * STEPS_AT_ONCE;
+            let at = self.table(stage, clock, first);
+            table = std::mem::take(&mut self.tables[at].1);
+            from = (at, (k - first) as usize * entries);
+        }
+        let (kernel, written) = trail.runner.kernel(1);
+        if self.trail_pool_for != Some(written) {
+            self.trail_pool = Aligned::from(&kernel.pool(&self.uniforms));
+            self.trail_pool_for = Some(written);
+        }
+        self.trail[..numbers].copy_from_slice(state);
+        let (rows, pool, held) = (&self.rows, &self.trail_pool, &self.held);
+        let per_step = &table[from.1..];
+        kernel.run(&mut Tile { state: &mut self.trail, rows, pool, steps: 1, per_step, held }, &mut self.scratch);
+        state.copy_from_slice(&self.trail[..numbers]);
+        if entries > 0 {
+            self.tables[from.0].1 = table;
+        }
+        &self.trail[numbers..]
     }
 
     /// One step of a state at a time.
@@ -332,8 +403,7 @@ impl Loaded {
     /// The entries of steps at these times, as many as the interpreter has lanes.
     fn fill(&mut self, stage: &Stage, step: &Runner, times: &[f64], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
-        self.values.clear();
-        self.values.resize(entries.len() * steps, 0.0);
+        self.values.resize(entries.len() * steps, 0.0); // all of them are written anew
         let (kernel, written) = step.kernel(1);
         if self.given_for != Some(written) {
             (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(written));
@@ -341,16 +411,20 @@ impl Loaded {
         let (values, pool) = (&mut self.values, &self.given_pool);
         let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };
         kernel.run(tile, &mut self.scratch);
-        table.clear();
-        table.resize(steps * entries.len(), 0);
-        for (e, entry) in entries.iter().enumerate() {
-            for step in 0..steps {
-                let value = self.values[e * steps + step];
-                table[step * entries.len() + e] = match *entry {
-                    Entry::Value => value.to_bits(),
-                    Entry::Sample(input) => self.common[input as usize][value as usize].to_bits(),
-                    Entry::Row(input) => (self.inputs[input as usize] + value as usize * lanes) as u64,
-                };
+        table.resize(entries.len() * steps, 0);
+        for (e, (entry, values)) in entries.iter().zip(self.values.chunks_exact(steps)).enumerate() {
+            let places = table[e..].iter_mut().step_by(entries.len());
+            let each = places.zip(values);
+            match *entry {
+                Entry::Value => each.for_each(|(place, value)| *place = value.to_bits()),
+                Entry::Sample(input) => {
+                    let samples = &self.common[input as usize];
+                    each.for_each(|(place, value)| *place = samples[*value as usize].to_bits());
+                }
+                Entry::Row(input) => {
+                    let first = self.inputs[input as usize];
+                    each.for_each(|(place, value)| *place = (first + *value as usize * lanes) as u64);
+                }
             }
         }
     }

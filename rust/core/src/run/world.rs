@@ -1,12 +1,37 @@
 //! A prepared real-time loop over arrays that belong to somebody else.
 
-use super::{Machine, Model, group::Group, stage::Clock};
+use std::sync::atomic::Ordering::Relaxed;
+
+use super::{
+    Machine, Model,
+    crew::{self, Crew, GoOn, Stop},
+    group::Group,
+    stage::Clock,
+};
 use crate::error::Error;
 
 struct Share {
     group: Box<dyn Group>,
     first: usize,
     count: usize,
+    /// Both slots before the step that is being made, if that can be stopped.
+    before: (Vec<f64>, Vec<f64>),
+}
+
+impl Share {
+    fn load(&mut self, v: &[f64], y: &[f64], members: usize) {
+        let (share, lanes) = ((self.first, self.count), self.group.lanes());
+        let (v_slot, y_slot) = self.group.slots_mut();
+        load(v, members, share, v_slot, lanes);
+        load(y, members, share, y_slot, lanes);
+    }
+
+    fn store(&self, v: &mut [f64], y: &mut [f64], members: usize) {
+        let (share, lanes) = ((self.first, self.count), self.group.lanes());
+        let (v_slot, y_slot) = self.group.slots();
+        store(v, members, share, v_slot, lanes);
+        store(y, members, share, y_slot, lanes);
+    }
 }
 
 /// Everything that a step needs, made once; a step allocates nothing and checks nothing.
@@ -17,12 +42,17 @@ pub struct World {
     sizes: (usize, usize),
     carries: bool,
     /// What was last written, if the method carries something else than v: if the arrays differ, somebody moved the bodies.
-    written: Option<(Vec<f64>, Vec<f64>)>,
+    written: (Vec<f64>, Vec<f64>),
+    /// Whether the slots hold what was last written.
+    is_written: bool,
     step: i64,
+    /// How many steps are made between two looks at whether to stop; none if a single one may take long.
+    patience: Option<i64>,
+    stop: Stop,
 }
 
-/// How often a world is stepped: nobody knows, but it is made for that.
-const MANY: f64 = f64::INFINITY;
+/// How often a world is stepped is unknown; it is made for many steps.
+const UNKNOWN_STEPS: f64 = f64::INFINITY;
 
 fn load(array: &[f64], members: usize, share: (usize, usize), slot: &mut [f64], lanes: usize) {
     let (first, count) = share;
@@ -48,19 +78,28 @@ impl World {
     /// Prepares the groups of all members.
     pub fn new(model: &Model, clock: Clock, machine: Machine, members: usize, step: i64) -> Result<Self, Error> {
         let traced = model.traced()?;
+        model.room(traced.shape, 1)?;
+        let patience = (!traced.is_long(members)).then(|| traced.steps_of(members, PATIENCE));
+        let stop = Stop::default();
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let whole = members - first >= model.lanes(&traced, machine, members, MANY)?;
-            let mut group = model.group(&traced, machine, if whole { members } else { members - first }, &clock, MANY)?;
+            let whole = members - first >= model.lanes(&traced, machine, members, UNKNOWN_STEPS)?;
+            let mut group =
+                model.group(&traced, machine, if whole { members } else { members - first }, &clock, UNKNOWN_STEPS)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
-            group.settle();
-            shares.push(Share { group, first, count });
+            group.compile_now();
+            group.heed(&stop);
+            let before =
+                if patience.is_none() { (group.slots().0.to_vec(), group.slots().1.to_vec()) } else { Default::default() };
+            shares.push(Share { group, first, count, before });
             first += count;
         }
         let sizes = (traced.shape.v * members, traced.shape.y * members);
-        Ok(World { clock, shares, members, sizes, carries: traced.carries, written: None, step })
+        let carries = traced.carries;
+        let written = if carries { (vec![0.0; sizes.0], vec![0.0; sizes.1]) } else { Default::default() };
+        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, patience, stop })
     }
 
     /// How many numbers each array holds.
@@ -78,57 +117,148 @@ impl World {
         self.clock.at(self.step)
     }
 
+    /// How many steps are made in some milliseconds; none if a single one may take long, and is for [`World::step_in_background`].
+    pub fn patience(&self) -> Option<i64> {
+        self.patience
+    }
+
+    /// Whether these arrays are not what the slots hold.
+    fn is_moved(&self, v: &[f64], y: &[f64]) -> bool {
+        !(self.is_written && same(v, &self.written.0) && same(y, &self.written.1))
+    }
+
+    /// What the method carries in the place of `v`, as rows of one number per member; none if the next step begins with `v` itself.
+    pub fn carry(&self, v: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+        if self.is_moved(v, y) {
+            return None;
+        }
+        let mut carry = vec![0.0; self.sizes.0];
+        for share in &self.shares {
+            store(&mut carry, self.members, (share.first, share.count), share.group.slots().0, share.group.lanes());
+        }
+        Some(carry)
+    }
+
+    /// Goes on with what was carried when the arrays were these.
+    pub fn carry_on(&mut self, carry: &[f64], v: &[f64], y: &[f64]) {
+        if self.carries && carry.len() == self.sizes.0 {
+            let members = self.members;
+            self.shares.iter_mut().for_each(|share| share.load(carry, y, members));
+            self.written.0.copy_from_slice(v);
+            self.written.1.copy_from_slice(y);
+            self.is_written = true;
+        }
+    }
+
     /// `n` steps, in place. `v` and `y` are rows of one number per member.
     pub fn step(&mut self, n: i64, v: &mut [f64], y: &mut [f64]) {
-        let (k, until, members) = (self.step, self.step + n, self.members);
-        let moved = !matches!(&self.written, Some((a, b)) if same(v, a) && same(y, b));
-        for Share { group, first, count } in &mut self.shares {
-            let (share, lanes) = ((*first, *count), group.lanes());
+        let (k, until, members, carries) = (self.step, self.step + n, self.members, self.carries);
+        let moved = !carries || self.is_moved(v, y);
+        for share in &mut self.shares {
             if moved {
-                let (v_slot, y_slot) = group.slots_mut();
-                load(v, members, share, v_slot, lanes);
-                load(y, members, share, y_slot, lanes);
+                share.load(v, y, members);
             }
-            if moved && self.carries {
-                group.start(k);
+            if moved && carries {
+                share.group.start(k);
             }
-            group.advance(k, n);
-            if !self.carries {
-                let (v_slot, y_slot) = group.slots();
-                store(v, members, share, v_slot, lanes);
-                store(y, members, share, y_slot, lanes);
+            share.group.advance(k, n);
+            if !carries {
+                share.store(v, y, members);
             }
         }
-        if self.carries {
+        if carries {
             self.publish(until, v, y);
         }
         self.step = until;
     }
 
-    /// Writes velocities of a method that carries something else, and remembers what was written.
-    fn publish(&mut self, k: i64, v: &mut [f64], y: &mut [f64]) {
-        let (mut old_v, mut old_y) = self.written.take().unwrap_or_else(|| (vec![0.0; v.len()], vec![0.0; y.len()]));
-        for Share { group, first, count } in &mut self.shares {
-            let (share, lanes) = ((*first, *count), group.lanes());
-            // The array of what was written last serves to keep what is carried meanwhile.
-            let carried = &mut old_v[*first..];
-            let rows = group.slots().0.len() / lanes;
-            for r in 0..rows {
-                carried[r * self.members..][..*count].copy_from_slice(&group.slots().0[r * lanes..][..*count]);
+    /// As `step`, by another thread. When the monitor, which is called on this one, answers no, the world stays at the last step that
+    /// was made whole.
+    pub fn step_in_background(
+        &mut self,
+        n: i64,
+        v: &mut [f64],
+        y: &mut [f64],
+        monitor: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<(), Error> {
+        self.stop.store(false, Relaxed);
+        let crew = Crew { threads: 1, background: true, total: n as f64, stop: Stop::clone(&self.stop) };
+        let nobody_else = || Err(Error::Interrupted);
+        crew::share(vec![()], &crew, monitor, (self, v, y), nobody_else, |(world, v, y), (), go_on| world.steps(n, v, y, go_on))
+    }
+
+    fn steps(&mut self, n: i64, v: &mut [f64], y: &mut [f64], go_on: GoOn) -> Result<(), Error> {
+        let (from, members) = (self.step, self.members);
+        if !self.carries || self.is_moved(v, y) {
+            self.is_written = false;
+            for share in &mut self.shares {
+                share.load(v, y, members);
+                share.group.start(from);
             }
-            group.finish(k);
-            let (v_slot, y_slot) = group.slots();
-            store(v, self.members, share, v_slot, lanes);
-            store(y, self.members, share, y_slot, lanes);
-            for r in 0..rows {
-                let kept = &carried[r * self.members..][..*count];
-                let slot = &mut group.slots_mut().0[r * lanes..][..lanes];
-                slot[..*count].copy_from_slice(kept);
-                slot[*count..].fill(kept[*count - 1]);
+            if !go_on(0) {
+                return Err(Error::Interrupted);
             }
         }
-        old_v.copy_from_slice(v);
-        old_y.copy_from_slice(y);
-        self.written = Some((old_v, old_y));
+        let mut made = 0;
+        while made < n {
+            for Share { group, before: (v, y), .. } in &mut self.shares {
+                v.copy_from_slice(group.slots().0);
+                y.copy_from_slice(group.slots().1);
+                group.advance(from + made, 1);
+            }
+            if !go_on(1) {
+                break;
+            }
+            made += 1;
+        }
+        if made == n && self.publish(from + n, v, y) {
+            self.step = from + n;
+            return Ok(());
+        }
+        for Share { group, before: (v, y), .. } in &mut self.shares {
+            group.slots_mut().0.copy_from_slice(v);
+            group.slots_mut().1.copy_from_slice(y);
+        }
+        made = made.min(n - 1);
+        // The arrays are still those of the start. To bring them to where the slots are takes one rate of a method that carries
+        // something else than v, which cannot be stopped.
+        if made > 0 {
+            self.stop.store(false, Relaxed);
+            self.publish(from + made, v, y);
+            self.step = from + made;
+        }
+        Err(Error::Interrupted)
+    }
+
+    /// Writes the states of step `k` to the arrays, unless it was stopped before.
+    fn publish(&mut self, k: i64, v: &mut [f64], y: &mut [f64]) -> bool {
+        let members = self.members;
+        if self.carries {
+            // The array of what was written last serves to keep what is carried meanwhile.
+            self.is_written = false;
+            for Share { group, first, count, .. } in &mut self.shares {
+                store(&mut self.written.0, members, (*first, *count), group.slots().0, group.lanes());
+                group.finish(k);
+            }
+            if self.stop.load(Relaxed) {
+                return false;
+            }
+        }
+        for share in &mut self.shares {
+            share.store(v, y, members);
+            if self.carries {
+                let (lanes, slot) = (share.group.lanes(), share.group.slots_mut().0);
+                load(&self.written.0, members, (share.first, share.count), slot, lanes);
+            }
+        }
+        if self.carries {
+            self.written.0.copy_from_slice(v);
+            self.written.1.copy_from_slice(y);
+            self.is_written = true;
+        }
+        true
     }
 }
+
+/// Operations that take some milliseconds.
+const PATIENCE: usize = 1 << 25;

@@ -18,7 +18,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |_| None,
     quantities: |_| Vec::new(),
     operations: |given| 6 * given.count("mass"),
-    long: Some(Long { from: (6 * 64, 800), beside: 0, make: chain::make }),
+    long: Some(Long { from: (6 * 64, 800), from_batch: 0, make: chain::make }),
     numbers: make,
     symbols: make,
 };

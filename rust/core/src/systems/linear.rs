@@ -19,7 +19,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |given| (given.word("kind") != "acceleration").then_some("rates of another kind"),
     quantities: |_| Vec::new(),
     operations: |given| 2 * given.count("rows"),
-    long: Some(Long { from: (2 * 19 * 19, usize::MAX), beside: 2 * 150 * 150, make: linear::make }),
+    long: Some(Long { from: (2 * 19 * 19, usize::MAX), from_batch: 2 * 150 * 150, make: linear::make }),
     numbers: make,
     symbols: make,
 };
@@ -66,13 +66,13 @@ fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
 }
 
 /// Rows that are summed side by side: a sum in a fixed order is a chain of additions that wait for each other.
-const ABREAST: usize = 4;
+const ROWS_AT_ONCE: usize = 4;
 
 /// Sums of products, by row and column, from the left.
 pub fn products<N: Number>(rows: usize, columns: usize, product: impl Fn(usize, usize) -> N) -> Vec<N> {
     let mut sums = Vec::with_capacity(rows);
-    for first in (0..rows).step_by(ABREAST) {
-        let some = first..rows.min(first + ABREAST);
+    for first in (0..rows).step_by(ROWS_AT_ONCE) {
+        let some = first..rows.min(first + ROWS_AT_ONCE);
         let mut sum: Vec<N> = some.clone().map(|i| if columns == 0 { N::of(0.0) } else { product(i, 0) }).collect();
         for j in 1..columns {
             some.clone().zip(&mut sum).for_each(|(i, sum)| *sum += product(i, j));

@@ -28,7 +28,7 @@ pub const KIND: Kind = Kind {
     velocity_term: |_| None,
     quantities,
     operations: |given| 11 * given.count("masses").pow(2),
-    long: Some(Long { from: (11 * 10 * 10, usize::MAX), beside: 11 * 106 * 106, make: bodies::make }),
+    long: Some(Long { from: (11 * 10 * 10, usize::MAX), from_batch: 11 * 106 * 106, make: bodies::make }),
     numbers: make::<f64>,
     symbols: make,
 };
@@ -105,9 +105,11 @@ impl<N: Number> Bodies<N> {
     /// h·v̇ from every pair once, and with `wells` h·G·Σⱼ mⱼ·φ for each body, else zeros.
     fn meet(&self, y: &Block<N>, with_wells: bool) -> (Block<N>, Vec<N>) {
         let (n, dim, zero) = (self.masses.len(), self.dim, N::of(0.0));
-        let (mut dv, mut potential) = (Block::from_element(n * dim, zero), vec![zero; n]);
+        // Sums of pushes start from −0, for x + −0 is x, also where x is a zero: the first term costs no operation.
+        let none = N::of(-0.0);
+        let (mut dv, mut potential) = (Block::from_element(n * dim, none), vec![zero; n]);
         for slab in partners(n) {
-            let (mut after, mut before, mut wells) = (vec![zero; n * dim], vec![zero; 2 * n * dim], vec![zero; n]);
+            let (mut after, mut before, mut wells) = (vec![none; n * dim], vec![none; 2 * n * dim], vec![zero; n]);
             for group in slab {
                 // Body after body, so that what belongs to one is at hand for all of its partners: a body gets what those before it
                 // push from the farthest distance to the nearest, which is a single push in each round.
@@ -120,7 +122,7 @@ impl<N: Number> Bodies<N> {
                         let (to_i, to_j) = (pull * self.strength[j], pull * self.strength[i]);
                         for (c, d) in d.into_iter().enumerate() {
                             after[dim * i + c] += d * to_i;
-                            before[dim * (i + k) + c] -= d * to_j;
+                            before[dim * (i + k) + c] += d * to_j;
                         }
                         if with_wells {
                             wells[i] += self.law.potential(r2, pull, self.strength[j]);
@@ -129,7 +131,7 @@ impl<N: Number> Bodies<N> {
                 }
             }
             for r in 0..n * dim {
-                dv[r] += after[r] + (before[r] + before[n * dim + r]);
+                dv[r] += after[r] - (before[r] + before[n * dim + r]);
             }
             potential.iter_mut().zip(wells).for_each(|(sum, well)| *sum += well);
         }

@@ -6,13 +6,16 @@ use super::Op;
 #[inline(always)]
 pub fn apply(op: Op, a: u64, b: u64, c: u64) -> u64 {
     use Op::*;
-    let (x, y) = (f64::from_bits(a), f64::from_bits(b));
+    let (x, y, z) = (f64::from_bits(a), f64::from_bits(b), f64::from_bits(c));
     let mask = |yes: bool| if yes { u64::MAX } else { 0 };
     match op {
         Add(..) => (x + y).to_bits(),
         Sub(..) => (x - y).to_bits(),
         Mul(..) => (x * y).to_bits(),
         Div(..) => (x / y).to_bits(),
+        MulAdd(..) => x.mul_add(y, z).to_bits(),
+        MulSub(..) => x.mul_add(y, -z).to_bits(),
+        SubMul(..) => (-x).mul_add(y, z).to_bits(),
         Sqrt(_) => x.sqrt().to_bits(),
         Neg(_) => a ^ (1 << 63),
         Floor(_) => x.floor().to_bits(),

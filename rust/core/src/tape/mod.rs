@@ -7,6 +7,7 @@
 //! The only freedom taken is in what a NaN carries: its sign and payload are not promised.
 
 pub mod eval;
+pub mod fuse;
 pub mod print;
 pub mod quick;
 pub mod split;
@@ -39,6 +40,12 @@ pub enum Op {
     Mul(Id, Id),
     /// a / b
     Div(Id, Id),
+    /// a · b + c, rounded once
+    MulAdd(Id, Id, Id),
+    /// a · b − c, rounded once
+    MulSub(Id, Id, Id),
+    /// c − a · b, rounded once
+    SubMul(Id, Id, Id),
     /// √a
     Sqrt(Id),
     /// −a
@@ -98,7 +105,7 @@ impl Op {
             | Or(a, b)
             | Xor(a, b)
             | AddBits(a, b) => ([a, b, 0], 2),
-            Select(m, a, b) => ([m, a, b], 3),
+            MulAdd(a, b, c) | MulSub(a, b, c) | SubMul(a, b, c) | Select(a, b, c) => ([a, b, c], 3),
         }
     }
 
@@ -123,12 +130,21 @@ impl Op {
             Less(a, b) => Less(f(a), f(b)),
             LessEqual(a, b) => LessEqual(f(a), f(b)),
             Equal(a, b) => Equal(f(a), f(b)),
+            MulAdd(a, b, c) => MulAdd(f(a), f(b), f(c)),
+            MulSub(a, b, c) => MulSub(f(a), f(b), f(c)),
+            SubMul(a, b, c) => SubMul(f(a), f(b), f(c)),
             Select(m, a, b) => Select(f(m), f(a), f(b)),
             And(a, b) => And(f(a), f(b)),
             Or(a, b) => Or(f(a), f(b)),
             Xor(a, b) => Xor(f(a), f(b)),
             AddBits(a, b) => AddBits(f(a), f(b)),
         }
+    }
+
+    /// Whether its two operands may change places.
+    pub fn commutes(self) -> bool {
+        use Op::*;
+        matches!(self, Add(..) | Mul(..) | Equal(..) | And(..) | Or(..) | Xor(..) | AddBits(..))
     }
 
     /// Whether it is there before anything is computed.
@@ -144,6 +160,8 @@ pub struct Counts {
     pub additions: u32,
     /// Products.
     pub multiplications: u32,
+    /// Fused multiply-adds: a product and a sum, rounded once.
+    pub fused: u32,
     /// Quotients.
     pub divisions: u32,
     /// Square roots.
@@ -161,6 +179,7 @@ impl Counts {
         match op {
             Add(..) | Sub(..) => self.additions += 1,
             Mul(..) => self.multiplications += 1,
+            MulAdd(..) | MulSub(..) | SubMul(..) => self.fused += 1,
             Div(..) => self.divisions += 1,
             Sqrt(_) => self.square_roots += 1,
             Less(..) | LessEqual(..) | Equal(..) | Select(..) => self.choices += 1,
@@ -178,7 +197,9 @@ pub struct Tape {
     seen: QuickMap<Op, Id>,
     /// Of each value: whether it is surely not −0.
     not_minus_zero: Vec<bool>,
-    /// What was asked for, before equal operations were merged.
+    /// Of each value: whether it depends on the state.
+    of_state: Vec<bool>,
+    /// What was asked for of values that depend on the state, before equal operations were merged.
     written: Counts,
 }
 
@@ -195,9 +216,26 @@ impl Tape {
         self.ops[id as usize]
     }
 
-    /// What was asked for, before equal operations were merged and needless ones left out.
-    pub fn written(&self) -> Counts {
-        self.written
+    /// A step as it is written down, if these values are its next state: what was asked for of values that depend on the state, before
+    /// equal operations were merged and needless ones left out, and what inputs take that change with the time. What is made of parameters
+    /// alone is made before.
+    pub fn written(&self, roots: impl IntoIterator<Item = Id>) -> Counts {
+        let mut counts = self.written;
+        let mut changes: Vec<bool> = Vec::with_capacity(self.ops.len());
+        for ((op, needed), of_state) in self.ops.iter().zip(self.needed(roots)).zip(&self.of_state) {
+            let (operands, n) = op.operands();
+            let varies = matches!(op, Op::Time | Op::Sample(..)) || operands[..n].iter().any(|id| changes[*id as usize]);
+            changes.push(varies);
+            if needed && varies && !of_state {
+                counts.note(*op);
+            }
+        }
+        counts
+    }
+
+    /// Whether a value depends on the state.
+    pub fn is_of_state(&self, id: Id) -> bool {
+        self.of_state[id as usize]
     }
 
     /// A number.
@@ -207,7 +245,10 @@ impl Tape {
 
     /// Writes an operation, or finds what is equal to it in every bit.
     pub fn push(&mut self, op: Op) -> Id {
-        self.written.note(op);
+        let (operands, n) = op.operands();
+        if operands[..n].iter().any(|id| self.is_of_state(*id)) {
+            self.written.note(op);
+        }
         self.shorten(op)
     }
 
@@ -246,8 +287,11 @@ impl Tape {
             Op::Select(_, a, b) => sure(a) && sure(b),
             _ => false,
         };
+        let (operands, n) = op.operands();
+        let of_state = matches!(op, Op::State(_)) || operands[..n].iter().any(|id| self.is_of_state(*id));
         self.ops.push(op);
         self.not_minus_zero.push(not_minus_zero);
+        self.of_state.push(of_state);
         self.seen.insert(op, id);
         id
     }
@@ -328,6 +372,8 @@ impl Tape {
             Xor(a, b) => self.keep(Xor(a.min(b), a.max(b))),
             AddBits(a, b) => self.keep(AddBits(a.min(b), a.max(b))),
             Select(_, a, b) if a == b => a,
+            Select(truth, a, _) if self.bits(truth) == Some(u64::MAX) => a,
+            Select(truth, _, b) if self.bits(truth) == zero => b,
             Copy(a) => a,
             ShiftUp(a, 0) | ShiftDown(a, 0) => a,
             _ => self.keep(op),
@@ -343,8 +389,17 @@ impl Tape {
         let bits = |id: Id| self.bits(id);
         let (x, y, z) = (bits(a)?, if n > 1 { bits(b)? } else { 0 }, if n > 2 { bits(c)? } else { 0 });
         let made = eval::apply(op, x, y, z);
-        let is_number = matches!(op, Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) | Op::Floor(_));
+        let is_sum = matches!(op, Op::Add(..) | Op::Sub(..) | Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..));
+        let is_number = is_sum || matches!(op, Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) | Op::Floor(_));
         (!is_number || !f64::from_bits(made).is_nan()).then_some(made)
+    }
+
+    /// The same operations in the same places, with some replaced by others of the same operands or earlier ones.
+    fn rewritten(&self, replace: impl Fn(Id, Op) -> Op) -> Tape {
+        let ops: Vec<Op> = self.ops.iter().enumerate().map(|(id, op)| replace(id as Id, *op)).collect();
+        let seen = ops.iter().enumerate().map(|(id, op)| (*op, id as Id)).collect();
+        let of_state = self.of_state.clone();
+        Tape { ops, seen, not_minus_zero: vec![false; self.ops.len()], of_state, written: self.written }
     }
 
     /// The values that these need, themselves with them: for each value of the tape whether it is needed.

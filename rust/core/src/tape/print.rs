@@ -19,6 +19,9 @@ pub fn line(id: Id, op: Op) -> String {
         Sub(a, b) => format!("%{a} - %{b}"),
         Mul(a, b) => format!("%{a} * %{b}"),
         Div(a, b) => format!("%{a} / %{b}"),
+        MulAdd(a, b, c) => format!("fused %{a} * %{b} + %{c}"),
+        MulSub(a, b, c) => format!("fused %{a} * %{b} - %{c}"),
+        SubMul(a, b, c) => format!("fused %{c} - %{a} * %{b}"),
         Sqrt(a) => format!("sqrt %{a}"),
         Neg(a) => format!("- %{a}"),
         Floor(a) => format!("floor %{a}"),
@@ -40,6 +43,45 @@ pub fn line(id: Id, op: Op) -> String {
         Gather(a) => format!("sample %{a}"),
     };
     format!("%{id} = {is}")
+}
+
+/// What an operation is called, and what it is given beside its operands: the number of a leaf, the bits of a constant, places.
+pub fn named(op: Op) -> (&'static str, u64) {
+    use Op::*;
+    match op {
+        State(i) => ("state", i.into()),
+        Param(i) => ("parameter", i.into()),
+        Step => ("step", 0),
+        Time => ("time", 0),
+        Const(bits) => ("constant", bits),
+        Sample(i, _) => ("sample", i.into()),
+        Add(..) => ("add", 0),
+        Sub(..) => ("subtract", 0),
+        Mul(..) => ("multiply", 0),
+        Div(..) => ("divide", 0),
+        MulAdd(..) => ("multiply add", 0),
+        MulSub(..) => ("multiply subtract", 0),
+        SubMul(..) => ("subtract multiply", 0),
+        Sqrt(_) => ("square root", 0),
+        Neg(_) => ("negate", 0),
+        Floor(_) => ("floor", 0),
+        Less(..) => ("less", 0),
+        LessEqual(..) => ("at most", 0),
+        Equal(..) => ("equal", 0),
+        Select(..) => ("choose", 0),
+        And(..) => ("and", 0),
+        Or(..) => ("or", 0),
+        Xor(..) => ("exclusive or", 0),
+        AddBits(..) => ("add bits", 0),
+        ShiftUp(_, n) => ("shift up", n.into()),
+        ShiftDown(_, n) => ("shift down", n.into()),
+        Copy(_) => ("copy", 0),
+        Row(i) => ("row", i.into()),
+        Uniform(i) => ("uniform", i.into()),
+        PerStep(i) => ("of the step", i.into()),
+        Held(i) => ("held", i.into()),
+        Gather(_) => ("gather", 0),
+    }
 }
 
 /// A listing of operations.

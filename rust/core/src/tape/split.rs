@@ -82,7 +82,7 @@ impl Body {
                 }
             }
         }
-        // Those that nobody reads are next values themselves.
+        // Those that are not read are next values themselves.
         order.extend((0..self.ops.len() as Id).filter(|id| is(self.ops[*id as usize]) && !seen[*id as usize]));
         let old = std::mem::take(list);
         for id in order {
@@ -121,6 +121,44 @@ impl Body {
             };
             *count = (*count).max(i as usize + 1);
         }
+    }
+
+    /// The body of so many steps, one after the other, which keeps the state after each: behind its numbers follow those after the first
+    /// step, after the second and so on.
+    #[must_use]
+    pub fn trail(&self, steps: usize) -> Body {
+        let mut trail = Body::default();
+        let mut leaves: QuickMap<Op, Id> = QuickMap::default();
+        let mut state: Vec<Option<Id>> = vec![None; self.next.len()];
+        let mut kept = Vec::with_capacity(steps * self.next.len());
+        let mut place = vec![0; self.ops.len()];
+        for step in 0..steps {
+            let before = (step * self.per_step) as u32;
+            for (id, op) in self.ops.iter().enumerate() {
+                let leaf = match *op {
+                    Op::PerStep(i) => Op::PerStep(before + i),
+                    Op::Held(i) => Op::Held(before + i),
+                    other => other,
+                };
+                place[id] = match leaf {
+                    Op::State(s) if state[s as usize].is_some() => state[s as usize].unwrap_or_default(),
+                    leaf if leaf.is_leaf() => *leaves.entry(leaf).or_insert_with(|| {
+                        trail.ops.push(leaf);
+                        trail.ops.len() as Id - 1
+                    }),
+                    op => {
+                        trail.ops.push(op.with(|operand| place[operand as usize]));
+                        trail.ops.len() as Id - 1
+                    }
+                };
+            }
+            for (value, id) in state.iter_mut().zip(&self.next) {
+                *value = Some(place[*id as usize]);
+                kept.push(place[*id as usize]);
+            }
+        }
+        trail.next = state.into_iter().flatten().chain(kept).collect();
+        trail.finished()
     }
 
     fn finished(mut self) -> Body {

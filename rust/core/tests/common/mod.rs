@@ -31,7 +31,7 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
 /// A system stepped by a method.
 pub fn model<'a>(spec: Spec<'a>, method: &str) -> Model<'a> {
     let how = How::Method { name: method.to_owned(), choice: 0 };
-    Model { scene: Scene { given: spec.given.clone(), how, record: Vec::new() }, spec }
+    Model { scene: Scene { given: spec.given.clone(), how, record: Vec::new(), fused: false }, spec }
 }
 
 /// Free oscillators in canonical form.

@@ -3,20 +3,20 @@
 use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
 use stepwell_core::kernel::x86::Written;
 
-/// Panics if anything is in the code that should not be.
-pub fn read(kernel: &Written) {
+/// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some.
+pub fn read(kernel: &Written, is_fused: bool) {
     let (code, frame, shape) = (kernel.code(), kernel.frame(), kernel.shape());
     let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);
     let mut starts = Vec::new();
     let mut branches = 0;
     let row = 8 * frame.lanes as u64;
-    let block = 8 * (shape.width * shape.abreast) as u64;
+    let block = 8 * (shape.width * shape.block_vectors) as u64;
     let in_rows = |at: u64, size: u64, rows: usize| at / row < rows as u64 && at % row + size <= block;
     loop {
         let i = decoder.decode();
         assert!(!i.is_invalid(), "no instruction at {:#x}", i.ip());
         starts.push(i.ip());
-        assert!(is_known(i.mnemonic()), "{i}");
+        assert!(is_known(i.mnemonic()) || is_fused && is_multiply_add(i.mnemonic()), "{i}");
         match i.flow_control() {
             FlowControl::Next => {}
             FlowControl::Return => break,
@@ -88,6 +88,11 @@ fn moves_on(i: &Instruction, block: u64, blocks: u64) {
             _ => panic!("{i}"),
         }
     }
+}
+
+fn is_multiply_add(mnemonic: Mnemonic) -> bool {
+    let name = format!("{mnemonic:?}");
+    ["Vfmadd", "Vfmsub", "Vfnmadd"].iter().any(|kind| name.starts_with(kind)) && (name.ends_with("pd") || name.ends_with("sd"))
 }
 
 /// What kernels are made of. What is not here is not exact, or not the same on all machines.

@@ -70,10 +70,10 @@ fn widths() -> Vec<(Level, usize)> {
 }
 
 fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
-    let abreast = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
+    let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
     let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
-    let together = if random.once_in(3) { 1 + random.below(abreast) } else { abreast };
-    Shape { level, width, abreast, together, blocks, resident: random.once_in(2) }
+    let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
+    Shape { level, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
 }
 
 /// The same bits, or both NaN.
@@ -100,7 +100,8 @@ fn one_case(seed: u64, read_code: bool) -> usize {
     };
     let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
     if read_code {
-        code::read(&kernel);
+        let is_fused = body.ops.iter().any(|op| matches!(op, Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..)));
+        code::read(&kernel, is_fused);
     }
     let lanes = shape.lanes();
     let oracle = Interpreter::new(&body, lanes, Level::Baseline);
@@ -136,7 +137,7 @@ fn oscillator() -> Body {
 
 fn written(body: &Body) -> Written {
     let (level, width) = *widths().last().expect("AVX2");
-    write(body, Shape { level, width, abreast: 2, together: 2, blocks: 3, resident: true }).expect("a kernel")
+    write(body, Shape { level, width, block_vectors: 2, interleaved: 2, blocks: 3, resident: true }).expect("a kernel")
 }
 
 #[test]
@@ -144,7 +145,7 @@ fn states_that_change_places_do() {
     let body = Body { ops: vec![Op::State(0), Op::State(1), Op::Copy(1), Op::Copy(0)], next: vec![2, 3], ..Body::default() };
     for (level, width) in widths() {
         for resident in [false, true] {
-            let shape = Shape { level, width, abreast: 2, together: 2, blocks: 2, resident };
+            let shape = Shape { level, width, block_vectors: 2, interleaved: 2, blocks: 2, resident };
             let inputs = Inputs::new(&mut Random(7), &body, shape.lanes(), 3);
             let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
             let lanes = shape.lanes();
@@ -157,7 +158,7 @@ fn states_that_change_places_do() {
 #[test]
 fn what_is_no_body_is_not_written() {
     let (level, width) = *widths().last().expect("AVX2");
-    let shape = Shape { level, width, abreast: 1, together: 1, blocks: 1, resident: true };
+    let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
     let good = oscillator();
     assert!(write(&good, shape).is_some());
     let bad = [
@@ -172,8 +173,8 @@ fn what_is_no_body_is_not_written() {
     ];
     assert!(bad.iter().all(|body| write(body, shape).is_none()));
     for wrong in [
-        Shape { abreast: 0, ..shape },
-        Shape { together: 0, ..shape },
+        Shape { block_vectors: 0, ..shape },
+        Shape { interleaved: 0, ..shape },
         Shape { blocks: 0, ..shape },
         Shape { width: 2, ..shape },
         Shape { level: Level::Baseline, ..shape },
@@ -215,7 +216,7 @@ fn long_rows_are_gone_through_once() {
     // One step over 100 000 numbers, as elementwise functions are.
     let (level, width) = *widths().last().expect("AVX2");
     let body = oscillator();
-    let shape = Shape { level, width, abreast: 1, together: 1, blocks: 100_000 / width, resident: false };
+    let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 100_000 / width, resident: false };
     let inputs = Inputs::new(&mut Random(9), &body, shape.lanes(), 2);
     let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
     let want = inputs.run(&Interpreter::new(&body, shape.lanes(), level), &mut Vec::new());
@@ -234,4 +235,45 @@ fn rounding_is_to_nearest_whatever_the_caller_does() {
     let (got, after) = process::with_other_rounding(|| inputs.run(&kernel, &mut Vec::new()));
     assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
     assert_eq!(after & OTHER_ROUNDING, OTHER_ROUNDING);
+}
+
+/// The body of several steps that keeps the states between has the bits of these steps, interpreted and written.
+#[test]
+fn a_trail_has_the_states_of_its_steps() {
+    let mut seen = 0;
+    for seed in 0..400u64 {
+        let random = &mut Random(seed.wrapping_mul(0xA076_1D64_78BD_642F) ^ 7);
+        let (operations, states) = (3 + random.below(40), 1 + random.below(5));
+        let body = random::body(random, operations, states);
+        let (lanes, steps, numbers) = (random.one_of(&[1, 4, 8]), 1 + random.below(9), body.next.len());
+        let trail = body.trail(steps);
+        let inputs = Inputs::new(random, &body, lanes, steps);
+        // One after the other.
+        let oracle = Interpreter::new(&body, lanes, Level::Baseline);
+        let mut want = Vec::new();
+        let mut now = inputs.clone();
+        for step in 0..steps {
+            now.steps = 1;
+            now.per_step = inputs.per_step[step * body.per_step..].to_vec();
+            now.state = now.run(&oracle, &mut Vec::new());
+            want.extend_from_slice(&now.state);
+        }
+        // At once.
+        let mut all = Inputs { steps: 1, ..inputs };
+        all.state.resize((steps + 1) * numbers * lanes, 0.0);
+        let width = if lanes == 1 { 1 } else { 4 };
+        let shape = Shape { level: Level::Avx2, width, block_vectors: 1, interleaved: 1, blocks: lanes / width, resident: false };
+        let written = Level::Avx2.here().then(|| write(&trail, shape).expect("a kernel"));
+        let interpreter = Interpreter::new(&trail, lanes, Level::Baseline);
+        for kernel in
+            [Some(&interpreter as &dyn Kernel), written.as_ref().map(|kernel| kernel as &dyn Kernel)].into_iter().flatten()
+        {
+            let got = all.run(kernel, &mut Vec::new());
+            let (last, kept) = got.split_at(numbers * lanes);
+            assert!(kept.iter().zip(&want).all(|(got, want)| same(*got, *want)), "seed {seed}, {steps} steps, {lanes} lanes");
+            assert!(last.iter().zip(&now.state).all(|(got, want)| same(*got, *want)), "seed {seed}: the last state");
+            seen += kept.len();
+        }
+    }
+    assert!(seen > 10_000, "{seen}");
 }

@@ -68,7 +68,7 @@ fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
         return;
     }
     let (level, width) = *crate::widths().last().expect("AVX2");
-    assert!(write(&oscillator(), Shape { level, width, abreast: 1, together: 1, blocks: 1, resident: true }).is_none());
+    assert!(write(&oscillator(), Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true }).is_none());
     // What was there before goes on.
     let inputs = crate::Inputs::new(&mut crate::Random(1), &oscillator(), before.lanes(), 3);
     inputs.run(&before, &mut Vec::new());

@@ -83,7 +83,7 @@ impl Maker<'_> {
     fn operation(&mut self) {
         let (a, b) = (self.any(), self.any());
         let sure = |maker: &Self, id: Id| maker.sure[id as usize];
-        match self.random.below(24) {
+        match self.random.below(27) {
             0..3 => self.push(Op::Add(a, b), false, false),
             3..6 => self.push(Op::Sub(a, b), false, false),
             6..9 => self.push(Op::Mul(a, b), false, false),
@@ -111,6 +111,11 @@ impl Maker<'_> {
                 let is_number = self.push(Op::Equal(a, a), true, true);
                 let other = self.one_that(sure).unwrap_or(0);
                 self.push(Op::Select(is_number, a, other), true, false)
+            }
+            24.. => {
+                let c = self.any();
+                let op = self.random.one_of(&[Op::MulAdd(a, b, c), Op::MulSub(a, b, c), Op::SubMul(a, b, c)]);
+                self.push(op, false, false)
             }
             kind => {
                 let (Some(a), Some(b), Some(c)) = (self.one_that(sure), self.one_that(sure), self.one_that(sure)) else {

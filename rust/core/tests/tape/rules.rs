@@ -1,6 +1,6 @@
 //! Every rule that shortens an expression, where it fires and on its border, where it must not.
 
-use stepwell_core::tape::{Counts, Id, Op, Tape};
+use stepwell_core::tape::{Counts, Id, Op, Tape, fuse::fuse};
 
 use crate::expressions::{Given, evaluate, same};
 
@@ -85,6 +85,9 @@ fn show(tape: &Tape, id: Id) -> String {
         op @ Op::Xor(..) => ("xor", op),
         op @ Op::AddBits(..) => ("plus", op),
         op @ Op::Select(..) => ("select", op),
+        op @ Op::MulAdd(..) => ("muladd", op),
+        op @ Op::MulSub(..) => ("mulsub", op),
+        op @ Op::SubMul(..) => ("submul", op),
         other => panic!("{other:?}"),
     };
     let (operands, n) = op.operands();
@@ -214,6 +217,8 @@ fn rules_fire_and_change_no_bit() {
         ("(plus y x)", "(plus x y)"),
         // What chooses nothing and moves nothing.
         ("(select (< x y) z z)", "z"),
+        ("(select (< 1 2) x y)", "x"),
+        ("(select (< 2 1) x y)", "y"),
         ("(copy x)", "x"),
         ("(up x 0)", "x"),
         ("(down x 0)", "x"),
@@ -303,10 +308,11 @@ fn operations_are_counted_before_and_after() {
     let text = "(select (< 1 2) (- (+ (* (+ x y) (+ y x)) (* 0 1)) (/ (sqrt (+ x y)) x)) (floor (up 1 2)))";
     let mut tape = Tape::default();
     let id = read(text, &mut |op| tape.push(op));
-    let written = Counts { additions: 5, multiplications: 2, divisions: 1, square_roots: 1, choices: 2, bits: 2 };
-    assert_eq!(tape.written(), written);
-    // The sum once; (x + y)² is never −0, so the zero is gone; the choice is left, for its mask is a constant and its values are not.
-    let computed = Counts { additions: 2, multiplications: 1, divisions: 1, square_roots: 1, choices: 1, bits: 0 };
+    // What is made of constants alone is not counted: 0·1, 1 < 2, and the other choice.
+    let written = Counts { additions: 5, multiplications: 1, fused: 0, divisions: 1, square_roots: 1, choices: 1, bits: 0 };
+    assert_eq!(tape.written([id]), written);
+    // The sum once; (x + y)² is never −0, so the zero is gone; the choice is made.
+    let computed = Counts { additions: 2, multiplications: 1, fused: 0, divisions: 1, square_roots: 1, choices: 0, bits: 0 };
     assert_eq!(tape.counts([id]), computed);
     assert_eq!(tape.counts([]), Counts::default());
     // What nobody needs is on the tape and does not count.
@@ -316,5 +322,71 @@ fn operations_are_counted_before_and_after() {
     // Changes of sign and copies are no arithmetic.
     let mut tape = Tape::default();
     let id = read("(copy (neg x))", &mut |op| tape.push(op));
-    assert_eq!((tape.written(), tape.counts([id])), (Counts::default(), Counts::default()));
+    assert_eq!((tape.written([id]), tape.counts([id])), (Counts::default(), Counts::default()));
+    // Of inputs what is needed of them counts, once; and nothing of parameters alone.
+    let mut tape = Tape::default();
+    let [x, t, h] = [Op::State(0), Op::Time, Op::Step].map(|op| tape.push(op));
+    let later = tape.push(Op::Add(t, h));
+    let (sample, twice) = (tape.push(Op::Sample(0, later)), tape.push(Op::Add(h, h)));
+    let input = tape.push(Op::Mul(sample, twice));
+    let needless = tape.push(Op::Div(t, h));
+    tape.push(Op::Mul(sample, twice));
+    let next = tape.push(Op::Sub(x, input));
+    let counts = Counts { additions: 2, multiplications: 1, ..Counts::default() };
+    assert_eq!(tape.written([next]), counts);
+    assert_eq!(tape.written([next, needless]), Counts { divisions: 1, ..counts });
+}
+
+/// What is fused of an expression of x, y and z, if these others are asked for as well.
+fn fused(text: &str, also: &[&str]) -> String {
+    let mut tape = Tape::default();
+    for i in 0..3 {
+        tape.push(Op::State(i));
+    }
+    let roots: Vec<Id> = std::iter::once(&text).chain(also).map(|text| read(text, &mut |op| tape.push(op))).collect();
+    show(&fuse(&tape, &roots), roots[0])
+}
+
+#[test]
+fn a_product_of_one_use_is_fused_into_its_sum() {
+    for (text, want) in [
+        ("(+ x (* y z))", "(muladd y z x)"),
+        ("(+ (* y z) x)", "(muladd y z x)"),
+        ("(- (* y z) x)", "(mulsub y z x)"),
+        ("(- x (* y z))", "(submul y z x)"),
+        // Of two that are equally deep the one whose factors come later.
+        ("(+ (* x x) (* y y))", "(muladd y y (* x x))"),
+        ("(- (* x x) (* y y))", "(submul y y (* x x))"),
+        ("(+ (+ (* x x) (* y y)) (* z z))", "(muladd z z (muladd y y (* x x)))"),
+        // A change of sign goes with it, as it does without.
+        ("(+ x (neg (* y z)))", "(submul y z x)"),
+        // A fused sum is no product, and a product of it is one like others.
+        ("(+ z (* x (+ x (* y z))))", "(muladd x (muladd y z x) z)"),
+    ] {
+        assert_eq!(fused(text, &[]), want, "{text}");
+    }
+}
+
+#[test]
+fn what_would_not_vanish_or_is_not_of_the_state_is_not_fused() {
+    // Twice in the sum itself, in a sum and a root, in a sum and a state, in two sums.
+    for (text, also) in [
+        ("(+ (* x y) (* x y))", ""),
+        ("(+ (* x y) (sqrt (* x y)))", ""),
+        ("(+ z (* x y))", "(* x y)"),
+        ("(+ z (* x y))", "(- z (* x y))"),
+    ] {
+        let also: Vec<&str> = Some(also).filter(|also| !also.is_empty()).into_iter().collect();
+        assert_eq!(fused(text, &also), text, "{also:?}");
+    }
+    // A product of parameters is made before the steps, whoever has them in common.
+    let mut tape = Tape::default();
+    let [x, a, b] = [Op::State(0), Op::Param(0), Op::Param(1)].map(|op| tape.push(op));
+    let product = tape.push(Op::Mul(a, b));
+    let sum = tape.push(Op::Add(x, product));
+    assert_eq!(fuse(&tape, &[sum]).op(sum), Op::Add(x, product));
+    // Of the state is what is a parameter times it.
+    let product = tape.push(Op::Mul(a, x));
+    let sum = tape.push(Op::Add(b, product));
+    assert!(matches!(fuse(&tape, &[sum]).op(sum), Op::MulAdd(..)));
 }

@@ -13,14 +13,16 @@ pub struct Form {
     pub vector: (u8, u8),
     /// The same for the first number of a vector only, if there is such an instruction.
     pub single: Option<(u8, u8)>,
+    /// Whether VEX has to say that numbers are of 64 bits (W). EVEX always does.
+    pub wide: bool,
 }
 
 const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
-    Form { map, vector: (prefix, opcode), single: None }
+    Form { map, vector: (prefix, opcode), single: None, wide: false }
 }
 
 const fn arithmetic(opcode: u8) -> Form {
-    Form { map: 1, vector: (P66, opcode), single: Some((PF2, opcode)) }
+    Form { single: Some((PF2, opcode)), ..form(1, P66, opcode) }
 }
 
 const P66: u8 = 1;
@@ -34,7 +36,31 @@ pub const DIV: Form = arithmetic(0x5E);
 pub const SQRT: Form = arithmetic(0x51);
 pub const COMPARE: Form = arithmetic(0xC2);
 /// Rounds to a whole number as the byte behind says.
-pub const ROUND: Form = Form { map: 3, vector: (P66, 0x09), single: Some((P66, 0x0B)) };
+pub const ROUND: Form = Form { single: Some((P66, 0x0B)), ..form(3, P66, 0x09) };
+/// A fused multiply-add overwrites one of its operands; which one, the instruction says.
+#[derive(Clone, Copy, Debug)]
+pub struct Fused {
+    /// to ← to · second ± first
+    pub over_factor: Form,
+    /// to ← first · to ± second
+    pub over_other: Form,
+    /// to ← first · second ± to
+    pub over_term: Form,
+}
+
+const fn fused(opcode: u8) -> Fused {
+    const fn of(opcode: u8) -> Form {
+        Form { single: Some((P66, opcode + 1)), wide: true, ..form(2, P66, opcode) }
+    }
+    Fused { over_factor: of(opcode), over_other: of(opcode + 0x10), over_term: of(opcode + 0x20) }
+}
+
+/// a · b + c
+pub const MUL_ADD: Fused = fused(0x98);
+/// a · b − c
+pub const MUL_SUB: Fused = fused(0x9A);
+/// c − a · b
+pub const SUB_MUL: Fused = fused(0x9C);
 pub const AND: Form = form(1, P66, 0x54);
 /// Not the first, and the second.
 pub const AND_NOT: Form = form(1, P66, 0x55);
@@ -53,8 +79,8 @@ pub const BLEND_BY_SIGN: Form = form(3, P66, 0x4B);
 pub const BITS_OF_THREE: Form = form(3, P66, 0x25);
 /// All ones where a bit of the mask is set (EVEX).
 pub const SPREAD_MASK: Form = form(2, PF3, 0x38);
-pub const LOAD: Form = Form { map: 1, vector: (P66, 0x10), single: Some((PF2, 0x10)) };
-pub const STORE: Form = Form { map: 1, vector: (P66, 0x11), single: Some((PF2, 0x11)) };
+pub const LOAD: Form = Form { single: Some((PF2, 0x10)), ..form(1, P66, 0x10) };
+pub const STORE: Form = Form { single: Some((PF2, 0x11)), ..form(1, P66, 0x11) };
 /// From register to register.
 pub const MOVE: Form = form(1, P66, 0x28);
 /// One number to all lanes.
@@ -148,7 +174,7 @@ impl Code {
             self.operand(to & 7, second, unit);
         } else {
             self.bytes.extend([0xC4, no(to, 3) << 7 | 1 << 6 | b << 5 | form.map]);
-            self.bytes.extend([(!first & 15) << 3 | (length & 1) << 2 | prefix, opcode]);
+            self.bytes.extend([u8::from(form.wide) << 7 | (!first & 15) << 3 | (length & 1) << 2 | prefix, opcode]);
             self.operand(to & 7, second, 1);
         }
     }

@@ -50,16 +50,16 @@ struct Pressure {
 impl<'a> Writer<'a> {
     fn new(plan: &'a Plan, shape: Shape) -> Writer<'a> {
         let evex = shape.level == Level::Avx512;
-        let values = plan.sources.len() * shape.abreast;
+        let values = plan.sources.len() * shape.block_vectors;
         let mut replaces = vec![None; plan.sources.len()];
         for (s, id) in plan.next.iter().enumerate() {
             if let Some(id) = id {
                 replaces[*id as usize] = Some(s as u32);
             }
         }
-        let mut order = Vec::with_capacity(plan.steps.len() * shape.abreast);
-        for first in (0..shape.abreast).step_by(shape.together) {
-            let team = first..shape.abreast.min(first + shape.together);
+        let mut order = Vec::with_capacity(plan.steps.len() * shape.block_vectors);
+        for first in (0..shape.block_vectors).step_by(shape.interleaved) {
+            let team = first..shape.block_vectors.min(first + shape.interleaved);
             order.extend(plan.steps.iter().flat_map(|step| team.clone().map(move |vector| (step, vector))));
         }
         let leaf = |source: &Source| if *source == Source::Made { Where::Nowhere } else { Where::Leaf };
@@ -67,13 +67,13 @@ impl<'a> Writer<'a> {
             plan,
             shape,
             order,
-            code: Code { bytes: Vec::with_capacity(16 * plan.steps.len() * shape.abreast + 512), evex, width: shape.width },
-            registers: Registers::new(if evex { 32 } else { 16 }, values),
+            code: Code { bytes: Vec::with_capacity(16 * plan.steps.len() * shape.block_vectors + 512), evex, width: shape.width },
+            registers: Registers::new(shape.registers() as u8, values),
             uses: Uses::new(values),
-            memory: plan.sources.iter().flat_map(|source| std::iter::repeat_n(leaf(source), shape.abreast)).collect(),
+            memory: plan.sources.iter().flat_map(|source| std::iter::repeat_n(leaf(source), shape.block_vectors)).collect(),
             replaces,
-            homes: vec![None; plan.next.len() * shape.abreast],
-            waits: vec![false; plan.next.len() * shape.abreast],
+            homes: vec![None; plan.next.len() * shape.block_vectors],
+            waits: vec![false; plan.next.len() * shape.block_vectors],
             now: 0,
             free_slots: Vec::new(),
             slots: 0,
@@ -87,8 +87,8 @@ impl<'a> Writer<'a> {
 
     /// Finds out when each value is needed, and how many are at once if every number of the state has a register.
     fn look_ahead(&mut self) -> Pressure {
-        let (plan, abreast) = (self.plan, self.shape.abreast);
-        let values = plan.sources.len() * abreast;
+        let (plan, block_vectors) = (self.plan, self.shape.block_vectors);
+        let values = plan.sources.len() * block_vectors;
         let mut made = vec![0u32; values];
         for (place, (step, vector)) in self.order.iter().enumerate() {
             made[self.value(step.id, *vector) as usize] = Self::time(place);
@@ -140,23 +140,23 @@ impl<'a> Writer<'a> {
     /// Gives registers to what is in use through the whole loop, as far as those that are under way leave any.
     fn share_out(&mut self) -> Pinned {
         let Pressure { most, reads } = self.look_ahead();
-        let (plan, abreast, resident) = (self.plan, self.shape.abreast, self.shape.resident);
+        let (plan, block_vectors, resident) = (self.plan, self.shape.block_vectors, self.shape.resident);
         let mut pinned = Pinned::default();
         // One more than are under way: an operand may have to be loaded. At least five: no instruction asks for more.
         let needed = (most + 1).max(5);
         if resident {
             for s in (0..plan.next.len()).filter(|s| plan.next[*s].is_some()) {
-                for vector in 0..abreast {
+                for vector in 0..block_vectors {
                     if self.registers.free() > needed
                         && let Some(register) = self.registers.keep_one()
                     {
-                        self.homes[s * abreast + vector] = Some(register);
+                        self.homes[s * block_vectors + vector] = Some(register);
                         pinned.state.push((s as u32, vector, register));
                     }
                 }
             }
         }
-        let stays = |value: Value| match plan.sources[value as usize / abreast] {
+        let stays = |value: Value| match plan.sources[value as usize / block_vectors] {
             Source::Pool(_) => true,
             Source::Row(_) | Source::Kept(_) => resident,
             Source::PerStep(_) => !resident,
@@ -251,7 +251,7 @@ impl<'a> Writer<'a> {
 
     /// To the rows of a block so many further on.
     fn move_on(&mut self, blocks: i32) {
-        let bytes = (self.shape.width * self.shape.abreast * 8) as i32 * blocks;
+        let bytes = (self.shape.width * self.shape.block_vectors * 8) as i32 * blocks;
         if self.shape.blocks > 1 {
             let sources = &self.plan.sources;
             let reads = |kind: fn(&Source) -> bool| sources.iter().any(kind);

@@ -12,24 +12,24 @@ mod write;
 pub use choose::{choose, choose_long};
 
 use super::{
-    Kernel, Tile,
+    Kernel, Layout, Tile,
     pages::{Frame, Pages},
 };
 use crate::{isa::Level, tape::split::Body};
 
-/// How a kernel goes through a tile. Its rows are `width · abreast · blocks` numbers long.
+/// How a kernel goes through a tile. Its rows are `width · block_vectors · blocks` numbers long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// The instructions: of AVX2 or AVX-512.
     pub level: Level,
     /// Numbers in a vector: 1, 4, or 8 (AVX-512).
     pub width: usize,
-    /// Vectors that are stepped by one turn of the loop.
-    pub abreast: usize,
-    /// How many of them go operation by operation; so many after so many. All, or few where registers are, and the machine itself looks
-    /// far enough ahead.
-    pub together: usize,
-    /// Vectors that go one after the other, in units of those abreast.
+    /// Vectors of a block: those that one turn of the loop steps.
+    pub block_vectors: usize,
+    /// How many of them are interleaved, operation by operation; so many after so many. All, or fewer where registers are scarce and
+    /// out-of-order execution overlaps them by itself.
+    pub interleaved: usize,
+    /// Blocks, which are stepped one after the other.
     pub blocks: usize,
     /// Whether a block makes all steps before the next one does, with the state in registers. Otherwise each step is made by all blocks.
     pub resident: bool,
@@ -38,7 +38,18 @@ pub struct Shape {
 impl Shape {
     /// How long rows are.
     pub fn lanes(&self) -> usize {
-        self.width * self.abreast * self.blocks
+        self.width * self.block_vectors * self.blocks
+    }
+
+    /// The same in words that every CPU has.
+    pub fn layout(&self) -> Layout {
+        let Shape { width, block_vectors, blocks, resident, .. } = *self;
+        Layout { width, block_vectors, blocks, resident, registers: self.registers() }
+    }
+
+    /// How many vector registers there are.
+    fn registers(&self) -> usize {
+        if self.level == Level::Avx512 { 32 } else { 16 }
     }
 
     /// How often a number of the pool stands there: AVX-512 can take one for all lanes.
@@ -58,16 +69,16 @@ impl Shape {
             _ => false,
         };
         let bytes = |sizes: &[usize]| sizes.iter().try_fold(8usize, |a, b| a.checked_mul(*b)).is_some_and(|n| n < 1 << 31);
-        let lanes = [self.width, self.abreast, self.blocks];
+        let lanes = [self.width, self.block_vectors, self.blocks];
         let rows = body.next.len().max(body.rows).max(1);
         is_known
-            && self.abreast > 0
-            && self.together > 0
+            && self.block_vectors > 0
+            && self.interleaved > 0
             && self.blocks > 0
             && self.level.here()
-            && body.ops.len().saturating_mul(self.abreast) < MOST_OPERATIONS
+            && body.ops.len().saturating_mul(self.block_vectors) < MOST_OPERATIONS
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])
-            && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.abreast])
+            && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.block_vectors])
     }
 }
 
@@ -100,6 +111,11 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     let pages = Pages::new(&code, frame)?;
     let constants = plan.constants.iter().map(|bits| f64::from_bits(*bits)).collect();
     Some(Written { pages, shape, constants, uniforms: body.uniforms, spills: slots })
+}
+
+/// Whether the system lets machine code be run.
+pub fn allowed() -> bool {
+    Pages::allowed()
 }
 
 impl Written {

@@ -40,6 +40,8 @@ pub enum Doing {
     Two(Form, bool),
     /// Of one, with a byte behind or none.
     One(Form, Option<u8>),
+    /// A product and a sum, rounded once.
+    Fused(x::Fused),
     /// Moves bits up or down.
     Shift(u8, u8),
     /// A mask of two values, by predicate.
@@ -177,6 +179,9 @@ impl Plan {
             Op::Sub(..) => Doing::Two(x::SUB, false),
             Op::Mul(..) => Doing::Two(x::MUL, true),
             Op::Div(..) => Doing::Two(x::DIV, false),
+            Op::MulAdd(..) => Doing::Fused(x::MUL_ADD),
+            Op::MulSub(..) => Doing::Fused(x::MUL_SUB),
+            Op::SubMul(..) => Doing::Fused(x::SUB_MUL),
             Op::And(..) => Doing::Two(x::AND, true),
             Op::Or(..) => Doing::Two(x::OR, true),
             Op::Xor(..) => Doing::Two(x::XOR, true),

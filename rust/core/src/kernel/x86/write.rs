@@ -1,4 +1,4 @@
-//! One step of the vectors that go abreast, instruction after instruction.
+//! One step of the vectors of a block, instruction after instruction.
 //!
 //! A value is in a register, in memory, or both. Leaves are in memory from the start; what is made is spilled to the scratch only when
 //! registers run out. Numbers of the state have a home: a register of their own, or their row. The next value goes there as soon as
@@ -23,7 +23,7 @@ pub enum Where {
     State(u32),
 }
 
-/// A value of one of the vectors abreast.
+/// A value of one of the vectors of a block.
 pub type Value = u32;
 
 #[derive(Debug)]
@@ -38,7 +38,7 @@ pub struct Writer<'a> {
     pub memory: Vec<Where>,
     /// Which number of the state a value of the plan replaces.
     pub replaces: Vec<Option<u32>>,
-    /// Of each number of the state in each vector abreast its register, if it has one.
+    /// Of each number of the state in each vector of the block its register, if it has one.
     pub homes: Vec<Option<u8>>,
     /// Of the same, whether the next value waits for the old one to be read.
     pub waits: Vec<bool>,
@@ -63,11 +63,11 @@ impl Writer<'_> {
     /// The value of the plan in a vector.
     pub fn value(&self, id: u32, vector: usize) -> Value {
         let vector = if self.plan.sources[id as usize].is_shared() { 0 } else { vector };
-        id * self.shape.abreast as u32 + vector as u32
+        id * self.shape.block_vectors as u32 + vector as u32
     }
 
     fn source(&self, value: Value) -> Source {
-        self.plan.sources[value as usize / self.shape.abreast]
+        self.plan.sources[value as usize / self.shape.block_vectors]
     }
 
     fn bytes(&self) -> i32 {
@@ -75,7 +75,7 @@ impl Writer<'_> {
     }
 
     fn in_row(&self, base: General, row: u32, value: Value) -> Memory {
-        let vector = value as usize % self.shape.abreast;
+        let vector = value as usize % self.shape.block_vectors;
         Memory::new(base, (row as usize * self.shape.lanes() * 8) as i32 + vector as i32 * self.bytes())
     }
 
@@ -129,7 +129,7 @@ impl Writer<'_> {
         self.code.vector(x::STORE, register, 0, Operand::Memory(row));
     }
 
-    /// How dear it is to keep a value: how long it is until it is needed, and longer if it can be had back for nothing.
+    /// The cost of keeping a value in its register: how many operations until it is needed, twice as many if memory holds it too.
     fn price(uses: &mut Uses, memory: &[Where], now: u32, value: Value) -> u32 {
         let wait = uses.next(value, now).saturating_sub(now);
         if memory[value as usize] == Where::Nowhere { wait } else { wait.saturating_mul(2) }
@@ -212,7 +212,7 @@ impl Writer<'_> {
     fn result(&mut self, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
         self.let_go(of);
         if let Some(s) = self.replaces[id as usize]
-            && let Some(home) = self.homes[s as usize * self.shape.abreast + vector]
+            && let Some(home) = self.homes[s as usize * self.shape.block_vectors + vector]
             && !self.is_old_needed(s, vector)
         {
             return Some(home);
@@ -258,6 +258,7 @@ impl Writer<'_> {
                 self.code.bytes.extend(byte);
                 to
             }
+            Doing::Fused(fused) => self.fused(fused, step, vector, of)?,
             Doing::Shift(way, places) => {
                 let second = if self.code.evex { self.operand(of[0], x::SHIFT)? } else { Operand::Register(self.fetch(of[0])?) };
                 let to = self.result(step.id, vector, of)?;
@@ -318,6 +319,44 @@ impl Writer<'_> {
         Some((first, self.operand(second, x::COMPARE)?, predicate))
     }
 
+    /// One of three operands is overwritten, and one may come from memory.
+    fn fused(&mut self, fused: x::Fused, step: &Step, vector: usize, of: &[Value]) -> Option<u8> {
+        let &[a, b, c] = of else { return None };
+        let (a, b) = self.in_order(a, b);
+        let a = self.fetch(a)?;
+        if self.registers.of(c).is_none() {
+            let b = self.fetch(b)?;
+            let c = self.operand(c, fused.over_other)?;
+            let to = self.result(step.id, vector, of)?;
+            let other = if to == b { a } else { b };
+            if to != a && to != b {
+                // What it overwrites may be the third operand's, if that has a register after all.
+                if let Operand::Register(c) = c
+                    && to == c
+                {
+                    self.code.vector(fused.over_term, to, a, Operand::Register(b));
+                    return Some(to);
+                }
+                self.code.vector(x::MOVE, to, 0, Operand::Register(a));
+            }
+            self.code.vector(fused.over_other, to, other, c);
+            return Some(to);
+        }
+        let c = self.fetch(c)?;
+        let b = self.operand(b, fused.over_term)?;
+        let to = self.result(step.id, vector, of)?;
+        match b {
+            _ if to == c => self.code.vector(fused.over_term, to, a, b),
+            _ if to == a => self.code.vector(fused.over_factor, to, c, b),
+            Operand::Register(b) if to == b => self.code.vector(fused.over_other, to, a, Operand::Register(c)),
+            _ => {
+                self.code.vector(x::MOVE, to, 0, Operand::Register(c));
+                self.code.vector(fused.over_term, to, a, b);
+            }
+        }
+        Some(to)
+    }
+
     fn select(&mut self, is_mask: bool, step: &Step, vector: usize, of: &[Value]) -> Option<u8> {
         let &[m, a, b] = of else { return None };
         if self.code.evex {
@@ -365,12 +404,12 @@ impl Writer<'_> {
         self.registers.put(value, to);
         self.now += 1;
         if let Some(s) = self.replaces[id as usize] {
-            self.waits[s as usize * self.shape.abreast + vector] = true;
-            self.settle(s, vector)?;
+            self.waits[s as usize * self.shape.block_vectors + vector] = true;
+            self.store_next(s, vector)?;
         }
         for value in of {
             if let Source::State(s) = self.source(*value) {
-                self.settle(s, vector)?;
+                self.store_next(s, vector)?;
             }
         }
         self.let_go(&[value]);
@@ -386,9 +425,9 @@ impl Writer<'_> {
         }
     }
 
-    /// Brings the next value of a number of the state home, if it waits and the old one is not needed any more.
-    fn settle(&mut self, s: u32, vector: usize) -> Option<()> {
-        let at = s as usize * self.shape.abreast + vector;
+    /// Moves the next value of a number of the state to its register or row, if it waits and the old one is not needed any more.
+    fn store_next(&mut self, s: u32, vector: usize) -> Option<()> {
+        let at = s as usize * self.shape.block_vectors + vector;
         let Some(id) = self.plan.next[s as usize].filter(|_| self.waits[at]) else { return Some(()) };
         if self.is_old_needed(s, vector) {
             return Some(());

@@ -3,11 +3,11 @@
 mod quantities;
 mod share;
 
-use std::thread;
+use std::{sync::atomic::Ordering::Relaxed, thread};
 
 use stepwell_base::{
-    along::{Distances, Kernel, Meeting, Round, Sums},
     bodies::{LANES, Law, partners},
+    forces::{Distances, Kernel, Meeting, Round, Sums},
 };
 
 use self::{
@@ -15,7 +15,7 @@ use self::{
     share::{Share, add, share},
 };
 use super::{Asked, Facts, Rates};
-use crate::{isa::with_isa, spec::Spec, systems::nbody};
+use crate::{isa::with_isa, run::crew::Stop, spec::Spec, systems::nbody};
 
 /// Bodies that are taken side by side, and parts in which sums over bodies are kept.
 const SIDE: usize = LANES;
@@ -40,6 +40,7 @@ struct Bodies {
     /// One for each slab, if there are several threads.
     shares: Vec<Share>,
     record: Vec<Quantity>,
+    stop: Stop,
     /// Places whose forces and potentials are at hand, until others are asked for: those of a state that is projected or
     /// recorded, at which the next step begins.
     at_hand: bool,
@@ -73,6 +74,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         shares,
         slabs,
         record: asked.record.iter().filter_map(|name| Quantity::named(name)).collect(),
+        stop: Stop::default(),
         at_hand: false,
         y: Vec::new(),
         dv: Vec::new(),
@@ -86,16 +88,16 @@ impl Bodies {
             2 => self.round.fill::<2>(y),
             _ => self.round.fill::<3>(y),
         }
-        let (n, kernel, round, potential) = (self.n, self.kernel, &self.round, &mut self.potential[..]);
+        let (n, kernel, round, stop, potential) = (self.n, self.kernel, &self.round, &*self.stop, &mut self.potential[..]);
         if let [sums] = &mut self.sums[..] {
             for (i, groups) in self.slabs.iter().enumerate() {
-                kernel.meet(energy, Meeting { n, groups, round, sums, more: i > 0, potential, out });
+                kernel.meet(energy, Meeting { n, groups, round, sums, more: i > 0, stop, potential, out });
             }
             return;
         }
         share(&self.slabs, &mut self.shares, &mut self.sums, |groups, share, sums| {
             let (potential, out) = (&mut share.potential[..], &mut share.force[..]);
-            kernel.meet(energy, Meeting { n, groups, round, sums, more: false, potential, out });
+            kernel.meet(energy, Meeting { n, groups, round, sums, more: false, stop, potential, out });
         });
         // Slab after slab, whichever was ready first.
         for (i, share) in self.shares.iter().enumerate() {
@@ -148,16 +150,20 @@ impl Rates for Bodies {
         self.at_hand = false;
     }
 
+    fn heed(&mut self, stop: &Stop) {
+        self.stop = Stop::clone(stop);
+    }
+
     fn dv(&mut self, _t: f64, _v: &[f64], y: &[f64], out: &mut [f64]) {
         self.find(false, y, out);
     }
 
-    fn foresee(&mut self, y: &[f64]) {
+    fn cache_forces(&mut self, y: &[f64]) {
         if !self.has(y) {
             let mut dv = std::mem::take(&mut self.dv);
             dv.resize(y.len(), 0.0);
             self.meet(true, y, &mut dv);
-            (self.dv, self.at_hand) = (dv, true);
+            (self.dv, self.at_hand) = (dv, !self.stop.load(Relaxed));
             self.y.clear();
             self.y.extend_from_slice(y);
         }

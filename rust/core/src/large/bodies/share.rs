@@ -2,7 +2,7 @@
 
 use std::{sync::Mutex, thread};
 
-use stepwell_base::along::{Distances, Sums};
+use stepwell_base::forces::{Distances, Sums};
 
 /// What a slab brings.
 pub(super) struct Share {

@@ -12,10 +12,10 @@ from math import prod
 from typing import Any
 
 import numpy as np
-import stepwell as sw
-from stepwell.reference import adaptive
-from stepwell.reference.run import linear_step
-from stepwell.reference.signal import Constant, Held, Sine
+
+from . import adaptive
+from .run import linear_step
+from .signal import Constant, Held, Sine
 
 
 def _array(shape: tuple[int, ...], symbols: Any) -> Any:
@@ -38,11 +38,18 @@ class Sampled(Held):
 
 
 class Tracer:
-    """A system of symbols, for one member, and what can be traced of it."""
+    """A system of symbols, for one member, and what can be traced of it.
 
-    def __init__(self, system: sw.System, tape: Any) -> None:
+    Attributes:
+        numbers: what stands behind the parameters: of each symbol its number for every member.
+        tables: what stands behind the sampled inputs.
+    """
+
+    def __init__(self, system: Any, tape: Any) -> None:
         self.system, self.tape = system, tape
         self._params, self._tables = map(tape.param, count()), count()
+        self.numbers: list[Any] = []
+        self.tables: list[Held] = []
 
     def state(self) -> tuple[Any, Any, Any]:
         """Both blocks, and the symbols of the state that come after them."""
@@ -59,9 +66,12 @@ class Tracer:
             case Sine():
                 return Sine(*(self.symbols(each, batch) for each in (value.amplitude, value.omega, value.phase)))
             case Held():
+                self.tables.append(value)
                 return Sampled(self.tape, next(self._tables))
             case np.ndarray():
-                return _array(value.shape[: max(0, value.ndim - len(batch))], self._params)
+                own = value.shape[: max(0, value.ndim - len(batch))]
+                self.numbers += [value[index] for index in np.ndindex(own)]
+                return _array(own, self._params)
             case _:
                 return value
 
@@ -78,24 +88,24 @@ class Tracer:
                 setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
         return control.around(s, h)
 
-    def step(self, method: sw.Method) -> list[Any]:
+    def step(self, method: Any) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
         h = self.tape.step()
         s, (v, y, more) = self.scaled(h), self.state()
         if hasattr(s, "work"):
             s.work = next(more)
         v, y = method.steps.step(s, self.tape.time(), h, v, y)
-        if hasattr(s, "settle"):
-            v, y = s.settle(v, y)
+        if hasattr(s, "project"):
+            v, y = s.project(v, y)
         return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
 
-    def slot(self, method: sw.Method, which: str, choice: int) -> list[Any]:
+    def slot(self, method: Any, which: str, choice: int) -> list[Any]:
         """The state after a method's ``start`` or ``finish``."""
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
 
-    def attempt(self, method: sw.Method) -> list[Any]:
-        """The state and the pace after an attempt at a step of chosen length."""
+    def attempt(self, method: Any) -> list[Any]:
+        """The state and the pace after an attempt at an adaptive step."""
         s, (v, y, more) = self.scaled(1.0), self.state()
         pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
         axes = len(self.system.v_shape), len(self.system.y_shape)

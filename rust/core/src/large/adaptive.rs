@@ -1,4 +1,4 @@
-//! A large member that goes at its own pace.
+//! A large member with adaptive steps.
 
 use std::sync::Arc;
 
@@ -12,13 +12,16 @@ use crate::{
     error::Error,
     isa::Level,
     pace::{Pace, judge, length2},
-    run::paced::{NO_CLOCK, Paced},
+    run::{
+        adaptive::{AdaptiveBatch, NO_CLOCK},
+        crew::Stop,
+    },
     spec::Spec,
     trace::{How, Traced, method},
 };
 
 /// One member, whose rates are scaled to a step of 1.
-pub struct LargePaced {
+pub struct LargeAdaptive {
     blocks: Blocks,
     executor: Executor,
     /// The order of the estimate.
@@ -27,7 +30,7 @@ pub struct LargePaced {
     pace: Pace<f64>,
 }
 
-impl LargePaced {
+impl LargeAdaptive {
     /// Of rates by a method that estimates its error. `budget` is the most attempts of the member.
     pub fn new(
         courses: Arc<Courses>,
@@ -35,16 +38,16 @@ impl LargePaced {
         traced: &Traced,
         level: Level,
         budget: f64,
-    ) -> Result<LargePaced, Error> {
+    ) -> Result<LargeAdaptive, Error> {
         let How::Attempts { name } = &traced.scene().how else { return Err(Error::NoEstimate) };
         let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
         let blocks = Blocks::new(courses, rates, traced.shape);
         let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);
-        Ok(LargePaced { blocks, executor, order, budget, pace: Pace::new(0.0, 0.0, 0.0, 0.0) })
+        Ok(LargeAdaptive { blocks, executor, order, budget, pace: Pace::of([0.0; Pace::<f64>::NUMBERS]) })
     }
 }
 
-impl Paced for LargePaced {
+impl AdaptiveBatch for LargeAdaptive {
     fn lanes(&self) -> usize {
         1
     }
@@ -53,7 +56,7 @@ impl Paced for LargePaced {
         self.blocks.rates.prepare(spec, member, 1);
     }
 
-    fn sit(&mut self, _lane: usize, state: &[f64]) {
+    fn set_state(&mut self, _lane: usize, state: &[f64]) {
         let (v, y) = self.blocks.slots_mut();
         let (from_v, from_y) = state.split_at(v.len());
         v.copy_from_slice(from_v);
@@ -73,14 +76,19 @@ impl Paced for LargePaced {
         self.pace = pace;
     }
 
+    fn heed(&mut self, stop: &Stop) {
+        self.executor.stop = Stop::clone(stop);
+        self.blocks.rates.heed(stop);
+    }
+
     fn attempt(&mut self, attempts: usize) {
         let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
         for _ in 0..attempts {
-            let outlook @ (step, _, runs) = self.pace.outlook(self.budget);
-            if !runs {
+            let outlook = self.pace.outlook(self.budget);
+            if !outlook.runs && !outlook.is_extra {
                 break;
             }
-            self.executor.run(&courses.step, rates.as_mut(), *sizes, self.pace.t, step, arena);
+            self.executor.run(&courses.step, rates.as_mut(), *sizes, self.pace.t, outlook.step, arena);
             // Results come in pairs: of velocities, of coordinates.
             let length = |i: usize, row: usize| length2(&arena[row * *stride..][..sizes[i % 2]]);
             let made: Vec<f64> = courses.step.results.iter().enumerate().map(|(i, row)| length(i, *row)).collect();

@@ -1,4 +1,4 @@
-"""The film of a run: bodies with trails, curves that grow, a chain that swings; the errors so far beside it, and the time."""
+"""The animation of a run: bodies with trails, growing curves, a swinging chain; the errors so far beside it, and the time."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ if TYPE_CHECKING:
 
 ENDINGS = (".gif", ".mp4", ".html")
 
-#: More frames than this are a mistake, and no film.
+#: More frames than this are a mistake, and no animation.
 MOST_FRAMES = 20_000
 
-#: Dots per inch, for a film of about 1000 pixels' width.
+#: Dots per inch, for an animation of about 1000 pixels' width.
 DPI = 62.5
 
 #: A trail is as long as this share of the run, or of the period if there is one.
 TRAIL = 0.1
 TRAIL_OF_PERIOD = 0.3
 
-#: A page that holds a film of this many megabytes is still shown.
+#: A page that holds an animation of this many megabytes is still shown.
 LIMIT = 500.0
 
 Show = Callable[[int], None]
 
 
 def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
-    """Raise if no such film can be written, before any work is done; or return its seconds and frames a second.
+    """Raise if no such animation can be written, before any work is done; or return its seconds and frames a second.
 
     Raises:
-        ArgumentError: if the ending is not that of a film, or its length cannot be.
+        ArgumentError: if the ending is not that of an animation, or its length cannot be.
         UnsupportedError: naming what is missing.
     """
     seconds = _checks.number("seconds", seconds, positive=True, unit="seconds")
     fps = _checks.number("fps", fps, positive=True, unit="frames a second")
     if seconds * fps > MOST_FRAMES:
         raise ArgumentError(f"seconds, fps: {seconds * fps:.3g} frames, expected {MOST_FRAMES} or fewer")
-    ending = Path(path).suffix.lower()
+    ending = _checks.file("path", path).suffix.lower()
     if ending not in ENDINGS:
-        raise ArgumentError(f"path: expected an ending of a film, one of {', '.join(ENDINGS)}, got {str(path)!r}")
+        raise ArgumentError(f"path: expected an ending of an animation, one of {', '.join(ENDINGS)}, got {str(path)!r}")
     new_figure(1.0, 1.0)  # raises if matplotlib is missing
     from matplotlib.animation import FFMpegWriter
 
@@ -58,7 +58,7 @@ def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
 
 
 def write(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> None:
-    """Draw every frame and write the film."""
+    """Draw every frame and write the animation."""
     from matplotlib import animation, rc_context
 
     good = np.flatnonzero(chart.finite)
@@ -82,7 +82,7 @@ def write(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> No
 
 
 def stage(chart: RunPicture) -> tuple[Figure, Show]:
-    """The figure, and what shows a kept state on it."""
+    """The figure, and what shows a saved state on it."""
     figure = new_figure(16.0, 9.0)
     figure.text(0.012, 0.95, chart.title, size=22, weight="bold")
     run = chart.run

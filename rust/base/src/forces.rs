@@ -1,6 +1,8 @@
-//! The forces: several bodies side by side.
+//! The forces: several bodies side by side, a lane each.
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 use crate::{
     aligned::Aligned,
@@ -25,7 +27,7 @@ fn store(to: &mut [f64], at: usize, chunk: &Chunk) {
     to[at..at + SIDE].copy_from_slice(chunk);
 }
 
-/// Where bodies are and what they weigh, along the bodies, for two rounds and more.
+/// Places and masses of the bodies as rows, repeated for two rounds and more.
 pub struct Round {
     /// Places, one row as long as that of the partners for each direction.
     places: Aligned,
@@ -100,6 +102,7 @@ struct Along<'a, const D: usize, const LAW: u8, const ENERGY: bool> {
     round: &'a Round,
     sums: &'a mut Sums,
     more: bool,
+    stop: &'a AtomicBool,
     potential: &'a mut [f64],
     out: &'a mut [f64],
 }
@@ -142,23 +145,20 @@ impl<const D: usize> Bodies<D> {
                 more[l] = const { law(LAW) }.potential(r2, pull, p.strength[l]);
             }
         }
-        if let Some(met) = met {
-            // Adding nothing changes no sum. Bits, not a choice, which would become eight branches.
-            for l in 0..SIDE {
-                to_i[l] = f64::from_bits(to_i[l].to_bits() & met[l]);
-                to_j[l] = f64::from_bits(to_j[l].to_bits() & met[l]);
-                more[l] = f64::from_bits(more[l].to_bits() & met[l]);
-            }
-        }
+        // Adding −0 changes no sum. Bits, not a choice, which would become eight branches.
+        let if_met = |x: f64, l: usize| match met {
+            Some(met) => f64::from_bits(x.to_bits() & met[l] | (-0.0f64).to_bits() & !met[l]),
+            None => x,
+        };
         for c in 0..D {
             for l in 0..SIDE {
-                self.pull[c][l] += d[c][l] * to_i[l];
-                p.pull[c][l] -= d[c][l] * to_j[l];
+                self.pull[c][l] += if_met(d[c][l] * to_i[l], l);
+                p.pull[c][l] += if_met(d[c][l] * to_j[l], l);
             }
         }
         if ENERGY {
             for l in 0..SIDE {
-                self.well[l] += more[l];
+                self.well[l] += if_met(more[l], l);
             }
         }
     }
@@ -261,7 +261,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> 
 impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY> {
     #[inline(always)]
     fn meet(&mut self) {
-        let Along { n, round, sums, .. } = self;
+        let Along { n, round, sums, stop, .. } = self;
         let n = *n;
         let (width, stride) = (round.bodies.len(), round.partners.len());
         let Sums { after, before, potential } = &mut **sums;
@@ -274,12 +274,15 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
             before,
             wells: potential,
         };
-        hot.after.fill(0.0);
-        hot.before.fill(0.0);
+        hot.after.fill(-0.0);
+        hot.before.fill(-0.0);
         if ENERGY {
             hot.wells.fill(0.0);
         }
         for &(first, last) in self.groups {
+            if stop.load(Relaxed) {
+                return;
+            }
             let many = (last - first) / SIDE + 1;
             let count = meeting(n, last);
             hot.sweep(0, count, first, many);
@@ -292,7 +295,7 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
         for c in 0..D {
             let (after, before) = (&hot.after[c * width..][..n], &hot.before[c * stride..][..2 * n]);
             let (low, high) = before.split_at(n);
-            let sums = after.iter().zip(low).zip(high).map(|((after, low), high)| after + (low + high));
+            let sums = after.iter().zip(low).zip(high).map(|((after, low), high)| after - (low + high));
             if self.more {
                 out.iter_mut().zip(sums).for_each(|(out, sum)| out[c] += sum);
             } else {
@@ -349,6 +352,8 @@ pub struct Meeting<'a> {
     pub sums: &'a mut Sums,
     /// Whether to add to what is there.
     pub more: bool,
+    /// When set, nothing more is done, and what was done is of no use.
+    pub stop: &'a AtomicBool,
     /// h times the potential of each body.
     pub potential: &'a mut [f64],
     /// h times the acceleration of each body.
@@ -373,7 +378,7 @@ impl Kernel {
     }
 
     fn by<const D: usize, const LAW: u8, const ENERGY: bool>(self, m: Meeting) {
-        let Meeting { n, groups, round, sums, more, potential, out } = m;
-        with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY> { n, groups, round, sums, more, potential, out }));
+        let Meeting { n, groups, round, sums, more, stop, potential, out } = m;
+        with_isa!(self.level, |isa| isa.run(Along::<D, LAW, ENERGY> { n, groups, round, sums, more, stop, potential, out }));
     }
 }

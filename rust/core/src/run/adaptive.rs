@@ -1,10 +1,11 @@
-//! Members that go at a pace of their own each.
+//! Members with adaptive steps, each with a time and a step of its own.
 
 use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, Loaded},
+    crew::Stop,
+    stage::{Clock, PreparedStage},
 };
 use crate::{
     error::Error,
@@ -14,8 +15,8 @@ use crate::{
     trace::{Tapes, Traced},
 };
 
-/// A handful of members, each with a time and a step of its own, scaled to a step of 1.
-pub trait Paced: Send {
+/// A batch of members with adaptive steps; their rates are scaled to a step of 1.
+pub trait AdaptiveBatch: Send {
     /// How many members there are.
     fn lanes(&self) -> usize;
 
@@ -23,27 +24,30 @@ pub trait Paced: Send {
     fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize);
 
     /// Puts a state, v and y, into a lane.
-    fn sit(&mut self, lane: usize, state: &[f64]);
+    fn set_state(&mut self, lane: usize, state: &[f64]);
 
     /// The state of a lane.
     fn state(&self, lane: usize) -> Vec<f64>;
 
-    /// Where a lane stands.
+    /// The step-size control of a lane.
     fn pace(&self, lane: usize) -> Pace<f64>;
 
-    /// Says where a lane stands.
+    /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
     /// So many attempts of every lane that runs.
     fn attempt(&mut self, attempts: usize);
+
+    /// Stops within an attempt, too, if it may take long.
+    fn heed(&mut self, _stop: &Stop) {}
 }
 
 /// Members of a system whose whole attempt is one tape.
-pub struct PacedLanes {
+pub struct AdaptiveLanes {
     tapes: Arc<Tapes>,
     /// Numbers of v and y.
     numbers: usize,
-    step: Loaded,
+    step: PreparedStage,
     /// Rows of v, of y and of the paces.
     state: Aligned,
 }
@@ -51,18 +55,18 @@ pub struct PacedLanes {
 /// Every lane has its own time, so no step has one.
 pub(crate) const NO_CLOCK: Clock = Clock { t0: 0.0, h: 1.0 };
 
-impl PacedLanes {
+impl AdaptiveLanes {
     /// For a run of so many members.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<PacedLanes, Error> {
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
         let tapes = traced.tapes()?;
-        let step = Loaded::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
+        let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
         let numbers = traced.shape.v + traced.shape.y;
         let state = Aligned::new((numbers + Pace::<f64>::NUMBERS) * step.lanes());
-        Ok(PacedLanes { state, step, numbers, tapes })
+        Ok(AdaptiveLanes { state, step, numbers, tapes })
     }
 }
 
-impl Paced for PacedLanes {
+impl AdaptiveBatch for AdaptiveLanes {
     fn lanes(&self) -> usize {
         self.step.lanes()
     }
@@ -71,7 +75,7 @@ impl Paced for PacedLanes {
         self.step.prepare_lane(&self.tapes.step, spec, lane, member);
     }
 
-    fn sit(&mut self, lane: usize, state: &[f64]) {
+    fn set_state(&mut self, lane: usize, state: &[f64]) {
         let lanes = self.step.lanes();
         for (row, number) in self.state.chunks_exact_mut(lanes).zip(state) {
             row[lane] = *number;

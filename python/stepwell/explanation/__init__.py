@@ -1,0 +1,126 @@
+"""What a step is: every operation with names, what is computed how often, and the machine code that it becomes.
+
+``formula`` writes operations as text, ``listing`` makes lines of a tape, ``result`` holds and tells what was found.
+"""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+from .. import _checks, _core, engine
+from ..control import EnergyControl, Projection, a_control
+from ..errors import ArgumentError, UnsupportedError
+from ..integrate import fits_together
+from ..methods import Method
+from ..methods import method as find_method
+from ..methods import methods as every_method
+from ..systems import System
+from ..systems.base import a_system
+from .listing import Line, Section, lines_of_program, lines_of_tape, written
+from .result import Explanation, MachineCode
+
+__all__ = ["Explanation", "Line", "MachineCode", "Section", "explain"]
+
+
+def explain(
+    system: System,
+    method: str | Method,
+    *,
+    members: int | None = None,
+    control: EnergyControl | Projection | None = None,
+    fused: bool = False,
+    attempt: bool = False,
+) -> Explanation:
+    """What a step of a system by a method computes, and what it becomes on this machine.
+
+    ``print`` it for a listing: each value with its formula, by how often it is computed; the numbers of operations; the machine
+    code, or why the step is interpreted. In a notebook it is a table. Numbers of parameters and the step's length do not matter,
+    only which of them members have in common: those are computed with once a run instead of once a member.
+
+    ::
+
+        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
+        once a run
+          Φ = h·omega
+        in each step
+          v' = v − Φ·y
+          y' = y + Φ·v'
+
+    Args:
+        system: what to step. The arguments that are arrays over its batch are each member's own.
+        method: its name, or what ``stepwell.method`` returns.
+        members: how many trajectories go together, a multiple of the system's batch; if None as many as that, or one. Machine
+            code for many is other than that for one.
+        control: what keeps the energy, as ``integrate`` takes it.
+        fused: with fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as ``integrate`` takes it.
+        attempt: an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with what decides on the next
+            one.
+
+    Returns:
+        An ``Explanation``.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system.
+    """
+    how, system = find_method(method), a_system(system).sized()
+    fits_together(system, how)
+    fused, attempt = _checks.flag("fused", fused), _checks.flag("attempt", attempt)
+    control = a_control(control)
+    if attempt and how.error_order is None:
+        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
+        raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if attempt and (control is not None or system.control is not None):
+        raise ArgumentError("control: goes with fixed steps only, and attempt=True was given")
+    own = prod(system.batch)
+    count = own if members is None else _checks.count("members", members, 1)
+    if count % own:
+        raise ArgumentError(f"members: expected a multiple of the system's batch of {own}, got {count}")
+    batch = system.batch if count == own else (count // own, *system.batch)
+    _checks.batch_shape({"system": batch, "control": () if control is None else control.batch})
+    if control is not None:
+        system = system.under(control, batch)
+        fits_together(system, how)
+    return _explained(engine.Plan(system, how, batch, 1.0, fused=fused), attempt)
+
+
+def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
+    model = engine.model(plan)
+    what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
+    what |= {"fused": plan.fused, "attempt": attempt}
+    parts = _core.in_parts(model, plan.members, attempts=attempt)
+    told = None if parts else _core.compiled(model, plan.members, attempts=attempt)
+    if told is None:
+        kind, about, lanes = parts or ("rates", 0, 1)
+        sections = lines_of_program(plan, attempt)
+        return Explanation(**what, sections=sections, level=_core.isa(), lanes=lanes, parts=kind, about=about)
+    sections = lines_of_tape(plan, told["split"], attempt)
+    code = why = None
+    if told["interpreted"] is None:
+        names = {"vectors": "block_vectors", "turns": "blocks"} | {each: each for each in ("width", "resident", "registers")}
+        code = MachineCode(size=told["bytes"], spills=told["spills"], **{name: told[key] for name, key in names.items()})
+    else:
+        why = _why(told["interpreted"])
+    return Explanation(
+        **what,
+        sections=sections,
+        level=told["level"],
+        lanes=told["lanes"],
+        written=written(plan.system, plan.method, attempt),
+        computed=told["computed"],
+        hoisted={section.when: sum(sum(line.operations.values()) for line in section.lines) for section in sections[:-1]},
+        code=code,
+        interpreted_because=why,
+    )
+
+
+def _why(word: str) -> str:
+    """Why a step is interpreted, in words."""
+    if word == "level":
+        better = _core.isa_levels()[1:]
+        asked = "STEPWELL_KERNELS or STEPWELL_ISA asks for it"
+        return asked if better else "there is no machine code for this CPU, which has neither AVX2 nor AVX-512"
+    if word == "pages":
+        return "this system does not let a program execute code that it has written"
+    return "there is no machine code for this step"

@@ -1,0 +1,134 @@
+"""Operations as formulas, with as few parentheses as say exactly what is computed in which order.
+
+A formula is read as in Python: · − √ ≤ are its multiplication, subtraction, square root and comparison, ``=`` compares.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+#: How strongly a formula holds together, by what it does last.
+CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
+
+#: Operations on bits, whose constants are bits.
+ON_BITS = ("and", "or", "exclusive or", "add bits", "shift up", "shift down")
+
+ALL_BITS = 2**64 - 1
+
+
+class Formula(NamedTuple):
+    """A text, what it does last, and whether it is the truth of a comparison."""
+
+    text: str
+    holds: int = ATOM
+    is_truth: bool = False
+
+    @property
+    def is_negative(self) -> bool:
+        """Whether it is minus something that is no sum."""
+        return self.text.startswith("−") and self.holds in (PRODUCT, SIGN)
+
+    def within(self, holds: int) -> str:
+        """In a place where it has to hold together so strongly."""
+        return self.text if self.holds >= holds else f"({self.text})"
+
+    def behind(self, holds: int) -> str:
+        """The same behind an operator, where a sign needs parentheses."""
+        return f"({self.text})" if self.text.startswith("−") else self.within(holds)
+
+
+def number(bits: int) -> Formula:
+    """A constant: the shortest text that is this number."""
+    (x,) = struct.unpack("<d", struct.pack("<Q", bits))
+    if x != x:
+        return bit_pattern(bits)
+    text = repr(abs(x)).removesuffix(".0").replace("inf", "∞")
+    return Formula(f"−{text}", SIGN) if bits >> 63 else Formula(text)
+
+
+def bit_pattern(bits: int) -> Formula:
+    """A constant of which the bits count."""
+    return Formula(hex(bits))
+
+
+def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+    """An operation of these; ``bits`` are those of the operands that are constants."""
+    if name in ON_BITS:
+        if all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True)):
+            return _of_truths(name, of, bits)
+        of = [each if known is None else bit_pattern(known) for each, known in zip(of, bits, strict=True)]
+    match name:
+        case "add":
+            a, b = of
+            if a.is_negative and not b.is_negative:
+                a, b = b, a
+            return _sum(a, b, "+", "−")
+        case "subtract":
+            a, b = of
+            return _sum(a, b, "−", "+")
+        case "multiply":
+            a, b = of
+            return Formula(f"{a.within(PRODUCT)}·{b.behind(SIGN)}", PRODUCT)
+        case "divide":
+            a, b = of
+            return Formula(f"{a.within(PRODUCT)}/{b.behind(SIGN)}", PRODUCT)
+        case "negate":
+            return _minus(of[0])
+        case "multiply add":
+            a, b, c = of
+            return Formula(f"fma({a.text}, {b.text}, {c.text})")
+        case "multiply subtract":
+            a, b, c = of
+            return Formula(f"fma({a.text}, {b.text}, {_minus(c).text})")
+        case "subtract multiply":
+            a, b, c = of
+            return Formula(f"fma({_minus(a).text}, {b.text}, {c.text})")
+        case "square root":
+            return Formula(f"√({of[0].text})")
+        case "less" | "at most" | "equal":
+            a, b = of
+            sign = {"less": "<", "at most": "≤", "equal": "="}[name]
+            return Formula(f"{a.within(SUM)} {sign} {b.within(SUM)}", COMPARISON, True)
+        case "choose":
+            truth, a, b = of
+            return Formula(
+                f"{a.within(EITHER)} if {truth.within(EITHER)} else {b.within(CHOICE)}", CHOICE, a.is_truth and b.is_truth
+            )
+        case "shift up" | "shift down":
+            return Formula(f"{name.replace(' ', '_')}({of[0].text}, {given})")
+        case "and" | "or" | "exclusive or" | "add bits":
+            word = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}[name]
+            return Formula(f"{word}({of[0].text}, {of[1].text})")
+        case "gather":
+            return Formula(f"sample({of[0].text})")
+        case "copy":
+            return of[0]
+        case _:  # floor, and what is to come
+            return Formula(f"{name}({', '.join(each.text for each in of)})")
+
+
+def _sum(a: Formula, b: Formula, sign: str, other: str) -> Formula:
+    """Both with a sign between them; one of b itself is that of the sum instead, which changes no bit."""
+    if b.is_negative:
+        return Formula(f"{a.within(SUM)} {other} {b.text[1:]}", SUM)
+    return Formula(f"{a.within(SUM)} {sign} {b.behind(PRODUCT)}", SUM)
+
+
+def _minus(x: Formula) -> Formula:
+    if x.is_negative:
+        return Formula(x.text[1:], PRODUCT if x.holds == PRODUCT else ATOM)
+    return Formula(f"−{x.behind(PRODUCT)}", PRODUCT if x.holds == PRODUCT else SIGN)
+
+
+def _of_truths(name: str, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
+    """Of truths the bits are all alike."""
+    a, b = of
+    if name == "exclusive or" and ALL_BITS in bits:
+        return Formula(f"not {(b if bits[0] is not None else a).within(COMPARISON)}", NOT, True)
+    if name == "and":
+        return Formula(f"{a.within(BOTH)} and {b.within(NOT)}", BOTH, True)
+    if name == "or":
+        return Formula(f"{a.within(EITHER)} or {b.within(BOTH)}", EITHER, True)
+    return Formula(f"xor_bits({a.text}, {b.text})", ATOM, True)

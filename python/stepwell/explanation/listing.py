@@ -1,0 +1,446 @@
+"""The operations of a step as lines, with a name and a formula each.
+
+What is used once stands in the formula that uses it, as long as a line stays short. A value that has a name in the text of the
+method has it here: ``dv1``, ``dy1`` the first increments of a step, ``v2``, ``y2`` the state at which the second are asked for,
+``v'``, ``y'`` the next state. Others are numbered: ``c1`` is computed before the steps, ``s1`` once a step, ``a1`` by every
+member in every step.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .._checks import Shape
+from ..engine import Plan
+from ..reference import adaptive
+from ..reference.signal import Constant, Held, Sine
+from ..reference.traced import Tracer
+from .formula import ATOM, PRODUCT, SUM, Formula, formula, number
+
+#: Characters of a line, its name not counted, beyond which it becomes several.
+MAX_LINE = 72
+#: Characters of an increment of its own line; shorter ones stand where they are used.
+SHORT = 12
+
+#: Of each operation that counts, its kind. Changes of sign, copies and samples that are looked up are no arithmetic.
+KINDS = {
+    "add": "additions",
+    "subtract": "additions",
+    "multiply": "multiplications",
+    "multiply add": "fused",
+    "multiply subtract": "fused",
+    "subtract multiply": "fused",
+    "divide": "divisions",
+    "square root": "square_roots",
+    **dict.fromkeys(("less", "at most", "equal", "choose"), "choices"),
+    **dict.fromkeys(("and", "or", "exclusive or", "add bits", "shift up", "shift down", "floor"), "bits"),
+}
+
+#: What a value of a body is made of: names of operations, operands, what else is given; and the places of what comes of it.
+Body = tuple[list[tuple[str, list[int], int]], list[int]]
+
+
+class Line(NamedTuple):
+    """A value of a step.
+
+    Attributes:
+        name: what it is called.
+        formula: what it is, read as in Python, with · − √ ≤ for its multiplication, subtraction, square root and comparison; =
+            compares.
+        operations: how many of each kind it takes, as in ``Explanation.computed``.
+        note: what it is in the method, where its name does not say so.
+    """
+
+    name: str
+    formula: str
+    operations: dict[str, int]
+    note: str = ""
+
+
+class Section(NamedTuple):
+    """What is computed equally often.
+
+    Attributes:
+        when: ``"run"``, ``"member"``, ``"step"`` or ``"member step"``: once a run for all members, once a run for each member,
+            once a step for all members, in each step for each member.
+        lines: the values, each after what it reads.
+    """
+
+    when: str
+    lines: tuple[Line, ...]
+
+
+# ---- names
+
+
+class Named(Tracer):
+    """Traces a step and notes what its values are called, by their numbers on the tape."""
+
+    def __init__(self, system: Any, tape: Any) -> None:
+        super().__init__(system, tape)
+        self.names: dict[int, str] = {}
+        self._taken: set[str] = set()
+        self._length: Any = None
+
+    def scaled(self, h: Any) -> Any:
+        """The system, which notes what it is asked for."""
+        s, counts = super().scaled(h), Counter[str]()
+
+        def noting(which: str, rate: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
+            def increment(t: Any, v: Any, y: Any) -> Any:
+                counts[which] += 1
+                made = rate(t, v, y)
+                for name, block in (("v", v), ("y", y)):
+                    self._note(f"{name}{counts[which]}", block)
+                self._note(f"d{which}{counts[which]}", made if self._length is None else self._length * made)
+                return made
+
+            return increment
+
+        s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
+        return s
+
+    def attempt(self, method: Any) -> list[Any]:
+        """The state and the pace after an attempt, whose increments are as long as its step."""
+        _, _, more = self.state()
+        self._length = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields)).outlook(self.tape.budget()).step
+        return super().attempt(method)
+
+    def _note(self, name: str, block: Any) -> None:
+        block = np.asarray(block, dtype=object)
+        if name in self._taken:
+            return
+        for index in np.ndindex(block.shape):
+            if isinstance(block[index], _core.Symbol):
+                called = indexed(name, index)
+                self.names.setdefault(block[index].id, called)
+                self.names.setdefault((-block[index]).id, f"−{called}")
+        self._taken.add(name)
+
+
+def indexed(name: str, index: Shape) -> str:
+    """An element of a block."""
+    return f"{name}[{','.join(map(str, index))}]" if index else name
+
+
+def parameters(plan: Plan) -> tuple[list[str], list[str]]:
+    """What the numbers are called that describe a system, in the core's order, and its sampled inputs."""
+    numbers: list[str] = []
+    tables: list[str] = []
+    system = plan.system
+
+    def add(name: str, value: Any, own: int | None = None) -> None:
+        match value:
+            case list():
+                for i, each in enumerate(value):
+                    add(f"{name}[{i}]", each)
+            case Constant():
+                add(name, value.value)
+            case Sine():
+                for part in ("amplitude", "omega", "phase"):
+                    add(f"{name}.{part}", getattr(value, part))
+            case Held():
+                tables.append(system.named(name, ()))
+            case np.ndarray():
+                axes = max(0, value.ndim - len(plan.batch))
+                numbers.extend(system.named(name, index) for index in np.ndindex(value.shape[:axes]))
+
+    given = system.given(plan.batch) | ({} if system.control is None else system.control.given())
+    for name, value in given.items():
+        add(name, value)
+    return numbers, tables
+
+
+def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
+    """What the numbers of a state are called, with a mark behind the names."""
+    blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape)]
+    names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
+    beside = adaptive.Pace._fields if attempts else () if plan.system.control is None else ("work",)
+    return names + [name + mark for name in beside]
+
+
+# ---- values on a tape
+
+
+def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None]) -> Any:
+    """The same operation on another tape, where products that were fused into sums stand by themselves; None if it has none."""
+    if any(each is None for each in of):
+        return None
+    match name:
+        case "state" | "parameter" | "constant" | "step" | "time":
+            return _leaf(tape, name, given)
+        case "add" | "subtract" | "multiply" | "divide" | "less" | "at most" | "and" | "or":
+            return ARITHMETIC[name](*of)
+        case "multiply add" | "multiply subtract" | "subtract multiply":
+            a, b, c = of
+            return {"multiply add": a * b + c, "multiply subtract": a * b - c, "subtract multiply": c - a * b}[name]
+        case "square root":
+            return of[0].sqrt()
+        case "negate":
+            return -of[0]
+        case "floor":
+            return of[0].floor()
+        case "equal":
+            return of[0].equals(of[1])
+        case "choose":
+            return of[0].choose(of[1], of[2])
+        case "exclusive or":
+            return of[0].xor_bits(of[1])
+        case "add bits":
+            known = next((i for i, each in enumerate(bits) if each is not None), None)
+            return None if known is None else of[1 - known].add_bits(bits[known])
+        case "shift up":
+            return of[0].shift_up(given)
+        case "shift down":
+            return of[0].shift_down(given)
+        case "copy":
+            return of[0]
+        case _:
+            return None
+
+
+ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "less": lambda a, b: a < b,
+    "at most": lambda a, b: a <= b,
+    "and": lambda a, b: a & b,
+    "or": lambda a, b: a | b,
+}
+
+
+def _leaf(tape: Any, name: str, given: int) -> Any:
+    match name:
+        case "state":
+            return tape.state(given)
+        case "parameter":
+            return tape.param(given)
+        case "constant":
+            return tape.number(float(np.uint64(given).view(np.float64)))
+        case "step":
+            return tape.step()
+        case _:
+            return tape.time()
+
+
+# ---- lines
+
+
+class Leaf(NamedTuple):
+    """A value that is there before: its text, its symbol or None, and how often it changes, the rarest first."""
+
+    text: Formula
+    symbol: Any
+    rank: int
+
+
+class _Value(NamedTuple):
+    """A value that has been met."""
+
+    text: Formula
+    symbol: Any
+    rank: int
+    bits: int | None = None
+    operations: Mapping[str, int] = MappingProxyType({})
+    waits: bool = False  # it has no line of its own so far
+
+
+class Writer:
+    """Writes sections, one after the other, and knows what values are called."""
+
+    def __init__(self, tape: Any, names: dict[int, str]) -> None:
+        self.tape, self.names = tape, names
+        self._numbers: Counter[str] = Counter()
+        self._used: set[str] = set()
+
+    def section(
+        self,
+        when: str,
+        body: Body,
+        leaf: Callable[[str, int], Leaf],
+        rank: int,
+        letter: str,
+        results: Sequence[str] | None = None,
+    ) -> tuple[Section, list[Leaf]]:
+        """A body as a section, and what comes of it, which has the names ``results`` if there are any, and else the letter's."""
+        operations, places = body
+        reads = Counter(place for _, of, _ in operations for place in of)
+        wanted = {
+            place: None if results is None else name for place, name in zip(places, results or [""] * len(places), strict=True)
+        }
+        lines: list[Line] = []
+        values: list[_Value] = []
+
+        def name_of(place: int, value: _Value) -> tuple[str, str]:
+            known = "" if value.symbol is None else self.names.get(value.symbol.id, "")
+            if (given := wanted.get(place)) is not None:
+                return given, known if known.lstrip("−").startswith("d") else ""
+            if known and not known.startswith("−") and known not in self._used:
+                return known, ""
+            self._numbers[letter] += 1
+            return f"{letter}{self._numbers[letter]}", known if known.startswith("−") else ""
+
+        def write(place: int) -> None:
+            value = values[place]
+            name, note = name_of(place, value)
+            self._used.add(name)
+            lines.append(Line(name, value.text.text, dict(value.operations), note))
+            values[place] = _Value(Formula(name, is_truth=value.text.is_truth), value.symbol, value.rank)
+
+        def made(name: str, of: list[int], given: int) -> _Value:
+            parts = [values[place] for place in of]
+            symbol = again(self.tape, name, [each.symbol for each in parts], given, [each.bits for each in parts])
+            if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
+                parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
+            elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
+                parts.sort(key=lambda each: -each.rank)
+            elif name == "add" and (parts[0].text.holds != ATOM or parts[0].rank < 4):  # but v + (…), as methods are written
+                parts.sort(key=lambda each: each.text.holds != SUM)
+            text = formula(name, [each.text for each in parts], given, [each.bits for each in parts])
+            count = sum((Counter(each.operations) for each in parts), Counter[str]())
+            if name in KINDS:
+                count[KINDS[name]] += 1
+            return _Value(text, symbol, max(each.rank for each in parts), None, count, True)
+
+        for place, (name, of, given) in enumerate(operations):
+            if name == "constant":
+                values.append(_Value(number(given), _leaf(self.tape, name, given), 0, given))
+                continue
+            if not of:
+                text, symbol, rank_of_leaf = leaf(name, given)
+                values.append(_Value(text, symbol, rank_of_leaf))
+                continue
+            value = made(name, of, given)
+            while len(value.text.text) > MAX_LINE:
+                waiting = [each for each in of if values[each].waits]
+                if not waiting:
+                    break
+                write(max(waiting, key=lambda each: len(values[each].text.text)))
+                value = made(name, of, given)
+            values.append(value)
+            known = "" if value.symbol is None else self.names.get(value.symbol.id, "")
+            is_alias = name == "copy" and results is None
+            if not is_alias and (place in wanted or reads[place] > 1 or (known and len(value.text.text) > SHORT)):
+                write(place)
+        out = []
+        for place in places:
+            value = values[place]
+            if results is not None and operations[place][0] == "state":  # it stays as it is
+                lines.append(Line(str(wanted[place]), value.text.text, {}))
+            out.append(Leaf(value.text, value.symbol, rank if value.rank else 0))
+        return Section(when, tuple(lines)), out
+
+
+def written(system: Any, method: Any, attempts: bool = False) -> dict[str, int]:
+    """Operations of a step as it is written down, by kind, of values that change between steps."""
+    tape = _core.Tape()
+    tracer = Tracer(system, tape)
+    return tape.written(tracer.attempt(method) if attempts else tracer.step(method))
+
+
+def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Section, ...]:
+    """The sections of a step that is one tape, cut as the core did."""
+    tape = _core.Tape()
+    tracer = Named(plan.system, tape)
+    _ = tracer.attempt(plan.method) if attempts else tracer.step(plan.method)
+    numbers, tables = parameters(plan)
+    of_state, next_state = states(plan, attempts), states(plan, attempts, "'")
+    params = [tape.param(i) for i in range(len(numbers))]
+    for each, symbol in zip(numbers, params, strict=True):
+        if each == "omega":
+            tracer.names[(tape.step() * symbol).id] = "Φ"
+
+    def parameter(i: int, rank: int) -> Leaf:
+        if i >= len(numbers):
+            return Leaf(Formula("max_steps"), tape.budget(), rank)
+        return Leaf(Formula(numbers[i]), params[i], rank)
+
+    def given(i: int) -> Leaf:
+        kind, which = split["given"][i]
+        if kind == "step":
+            return Leaf(Formula("h"), tape.step(), 1)
+        if kind == "parameter":
+            return parameter(which, 1)
+        return Leaf(Formula("lanes" if kind == "lanes" else f"{tables[which]}.{kind}"), None, 1)
+
+    def before(name: str, i: int) -> Leaf:
+        return given(i) if name == "uniform" else parameter(split["params"][i], 2)
+
+    def in_step(name: str, i: int) -> Leaf:
+        return given(i) if name == "uniform" else Leaf(Formula("t"), tape.time(), 3)
+
+    writer = Writer(tape, tracer.names)
+    run, uniforms = writer.section("run", split["run"], before, 1, "c")
+    member, rows = writer.section("member", split["member"], before, 2, "c")
+    step, entries = writer.section("step", split["step"], in_step, 3, "s")
+
+    def entry(i: int) -> Leaf:
+        kind, table = split["entries"][i]
+        if kind == "value":
+            return entries[i]
+        return Leaf(Formula(f"{tables[table]}[{entries[i].text.text}]"), None, 3 if kind == "sample" else 4)
+
+    def hot(name: str, i: int) -> Leaf:
+        match name:
+            case "state":
+                return Leaf(Formula(of_state[i]), tape.state(i), 4)
+            case "uniform":
+                return uniforms[i]
+            case "row":
+                return rows[i]
+            case _:
+                return entry(i)
+
+    body, _ = writer.section("member step", split["body"], hot, 4, "a", next_state)
+    return run, member, step, body
+
+
+def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
+    """A method as what it does to blocks."""
+    entries, results = _core.program(plan.method.name, attempts=attempts)
+    carry = plan.method.carry or "v"
+    called = dict(zip(results, [f"{carry}'", "y'", "error_v", "error_y", "coarse_v", "coarse_y"], strict=False))
+    counts: Counter[str] = Counter()
+    for place, (name, of, _) in enumerate(entries):
+        if name in ("dv", "dy"):
+            counts[name] += 1
+            called.setdefault(place, f"{name}{counts[name]}")
+            for block, operand in zip("vy", of, strict=True):
+                if entries[operand][1] and f"{block}{counts[name]}" not in called.values():
+                    called.setdefault(operand, f"{block}{counts[name]}")
+    reads = Counter(place for _, of, _ in entries for place in of)
+    lines: list[Line] = []
+    texts: list[Formula] = []
+    for place, (name, of, share) in enumerate(entries):
+        parts = [texts[each] for each in of]
+        match name:
+            case "v" | "y":
+                text = Formula(carry if name == "v" else "y")
+            case "dv" | "dy":
+                t = "t" if share == 0.0 else "t + h" if share == 1.0 else f"t + {share!r}·h"
+                text = Formula(f"{name}({t}, {parts[0].text}, {parts[1].text})")
+            case "scale":
+                text = formula("multiply", [number(_bits(share)), *parts], 0, [None, None])
+            case _:
+                text = formula(name, parts, 0, [None] * len(parts))
+        if of and (place in called or reads[place] > 1):
+            if place not in called:
+                counts["a"] += 1
+            name = called.get(place, f"a{counts['a']}")
+            lines.append(Line(name, text.text, {}))
+            text = Formula(name)
+        texts.append(text)
+    lines += [Line(name, texts[place].text, {}) for place, name in called.items() if not entries[place][1]]
+    return (Section("member step", tuple(lines)),)
+
+
+def _bits(x: float) -> int:
+    return int(np.float64(x).view(np.uint64))

@@ -1,0 +1,222 @@
+"""What is said of a step, as text, as a table of a notebook, and as JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import asdict, dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from .. import _checks
+from .._value import Value
+from ..methods import Method
+from ..systems import System
+from .listing import Section
+
+#: How often, in words; of what all members have in common it is said if there are several.
+WHEN = {
+    "run": "once a run",
+    "member": "once a run, for each member",
+    "step": "once a step, for all members",
+    "member step": "in each step, for each member",
+}
+
+#: What makes the rates of a step that is no single tape.
+PARTS = {
+    "rates": "the rates are a tape of their own, {lanes} at a time",
+    "hand": "the rates are computed by a loop that was compiled beforehand, one member after the other",
+}
+
+
+@dataclass(frozen=True)
+class MachineCode:
+    """What a step becomes on a CPU.
+
+    Attributes:
+        size: its length in bytes.
+        width: how many numbers are in a vector, one for each member.
+        vectors: how many vectors a turn of the loop steps.
+        turns: how many turns step a tile, the members that go together.
+        resident: whether the state stays in registers over all steps of a turn; else it is read and written in each step.
+        registers: how many vector registers there are.
+        spills: how many values are kept beside the registers at most, because these do not suffice.
+    """
+
+    size: int
+    width: int
+    vectors: int
+    turns: int
+    resident: bool
+    registers: int
+    spills: int
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation(Value):
+    """What a step computes, and what it becomes on this machine. ``print`` it.
+
+    Attributes:
+        system: what is stepped, with its control.
+        method: by what.
+        members: how many trajectories.
+        fused: whether with fused multiply-adds.
+        attempt: whether it is an attempt at an adaptive step.
+        sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
+            blocks.
+        level: the CPU level in use.
+        lanes: how many members go together.
+        written: operations of a step, by kind, as the method and the system are written down. What does not change from step to
+            step is not counted, for it is computed before; changes of sign are not either. Empty if the step is too long for one
+            tape.
+        computed: operations of a step, by kind, that each member makes: without what was found equal or needless. ``fused``
+            counts fused multiply-adds.
+        hoisted: how many operations are made once a run, once for each member, and once a step for all members, instead of by
+            each member in each step: ``"run"``, ``"member"``, ``"step"``.
+        code: the machine code, or None.
+        interpreted_because: why there is none, in words, or None. Runs too short to be worth machine code are interpreted anyway.
+        parts: of a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
+            loop that was compiled beforehand. None if it is one tape.
+        about: about how many operations such a step has; 0 if it is one tape, of which they are counted.
+    """
+
+    system: System
+    method: Method
+    members: int
+    fused: bool
+    attempt: bool
+    sections: tuple[Section, ...]
+    level: str
+    lanes: int
+    written: dict[str, int] = field(default_factory=dict)
+    computed: dict[str, int] = field(default_factory=dict)
+    hoisted: dict[str, int] = field(default_factory=dict)
+    code: MachineCode | None = None
+    interpreted_because: str | None = None
+    parts: str | None = None
+    about: int = 0
+
+    @property
+    def listing(self) -> str:
+        """The values alone, a line each."""
+        out = []
+        for section in self.sections:
+            if section.lines:
+                out.append(self._when(section))
+                width = max(len(line.name) for line in section.lines)
+                for line in section.lines:
+                    note = f"    ({line.note})" if line.note else ""
+                    out.append(f"  {line.name:<{width}} = {line.formula}{note}")
+        return "\n".join(out)
+
+    @property
+    def title(self) -> str:
+        """What is explained, in a line."""
+        what = "an attempt at a step" if self.attempt else "a step"
+        fused = ", with fused multiply-adds" if self.fused else ""
+        return f"{self.method.title}: {what} of {self.system!r}, {self.members} member{'s' * (self.members > 1)}{fused}"
+
+    @property
+    def machine(self) -> str:
+        """What the step becomes, in words."""
+        if self.parts is not None:
+            rates = PARTS[self.parts].format(lanes=_members(self.lanes))
+            between = "is interpreted" if self.level == "baseline" else f"is machine code for {self.level}"
+            return (
+                f"A step of about {self.about} operations is not one tape: {rates}; what the method does between them {between}."
+            )
+        if self.code is None:
+            return f"It is interpreted, {_members(self.lanes)} at a time: {self.interpreted_because}."
+        code = self.code
+        vectors = (
+            f"vectors of {code.width} numbers, {code.vectors} in a turn of the loop" if code.width > 1 else "number by number"
+        )
+        place = "in registers over all steps" if code.resident else "in the cache, read and written in each step"
+        kept = f"{code.spills} value{'s' * (code.spills != 1)} beside them" if code.spills else "which suffice"
+        return (
+            f"Machine code for {self.level}, {code.size} bytes: {vectors}, {_members(self.lanes)} in a tile; the state is "
+            f"{place}; {code.registers} vector registers, {kept}."
+        )
+
+    def _when(self, section: Section) -> str:
+        """How often, in words; of one member all are the same."""
+        text = WHEN[section.when]
+        return text if self.members > 1 else text.partition(",")[0]
+
+    def counts(self) -> list[tuple[str, int, int]]:
+        """Operations of a step: kind, as written, as computed; kinds that do not occur are left out."""
+        kinds = [(kind.replace("_", " "), self.written[kind], self.computed[kind]) for kind in self.computed]
+        return [each for each in kinds if any(each[1:])]
+
+    def __str__(self) -> str:
+        out = [self.title, "", self.listing, ""]
+        if self.parts is None:
+            out.append(f"{'operations of a step':<24}{'written':>8}{'computed':>10}")
+            out += [f"  {name:<22}{written:>8}{computed:>10}" for name, written, computed in self.counts()]
+            out.append(self._hoisted())
+        return "\n".join([*out, self.machine, *self.words()])
+
+    def _hoisted(self) -> str:
+        said = [f"{n} {self._when(Section(when, ()))}" for when, n in self.hoisted.items() if n]
+        return f"Operations that are made before: {'; '.join(said) if said else 'none'}."
+
+    def words(self) -> list[str]:
+        """What names in the listing mean that are no arguments."""
+        text = [f"{line.name} {line.formula}" for section in self.sections for line in section.lines]
+        known = {
+            "h": "the step dt",
+            "Φ": "h·omega, the true angle of a step",
+            "Gm": "G·masses",
+            "fma": "fma(a, b, c) = a·b + c, rounded once",
+            "v2": "v2, y2: the state at which rates are asked for the second time",
+            "dv": "h times the rate of v" if self.parts is None else "dv(t, v, y) = h times the rate of v",
+        }
+        shown = []
+        for name, meaning in known.items():
+            if any(_names(name, each) for each in text):
+                shown.append(meaning if name in ("fma", "v2") else f"{name}: {meaning}")
+        if self.method.carry:
+            shown.append(f"{self.method.carry}: what stands in the place of v between steps")
+        return [f"Here {'; '.join(shown)}."] if shown else []
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it as numbers and texts."""
+        sections = [{"when": s.when, "lines": [line._asdict() for line in s.lines]} for s in self.sections]
+        held = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        code = None if self.code is None else asdict(self.code)
+        return held | {"system": repr(self.system), "method": self.method.name, "sections": sections, "code": code}
+
+    def to_json(self, path: str | Path) -> None:
+        """Write ``as_dict()``."""
+        text = json.dumps(self.as_dict(), ensure_ascii=False, indent=1) + "\n"
+        _checks.file("path", path).write_text(text, encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        """The same as tables."""
+        rows = []
+        for section in self.sections:
+            if section.lines:
+                rows.append(f'<tr><th colspan="3" style="text-align:left">{self._when(section)}</th></tr>')
+            rows += [
+                f'<tr><td style="text-align:left">{escape(line.name)}</td><td style="text-align:left">{escape(line.formula)}</td>'
+                f'<td style="text-align:left">{escape(line.note)}</td></tr>'
+                for line in section.lines
+            ]
+        html = f"<p><b>{escape(self.title)}</b></p><table>{''.join(rows)}</table>"
+        if self.parts is None:
+            counts = [
+                f"<tr><td>{name}</td><td>{written}</td><td>{computed}</td></tr>" for name, written, computed in self.counts()
+            ]
+            head = "<tr><th>operations of a step</th><th>written</th><th>computed</th></tr>"
+            html += f"<table>{head}{''.join(counts)}</table><p>{self._hoisted()}</p>"
+        return html + "".join(f"<p>{escape(each)}</p>" for each in (self.machine, *self.words()))
+
+
+def _members(count: int) -> str:
+    return "one member" if count == 1 else f"{count} members"
+
+
+def _names(name: str, text: str) -> bool:
+    """Whether a name occurs in a text: by itself, or with a number or a place behind it."""
+    return re.search(rf"(?<![\w.]){name}(?:\d+|\[|\(|(?![\w.']))", text) is not None

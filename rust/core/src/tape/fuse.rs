@@ -1,0 +1,81 @@
+//! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
+//!
+//! It is done on the tape and not by a compiler, so it is done in the same places for everybody. A product is fused into the sum or the
+//! difference that it is a term of if
+//!
+//! - nothing else reads it, so that it vanishes, and
+//! - it depends on the state. What depends on parameters and the time alone is computed before the steps for all of them, or once a step for
+//!   all members, and costs nothing in the hot loop. Which members have what in common decides nothing here: a result must not depend on
+//!   the batch.
+//!
+//! Of two such products the one of the higher [`ranks`] is fused. A rank says where a value stands in what is computed, and nothing of the
+//! order in which a tape was written: whoever writes down the same step fuses the same products.
+
+use super::{Id, Op, Tape, print::named};
+
+/// A number for each value that is needed. Values of fewer operations one after the other come before those of more; equally deep ones are
+/// sorted by the name of the operation, by what it is given, and by the ranks of its operands, the lower one first where they may change
+/// places.
+fn ranks(ops: &[Op], needed: &[bool]) -> Vec<u32> {
+    let mut depths: Vec<usize> = Vec::with_capacity(ops.len());
+    for op in ops {
+        let (operands, n) = op.operands();
+        depths.push(operands[..n].iter().map(|id| depths[*id as usize] + 1).max().unwrap_or(0));
+    }
+    let mut levels: Vec<Vec<Id>> = vec![Vec::new(); depths.iter().max().map_or(0, |most| most + 1)];
+    for (id, depth) in depths.into_iter().enumerate().filter(|(id, _)| needed[*id]) {
+        levels[depth].push(id as Id);
+    }
+    let (mut ranks, mut next) = (vec![0; ops.len()], 0);
+    for mut level in levels {
+        level.sort_by_cached_key(|id| {
+            let op = ops[*id as usize];
+            let (operands, n) = op.operands();
+            let mut of = operands.map(|id| ranks[id as usize]);
+            if op.commutes() {
+                of[..n].sort_unstable();
+            }
+            (named(op), of, n)
+        });
+        for id in level {
+            ranks[id as usize] = next;
+            next += 1;
+        }
+    }
+    ranks
+}
+
+/// The same tape, with products fused into the sums that these values need.
+#[must_use]
+pub fn fuse(tape: &Tape, roots: &[Id]) -> Tape {
+    let ops = tape.ops();
+    let needed = tape.needed(roots.iter().copied());
+    let mut reads = vec![0u32; ops.len()];
+    roots.iter().for_each(|root| reads[*root as usize] += 1);
+    for (op, _) in ops.iter().zip(&needed).filter(|(_, needed)| **needed) {
+        let (operands, n) = op.operands();
+        operands[..n].iter().for_each(|id| reads[*id as usize] += 1);
+    }
+    let ranks = ranks(ops, &needed);
+    let is_higher = |a: Id, b: Id| ranks[a as usize] > ranks[b as usize];
+    let product = |id: Id| match ops[id as usize] {
+        Op::Mul(x, y) if reads[id as usize] == 1 && tape.is_of_state(id) => Some((x, y)),
+        _ => None,
+    };
+    let fused = |op: Op| match op {
+        Op::Add(a, b) => match (product(a), product(b)) {
+            (Some((x, y)), None) => Op::MulAdd(x, y, b),
+            (Some((x, y)), Some(_)) if is_higher(a, b) => Op::MulAdd(x, y, b),
+            (_, Some((x, y))) => Op::MulAdd(x, y, a),
+            _ => op,
+        },
+        Op::Sub(a, b) => match (product(a), product(b)) {
+            (Some((x, y)), None) => Op::MulSub(x, y, b),
+            (Some((x, y)), Some(_)) if is_higher(a, b) => Op::MulSub(x, y, b),
+            (_, Some((x, y))) => Op::SubMul(x, y, a),
+            _ => op,
+        },
+        _ => op,
+    };
+    tape.rewritten(|id, op| if needed[id as usize] { fused(op) } else { op })
+}

@@ -1,0 +1,92 @@
+"""One rule for all methods: a member has diverged at the first step after which a number of its v or y is not finite."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+
+METHODS = [m.name for m in sw.methods()]
+
+
+def quiet(*arguments: Any, **options: Any) -> sw.Run:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.DivergenceWarning)
+        return sw.integrate(*arguments, **options)
+
+
+def first_not_finite(run: sw.Run, axes: int = 0) -> Any:
+    """From a run that kept every step."""
+    blocks = tuple(range(1, 1 + axes))
+    finite = np.isfinite(run.v).all(axis=blocks) & np.isfinite(run.y).all(axis=blocks)
+    finite[0] = True  # the start is no step
+    return np.where(finite.all(axis=0), -1, run.start_step + np.argmin(finite, axis=0))
+
+
+@pytest.mark.parametrize("form", ["direct", "matrix"])
+@pytest.mark.parametrize("method", METHODS)
+def test_the_first_bad_step_is_that_of_the_states(method: str, form: str) -> None:
+    """Whether all states are kept or the last alone, by both backends. 1e-5: a velocity overflows long before its coordinate."""
+    for dt in (3.0, 1e-5):
+        system = sw.Oscillator(np.linspace(2.5, 40.0, 9) / dt, form="physical")
+        options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": dt, "steps": 700, "form": form}
+        whole = quiet(system, method, every=1, **options)
+        expected = first_not_finite(whole)
+        assert (expected > 0).any()
+        for more in ({"every": 1}, {"every": None}, {"every": 13}, {"every": 13, "backend": "numpy"}):
+            np.testing.assert_array_equal(quiet(system, method, **options, **more).first_bad_step, expected)
+        np.testing.assert_array_equal(whole.status, expected > 0)
+
+
+@pytest.mark.parametrize("form", ["direct", "matrix"])
+@pytest.mark.parametrize("steps", [300, 3000])
+def test_a_velocity_that_is_finite_again(form: str, steps: int) -> None:
+    """Verlet's coordinates go on though the greatest velocities are infinite: it has diverged when the first one is."""
+    method = "verlet"
+    system = sw.Oscillator(np.array([100.0, 1.0, 30.0]), form="physical")
+    options: dict[str, Any] = {"v": 0.0, "y": [1e307, 1.0, 1e307], "dt": 1e-3, "steps": steps, "form": form}
+    whole = quiet(system, method, every=1, **options)
+    assert np.isfinite(whole.y).all()
+    expected = first_not_finite(whole)
+    assert expected[0] > 0
+    assert expected[1] == -1
+    for backend in ("rust", "numpy"):
+        np.testing.assert_array_equal(quiet(system, method, **options, backend=backend).first_bad_step, expected)
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "verlet"])
+def test_of_large_systems_too(method: str) -> None:
+    """A chain that is stepped row by row, and bodies."""
+    chain, y = sw.Chain(600), np.random.default_rng(1).normal(size=(600, 2))
+    options: dict[str, Any] = {"v": 0.0, "y": y, "dt": 2.5, "steps": 600}
+    whole = quiet(chain, method, every=1, **options)
+    expected = first_not_finite(whole, 1)
+    assert (expected > 0).all()
+    for more in ({}, {"backend": "numpy"}, {"every": 7}):
+        np.testing.assert_array_equal(quiet(chain, method, **options, **more).first_bad_step, expected)
+    y = np.array([[0.0, 0.0], [0.0, 1e-160], [1.0, 0.0]])  # the square of the distance is less than any number
+    for backend in ("rust", "numpy"):
+        assert quiet(sw.NBody(), method, v=0.0, y=y, dt=0.1, steps=5, backend=backend).first_bad_step == 1
+
+
+@pytest.mark.parametrize("form", ["direct", "matrix", "power"])
+@pytest.mark.parametrize("method", METHODS)
+def test_every_run_can_be_resumed(method: str, form: str) -> None:
+    """Wherever it stops: also where a velocity has just become infinite and nothing else has. And in pieces as in one piece."""
+    system = sw.Oscillator(np.array([9.0, 1e-3, 12.0]))
+    options: dict[str, Any] = {"dt": 1.0, "form": form}
+    start: dict[str, Any] = {"v": 0.0, "y": 1.0}
+    whole = quiet(system, method, **start, **options, steps=420)
+    first = int(whole.first_bad_step[whole.first_bad_step > 0].min())
+    for steps in range(max(1, first - 3), first + 4):
+        half = quiet(system, method, **start, **options, steps=steps)
+        finite = np.isfinite(half.v[-1]) & np.isfinite(half.y[-1])
+        np.testing.assert_array_equal(half.status == 0, finite)
+        rest = quiet(system, method, **options, steps=420 - steps, **half.resume)
+        if form != "power":
+            np.testing.assert_array_equal(rest.first_bad_step, whole.first_bad_step)
+            np.testing.assert_array_equal(rest.y, whole.y)
+            np.testing.assert_array_equal(rest.v, whole.v)

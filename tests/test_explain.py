@@ -1,0 +1,481 @@
+"""What a step is said to be: listings read by hand and evaluated, counts by hand, machine code and why there is none."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from stepwell import _core, engine
+from stepwell.explanation import listing
+from stepwell.reference import adaptive
+from stepwell.reference.fused import fma
+from stepwell.reference.traced import Tracer
+from test_tracing import ABLE, CONTROLS, MEMBERS, METHODS, H, T, assert_computes, fits, made
+
+WRONG: Any = "yes"
+
+
+def lines(explained: sw.Explanation) -> list[str]:
+    return [line.strip() for line in explained.listing.splitlines()]
+
+
+# ---- listings, written by hand from the document
+
+
+@pytest.mark.parametrize(
+    ("method", "step"),
+    [
+        ("standard_euler", ["v' = v − Φ·y", "y' = y + Φ·v"]),
+        ("damped_euler", ["y' = y + Φ·v", "v' = v − Φ·y'"]),
+        ("false_euler", ["v' = v − Φ·y", "y' = y + Φ·v'"]),
+        ("leapfrog", ["v_half' = v_half − Φ·y", "y'      = y + Φ·v_half'"]),
+        ("verlet", ["y'      = 2·y − y_prev − Φ·(Φ·y)", "y_prev' = y"]),
+        (
+            "standard_heun",
+            ["a1  = Φ·y    (−dv1)", "dy1 = Φ·v", "v'  = v + 0.5·(−a1 − Φ·(y + dy1))", "y'  = y + 0.5·(dy1 + Φ·(v − a1))"],
+        ),
+        (
+            "rk4",
+            [
+                "a1  = Φ·y    (−dv1)",
+                "dy1 = Φ·v",
+                "a2  = Φ·(y + 0.5·dy1)    (−dv2)",
+                "dy2 = Φ·(v − 0.5·a1)",
+                "a3  = Φ·(y + 0.5·dy2)    (−dv3)",
+                "dy3 = Φ·(v − 0.5·a2)",
+                "v'  = v + 0.16666666666666666·(−a1 − 2·a2 − 2·a3 − Φ·(y + dy3))",
+                "y'  = y + 0.16666666666666666·(dy1 + 2·dy2 + 2·dy3 + Φ·(v − a3))",
+            ],
+        ),
+    ],
+)
+def test_the_undamped_oscillator(method: str, step: list[str]) -> None:
+    assert lines(sw.explain(sw.Oscillator(), method)) == ["once a run", "Φ = h·omega", "in each step", *step]
+
+
+def test_who_has_what_in_common() -> None:
+    sweep = lines(sw.explain(sw.Oscillator([1.0, 2.0]), "false_euler"))
+    assert sweep == [
+        "once a run, for each member",
+        "Φ = h·omega",
+        "in each step, for each member",
+        "v' = v − Φ·y",
+        "y' = y + Φ·v'",
+    ]
+    driven = sw.Oscillator([1.0, 2.0], 0.1, a=sw.Sampled([1.0, 2.0], 0.5), form="physical")
+    explained = sw.explain(driven, "damped_euler")
+    assert [section.when for section in explained.sections if section.lines] == ["member", "step", "member step"]
+    assert lines(explained)[-3:] == ["in each step, for each member", "y' = y + h·v", "v' = v + (c2·y' − c1·v + h·a[s3])"]
+    assert "s1 = floor((t − a.start)/a.interval + 1e-06)" in lines(explained)
+
+
+def test_bodies() -> None:
+    """Newton's law, a = G·m·d/r³, of which the cube is r²·√r²."""
+    step = """
+        a1      = y[1,0] − y[0,0]
+        a2      = y[1,1] − y[0,1]
+        a3      = a1·a1 + a2·a2 + c3
+        a4      = 1/(a3·√(a3))
+        a5      = c2·a4
+        a6      = c1·a4
+        v'[0,0] = v[0,0] + (a1·a5 + 0)
+        v'[0,1] = v[0,1] + (a2·a5 + 0)
+        v'[1,0] = v[1,0] − a1·a6
+        v'[1,1] = v[1,1] − a2·a6
+        y'[0,0] = y[0,0] + h·v'[0,0]
+        y'[0,1] = y[0,1] + h·v'[0,1]
+        y'[1,0] = y[1,0] + h·v'[1,0]
+        y'[1,1] = y[1,1] + h·v'[1,1]
+    """
+    said = lines(sw.explain(sw.NBody([3.0, 4.0], force="newton"), "false_euler"))
+    assert said[:5] == ["once a run", "c1 = h·Gm[0]", "c2 = h·Gm[1]", "c3 = softening·softening", "in each step"]
+    assert said[5:] == [line.strip() for line in step.strip().splitlines()]
+
+
+def test_matrices_are_named_as_given() -> None:
+    system = sw.LinearSystem([[1, 2, 3], [4, 5, 6], [7, 8, 9.0]], np.ones((3, 2)), x=[None, 2.0], velocities=[2])
+    said = [re.sub(" +", " ", line) for line in lines(sw.explain(system, "standard_euler"))]
+    assert "c1 = h·A[2,2]" in said
+    assert "c2 = h·A[2,0]" in said
+    assert any("h·B[0,1]·x[1]" in line for line in said)
+
+
+def test_fused() -> None:
+    assert lines(sw.explain(sw.Oscillator(), "false_euler", fused=True))[-2:] == ["v' = fma(−Φ, y, v)", "y' = fma(Φ, v', y)"]
+
+
+# ---- counts by hand
+
+
+@pytest.mark.parametrize(
+    ("method", "written", "computed"),
+    [
+        # Sums and products. A step of Verlet is 2y − y_prev − Φ·(Φy).
+        ("standard_euler", (2, 2), (2, 2)),
+        ("damped_euler", (2, 2), (2, 2)),
+        ("false_euler", (2, 2), (2, 2)),
+        ("verlet", (2, 3), (2, 3)),
+        ("standard_heun", (6, 6), (6, 6)),
+        # Rates are asked for at v + dv, which is there already when the new increment of y is added.
+        ("semi_false_heun", (7, 6), (6, 6)),
+    ],
+)
+def test_counts(method: str, written: tuple[int, int], computed: tuple[int, int]) -> None:
+    explained = sw.explain(sw.Oscillator(), method)
+    for kinds, wanted in ((explained.written, written), (explained.computed, computed)):
+        assert (kinds["additions"], kinds["multiplications"]) == wanted
+        assert sum(kinds.values()) == sum(wanted)
+    assert explained.hoisted == {"run": 1, "member": 0, "step": 0}  # Φ
+
+
+def test_counts_of_a_fused_step() -> None:
+    explained = sw.explain(sw.Oscillator(), "false_euler", fused=True)
+    assert explained.computed["fused"] == sum(explained.computed.values()) == 2
+    assert explained.counts() == [("additions", 2, 0), ("multiplications", 2, 0), ("fused", 0, 2)]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_the_criteria_are_those_of_the_tape(method: sw.Method) -> None:
+    found = sw.stability.operations(method)
+    written = sw.explain(sw.Oscillator(), method).written
+    assert found[:4] == tuple(written[kind] for kind in found._fields[:4])
+    assert found.rate_evaluations == method.evaluations
+
+
+# ---- what is listed is what is computed
+
+
+def _as_bits(x: Any) -> Any:
+    if isinstance(x, int):
+        return np.uint64(x)
+    x = np.asarray(x)
+    return np.where(x, np.uint64(2**64 - 1), np.uint64(0)) if x.dtype == bool else x.astype(np.float64).view(np.uint64)
+
+
+def _on_bits(f: Any) -> Any:
+    return lambda *of: np.asarray(f(*map(_as_bits, of))).view(np.float64)
+
+
+FUNCTIONS = {
+    "sqrt": np.sqrt,
+    "floor": np.floor,
+    "fma": fma,
+    "and_bits": _on_bits(np.bitwise_and),
+    "or_bits": _on_bits(np.bitwise_or),
+    "xor_bits": _on_bits(np.bitwise_xor),
+    "add_bits": _on_bits(np.add),
+    "shift_up": _on_bits(np.left_shift),
+    "shift_down": _on_bits(np.right_shift),
+}
+COMPARED = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Eq: np.equal}
+DONE = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
+
+
+def _value(node: Any, known: dict[str, Any]) -> Any:
+    """Of Python's grammar, but that a choice takes one of two arrays number by number."""
+    of = lambda each: _value(each, known)  # noqa: E731
+    match node:
+        case ast.Constant():
+            return np.float64(node.value)
+        case ast.Name():
+            return known[node.id]
+        case ast.UnaryOp(op=ast.USub()):
+            return np.negative(of(node.operand))
+        case ast.UnaryOp(op=ast.Not()):
+            return np.logical_not(of(node.operand))
+        case ast.BinOp():
+            return DONE[type(node.op)](of(node.left), of(node.right))
+        case ast.Compare(ops=[op], comparators=[right]):
+            return COMPARED[type(op)](of(node.left), of(right))
+        case ast.BoolOp(values=truths):
+            return (np.logical_and if isinstance(node.op, ast.And) else np.logical_or).reduce(
+                np.broadcast_arrays(*map(of, truths))
+            )
+        case ast.IfExp():
+            return np.where(of(node.test), of(node.body), of(node.orelse))
+        case ast.Call() if node.func.id.endswith("_bits") or node.func.id.startswith("shift"):  # whose constants are bits
+            return FUNCTIONS[node.func.id](*(each.value if isinstance(each, ast.Constant) else of(each) for each in node.args))
+        case ast.Call():
+            return known.get(node.func.id, FUNCTIONS.get(node.func.id))(*map(of, node.args))
+    raise AssertionError(ast.dump(node))
+
+
+#: A name in a formula, with a place in an array behind it, or, of a sampled input, with the name of the number of a sample.
+NAME = re.compile(r"(?<![\w.])([^\W\d][\w.]*'?(?:\[\d+(?:,\d+)*\])?(?:\.\w+)*)(?:\[([^\W\d]\w*)\])?")
+SIGNS = (("·", "*"), ("−", "-"), ("√", "sqrt"), ("≤", "<="), (" = ", " == "), ("∞", "1e999"))
+
+
+def evaluate(explained: sw.Explanation, known: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """The values of all lines, by name, from the texts of their formulas."""
+    values, out = dict(known), {}
+    values |= {
+        f"look up {name}": lambda at, samples=samples: samples[np.asarray(at, dtype=int)] for name, samples in tables.items()
+    }
+    places = {name: f"name_{i}" for i, name in enumerate(values)}
+
+    def plain(found: re.Match[str]) -> str:
+        name, of = found.groups()
+        return places.get(name, name) if of is None else f"{places[f'look up {name}']}({places[of]})"
+
+    numbered = {places[name]: value for name, value in values.items()}
+    with np.errstate(all="ignore"):
+        for section in explained.sections:
+            for line in section.lines:
+                text = NAME.sub(plain, line.formula)
+                for sign, python in SIGNS:
+                    text = text.replace(sign, python)
+                assert line.name not in places, f"{line.name} twice"
+                places[line.name] = f"name_{len(places)}"
+                out[line.name] = numbered[places[line.name]] = _value(ast.parse(text, mode="eval").body, numbered)
+    return out
+
+
+def leaves(plan: engine.Plan) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What stands behind the names of parameters, and samples by the name of their table; a row of each for every member."""
+    names, tables = listing.parameters(plan)
+    tracer = Tracer(plan.system, _core.Tape())
+    tracer.scaled(H)
+    known = dict(zip(names, tracer.numbers, strict=True)) | {"h": H, "t": T}
+    samples, before = {}, 0
+    for name, table in zip(tables, tracer.tables, strict=True):
+        values = np.asarray(table.values)
+        known |= {f"{name}.start": table.start, f"{name}.interval": table.interval, f"{name}.last": len(values) - 1.0}
+        known |= {f"{name}.first": float(before)}
+        samples[name] = values
+        before += len(values)
+    wide = [np.broadcast_to(each.reshape(len(each), -1), (len(each), MEMBERS)) for each in samples.values()]
+    every = np.concatenate(wide) if wide else np.zeros((0, MEMBERS))
+    known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}
+    return known, samples
+
+
+def state(explained: sw.Explanation, plan: engine.Plan, known: dict[str, Any], mark: str = "'") -> list[Any]:
+    return [np.broadcast_to(known[name], MEMBERS) for name in listing.states(plan, explained.attempt, mark)]
+
+
+def assert_listing_is_a_step(system: sw.System, method: sw.Method, v: Any, y: Any, *, fused: bool) -> None:
+    explained = sw.explain(system, method, fused=fused)
+    plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, fused=fused)
+    assert explained.parts is None
+    known, tables = leaves(plan)
+    rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), np.zeros(MEMBERS)]
+    known |= dict(zip(listing.states(plan, False), rows, strict=False))
+    after = state(explained, plan, evaluate(explained, known, tables))
+    out = engine.advance(plan, v, y, carried=True)
+    wanted = [out.slot, out.y[-1]]
+    if system.control is not None:
+        wanted.append(out.work)
+        after[-1] = engine._per_step(plan, after[-1])
+    assert_computes(after, *wanted)
+    assert_counted(explained)
+
+
+def assert_counted(explained: sw.Explanation) -> None:
+    """What the lines take is what the core counts in all."""
+    total = sum((Counter(line.operations) for line in explained.sections[-1].lines), Counter[str]())
+    assert total == +Counter(explained.computed)
+    assert all(len(line.formula) < 120 for section in explained.sections for line in section.lines)
+
+
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[1].size <= 30 * MEMBERS])  # whose steps are one tape
+def test_every_listing_is_a_step(name: str, fused: bool) -> None:
+    system, v, y = made(name)
+    for method in METHODS:
+        if fits(system, method) and not _core.in_parts(engine.model(engine.Plan(system, method, (MEMBERS,), H)), MEMBERS):
+            assert_listing_is_a_step(system, method, v, y, fused=fused)
+
+
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+@pytest.mark.parametrize("control", CONTROLS)
+def test_every_listing_under_control_is_a_step(control: str, fused: bool) -> None:
+    for name in ("three bodies", "two bodies", "three bodies in space, newton"):
+        system, v, y = made(name)
+        held = system.controlled(CONTROLS[control], v, y, H)
+        for method in METHODS:
+            if fits(held, method):
+                assert sw.explain(system, method, control=CONTROLS[control], fused=fused) == sw.explain(held, method, fused=fused)
+                assert_listing_is_a_step(held, method, v, y, fused=fused)
+
+
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if not name.startswith("thirty-five")])
+def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
+    system, v, y = made(name)
+    first = dict.fromkeys(adaptive.Pace._fields, np.zeros(MEMBERS))
+    row = lambda *values: np.array(values)  # noqa: E731
+    pace = adaptive.Pace(
+        **first
+        | {"t": row(T, T, T), "h": row(0.3, 1e-3, 0.3), "target": row(0.4, 2.0, T), "relative": row(1e-3, 1e-2, 1e-3)}
+        | {
+            "absolute": row(1e-9, 1e-2, 1e-3),
+            "lasts": row(1.0, 0.0, 1.0),
+            "before": row(0.9, 0.6, 1.0),
+            "most": row(5.0, 1.0, 5.0),
+        }
+        | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0), "longest_v": row(0.1, 1.0, 0.0)}
+    )
+    for method in ABLE:
+        plan = engine.Plan(system, method, (MEMBERS,), H, fused=fused)
+        if _core.in_parts(engine.model(plan._replace(fused=False)), MEMBERS, attempts=True):
+            continue  # it is not one tape
+        explained = sw.explain(system, method, attempt=True, fused=fused)
+        known, tables = leaves(plan)
+        rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace]
+        known |= dict(zip(listing.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
+        after = state(explained, plan, evaluate(explained, known, tables))
+        if fused:
+            following, v1, y1 = engine._fused_attempt(plan, 9)(pace, 9, v, y)
+        else:
+            s, steps = system.scaled(1.0, system.batch), method.steps
+            axes = len(system.v_shape), len(system.y_shape)
+            with np.errstate(all="ignore"):
+                following, v1, y1 = adaptive.attempt(steps, s, method.error_order, axes, pace, 9.0, v, y)  # type: ignore[arg-type]
+        assert_computes(after, v1, y1, *following)
+        assert_counted(explained)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_what_a_method_does_to_blocks(method: sw.Method) -> None:
+    """The listing of a step that is no single tape."""
+    n = 700
+    system, rng = sw.Chain(n), np.random.default_rng(1)
+    explained = sw.explain(system, method)
+    assert explained.parts == "hand"
+    v, y = rng.normal(size=(2, n))
+    s = system.scaled(H, ())
+    carry = method.carry or "v"
+    found = evaluate(explained, {carry: v, "y": y, "h": H, "t": T, "dv": s.dv, "dy": s.dy}, {})
+    v1, y1 = method.steps.step(s, T, H, v, y)
+    np.testing.assert_array_equal(found[f"{carry}'"], v1)
+    np.testing.assert_array_equal(found["y'"], y1)
+    asked = [line.formula[:2] for section in explained.sections for line in section.lines]
+    assert asked.count("dv") == method.evaluations
+
+
+# ---- machine code, and why there is none
+
+
+def level() -> str:
+    return sw.isa_levels()[-1]
+
+
+@pytest.mark.skipif(len(sw.isa_levels()) < 2, reason="no machine code here")
+def test_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STEPWELL_KERNELS", "avx2")
+    explained = sw.explain(sw.Oscillator(), "false_euler", members=1000)
+    code = explained.code
+    assert code is not None
+    assert (explained.level, explained.interpreted_because, code.width, code.registers) == ("avx2", None, 4, 16)
+    assert explained.lanes == code.width * code.vectors * code.turns
+    assert code.resident
+    assert code.size > 50
+    assert code.spills == 0
+    many = sw.explain(sw.NBody(), "rk4", members=1000)
+    assert many.code is not None
+    assert many.code.spills > 0
+    assert f"{many.code.spills} values beside them" in str(many)
+    lone = sw.explain(sw.Oscillator(), "false_euler").code
+    assert lone is not None
+    assert (lone.width, lone.vectors, lone.turns) == (1, 1, 1)
+
+
+def test_interpreted_if_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STEPWELL_KERNELS", "interpret")
+    explained = sw.explain(sw.Oscillator(), "false_euler")
+    assert (explained.level, explained.code) == ("baseline", None)
+    assert explained.interpreted_because is not None
+    wanted = "STEPWELL_KERNELS" if len(sw.isa_levels()) > 1 else "this CPU"
+    assert wanted in explained.interpreted_because
+    assert "It is interpreted, one member at a time: " in str(explained)
+    assert "between them is interpreted" in str(sw.explain(sw.Chain(1000), "rk4"))
+
+
+HARDENED = """
+import ctypes
+import stepwell as sw
+libc = ctypes.CDLL(None, use_errno=True)
+PR_SET_MDWE, REFUSE_EXEC_GAIN = 65, 1
+refused = libc.prctl(PR_SET_MDWE, REFUSE_EXEC_GAIN, 0, 0, 0)
+print("refused" if refused else sw.explain(sw.Oscillator(), "false_euler").interpreted_because)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or len(sw.isa_levels()) < 2, reason="Linux, and a CPU with kernels")
+def test_interpreted_where_no_code_may_be_written() -> None:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("STEPWELL")}
+    out = subprocess.run([sys.executable, "-c", HARDENED], capture_output=True, text=True, check=True, env=environment)
+    if out.stdout == "refused\n":
+        pytest.skip("the kernel has no PR_SET_MDWE")
+    assert out.stdout == "this system does not let a program execute code that it has written\n"
+
+
+def test_large_systems() -> None:
+    chain = sw.explain(sw.Chain(1000), "rk4")
+    assert (chain.parts, chain.written, chain.computed, chain.code) == ("hand", {}, {}, None)
+    assert "a step of Chain(1000), 1 member\n" in str(chain)
+    assert "of about 24000 operations" in str(chain)
+    bodies = sw.explain(sw.NBody(np.ones(60)), "rk4", members=100)
+    assert bodies.parts == "rates"
+    assert "the rates are a tape of their own" in str(bodies)
+
+
+# ---- as an object
+
+
+def test_text_and_html() -> None:
+    explained = sw.explain(sw.Oscillator([1.0, 2.0]), "verlet", fused=True)
+    text, html = str(explained), explained._repr_html_()
+    assert text.startswith(
+        "Verlet: a step of Oscillator(omega=array(2,), form='canonical'), 2 members, with fused multiply-adds\n"
+    )
+    assert "y_prev: what stands in the place of v between steps" in text
+    assert "fma(a, b, c) = a·b + c, rounded once" in text
+    assert '<td style="text-align:left">y_prev&#x27;</td>' in html
+    assert html.count("<table>") == html.count("</table>") == 2
+    assert "<" not in re.sub(r"</?(p|b|table|tr|td|th)( [^>]*)?>", "", html)
+    less = sw.explain(sw.Oscillator(), "merson", attempt=True)._repr_html_()
+    assert "0 &lt; extra" in less
+
+
+def test_json(tmp_path: Path) -> None:
+    explained = sw.explain(sw.Oscillator(), "false_euler")
+    explained.to_json(tmp_path / "step.json")
+    told = json.loads((tmp_path / "step.json").read_text(encoding="utf-8"))
+    assert told == explained.as_dict() | {"sections": told["sections"]}
+    assert told["sections"][3]["lines"][0] == {
+        "name": "v'",
+        "formula": "v − Φ·y",
+        "operations": {"additions": 1, "multiplications": 1},
+        "note": "",
+    }
+
+
+def test_what_cannot_be_explained_says_so() -> None:
+    with pytest.raises(sw.errors.ShapeError, match="batch shapes do not broadcast"):
+        sw.explain(sw.NBody(), "rk4", members=3, control=sw.EnergyControl([0.1, 0.2]))
+    with pytest.raises(sw.errors.ArgumentError, match="members: expected a multiple of the system's batch of 2, got 3"):
+        sw.explain(sw.Oscillator([1.0, 2.0]), "rk4", members=3)
+    with pytest.raises(sw.errors.UnsupportedError, match="attempt: rk4 does not estimate its error"):
+        sw.explain(sw.Oscillator(), "rk4", attempt=True)
+    with pytest.raises(sw.errors.ArgumentError, match="control: goes with fixed steps only"):
+        sw.explain(sw.NBody(), "merson", attempt=True, control=sw.EnergyControl(0.1))
+    with pytest.raises(sw.errors.UnsupportedError, match=r"control: .* has no energy control"):
+        sw.explain(sw.Oscillator(), "rk4", control=sw.EnergyControl(0.1))
+    with pytest.raises(sw.errors.UnsupportedError, match="verlet needs forces"):
+        sw.explain(sw.Oscillator(1.0, 0.1), "verlet")
+    with pytest.raises(sw.errors.ArgumentError, match=r"fused: a step of about \d+ operations is too long"):
+        sw.explain(sw.Chain(1000), "rk4", fused=True)
+    with pytest.raises(sw.errors.DTypeError, match="fused: expected True or False"):
+        sw.explain(sw.Oscillator(), "rk4", fused=WRONG)

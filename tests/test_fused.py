@@ -1,0 +1,218 @@
+"""The second exact arithmetic: what is fused, that both languages fuse the same, and that a·b + c is rounded once."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import pickle
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from hypothesis import given
+from hypothesis import strategies as st
+from stepwell import _core, engine
+from stepwell.reference.fused import Operation, exact_fma, fma, fused
+from stepwell.reference.traced import Tracer
+from test_tracing import ABLE, CONTROLS, METHODS, fits, made
+
+WRONG: Any = "yes"
+ANY = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def rounded_once(a: float, b: float, c: float) -> float:
+    """a·b + c by exact rational arithmetic, or as IEEE 754 has it where that has no answer."""
+    if not (math.isfinite(a) and math.isfinite(b)):
+        return a * b + c
+    if not math.isfinite(c):
+        return c
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    if not exact:
+        return a * b + c
+    try:
+        return float(exact)
+    except OverflowError:
+        return math.inf if exact > 0 else -math.inf
+
+
+def same(a: float, b: float) -> bool:
+    return (a != a and b != b) or (a == b and math.copysign(1.0, a) == math.copysign(1.0, b))
+
+
+@given(ANY, ANY, ANY)
+def test_a_product_and_a_sum_are_rounded_once(a: float, b: float, c: float) -> None:
+    with np.errstate(all="ignore"):
+        want = getattr(math, "fma", None)
+        got = fma(a, b, c).item()
+        assert same(got, rounded_once(a, b, c)), (a, b, c)
+        if want and not any(map(math.isnan, (a, b, c))):
+            with contextlib.suppress(OverflowError, ValueError):  # where IEEE 754 has an infinity or a NaN
+                assert same(got, want(a, b, c))
+
+
+def test_where_sums_cancel_and_halves_are_met() -> None:
+    # c is minus the product, or a few last digits beside it; and products whose rest is half a digit of the sum.
+    rng = np.random.default_rng(3)
+    a, b = (rng.normal(size=20_000) * 2.0 ** rng.integers(-40, 40, 20_000) for _ in range(2))
+    c = -(a * b) * (1.0 + rng.integers(-3, 4, a.size) * 2.0**-52)
+    c[::3] = rng.normal(size=c[::3].size) * 2.0 ** rng.integers(-80, 80, c[::3].size)
+    a[::5] = 1.0 + 2.0**-30 * rng.integers(0, 8, a[::5].size)
+    b[::5], c[::5] = 1.0 + 2.0**-23, 2.0**53 * rng.integers(1, 4, c[::5].size)
+    got = fma(a, b, c)
+    assert got.tolist() == [exact_fma(*each) for each in zip(a.tolist(), b.tolist(), c.tolist(), strict=True)]
+    assert (got != a * b + c).mean() > 0.2  # it is another number often enough for this to be a test
+
+
+def operations(tape: Any, symbols: list[Any]) -> tuple[list[Operation], list[int]]:
+    listed, roots = tape.operations(symbols)
+    return [Operation(name, tuple(of), given) for name, of, given in listed], list(roots)
+
+
+def needed(tape: list[Operation], roots: list[int]) -> tuple[list[Operation], list[int]]:
+    """What the roots need, and nothing else."""
+    keep = set(roots)
+    for line in range(len(tape) - 1, -1, -1):
+        if line in keep:
+            keep.update(tape[line].of)
+    place = {line: i for i, line in enumerate(sorted(keep))}
+    kept = [tape[line]._replace(of=tuple(place[each] for each in tape[line].of)) for line in sorted(keep)]
+    return kept, [place[root] for root in roots]
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_both_fuse_the_same(name: str) -> None:
+    system, _, _ = made(name)
+    if int(np.prod(system.v_shape)) > 30:
+        return  # its step is too long for one tape
+    counts = []
+    for method in METHODS:
+        if not fits(system, method):
+            continue
+        tape = _core.Tape()
+        symbols = Tracer(system, tape).step(method)
+        core = operations(*tape.fused(symbols))
+        plain, roots = operations(tape, symbols)
+        assert core == needed(fused(plain, roots), roots), method.name
+        counts.append(sum(operation.name.count("multiply ") + (operation.name == "subtract multiply") for operation in core[0]))
+    assert max(counts) > 0
+
+
+def test_the_order_of_writing_decides_nothing() -> None:
+    # x·y + z·x, its products written down in either order, and its sum either way round.
+    found = set()
+    for turned in (False, True):
+        for swapped in (False, True):
+            tape = _core.Tape()
+            leaves = [tape.state(i) for i in ((2, 1, 0) if turned else (0, 1, 2))]
+            x, y, z = sorted(leaves, key=repr) if not turned else leaves[::-1]
+            products = [z * x, x * y] if turned else [x * y, z * x]
+            p, q = products[::-1] if turned else products
+            total = q + p if swapped else p + q
+            listed, _ = operations(*tape.fused([total]))
+            [line] = [operation for operation in listed if operation.name == "multiply add"]
+            found.add(frozenset(listed[each].given for each in line.of[:2]))
+    assert len(found) == 1
+
+
+def runs(system: Any, method: Any, v: Any, y: Any, **more: Any) -> tuple[Any, Any]:
+    return tuple(sw.integrate(system, method, v=v, y=y, fused=True, backend=backend, **more) for backend in ("rust", "numpy"))
+
+
+def assert_equal(one: Any, other: Any) -> None:
+    assert np.array_equal(one.v, other.v, equal_nan=True)
+    assert np.array_equal(one.y, other.y, equal_nan=True)
+    assert np.array_equal(np.signbit(one.y), np.signbit(other.y))
+
+
+KERNELS = ["interpret", *(level for level in _core.isa_levels() if level != "baseline")]
+RUN = ["free", "pendulum, sinusoid a, damped", "sampled x and a, physical", "three bodies, newton", "chain of five"]
+
+
+@pytest.mark.parametrize("kernels", KERNELS)
+@pytest.mark.parametrize("name", [*RUN, "restricted three bodies", "linear, velocities only"])
+def test_the_core_has_the_bits_of_the_reference(name: str, kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STEPWELL_KERNELS", kernels)
+    system, v, y = made(name)
+    for method in map(sw.method, ("damped_euler", "leapfrog", "verlet", "false_heun", "rk4", "fehlberg_5")):
+        if fits(system, method):
+            assert_equal(*runs(system, method, v, y, dt=0.01, steps=5, every=2))
+
+
+def test_with_a_tolerance() -> None:
+    system, v, y = made("three bodies")
+    for method in ABLE:
+        one, other = runs(system, method, v, y, tolerance=1e-6, at=[0.1, 0.25, 0.5])
+        assert_equal(one, other)
+        assert one.paces == other.paces
+        plain = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.5])
+        assert np.abs(plain.y[-1] - one.y[-1]).max() < 1e-4
+        first = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.1], fused=True)
+        on = sw.integrate(system, method, at=[0.5], **first.resume)
+        assert np.array_equal(on.y[-1], one.y[-1])
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_under_control_and_what_is_recorded(control: str) -> None:
+    system, v, y = made("three bodies")
+    for method in ("false_euler", "semi_false_heun", "rk4"):
+        more = {"control": CONTROLS[control], "record": ["energy"], "every": 5}
+        one, other = runs(system, method, v, y, dt=1e-3, steps=20, **more)
+        assert_equal(one, other)
+        assert np.array_equal(one.work, other.work)
+        # What is recorded is a property of the state and is computed as it is without.
+        assert np.array_equal(one.recorded["energy"], one.quantity("energy"))
+
+
+def test_a_world_and_going_on() -> None:
+    system, v, y = made("three bodies")
+    for method in ("leapfrog", "verlet", "rk4"):
+        whole = sw.integrate(system, method, v=v, y=y, dt=1e-3, steps=20, fused=True)
+        half = sw.integrate(system, method, v=v, y=y, dt=1e-3, steps=8, fused=True)
+        assert np.array_equal(sw.integrate(system, method, steps=12, **half.resume).y, whole.y)
+        world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=1e-3, fused=True)
+        world.step(8)
+        again = pickle.loads(pickle.dumps(world))
+        again.step(12)
+        assert np.array_equal(again.y, whole.y[-1])
+    plain, with_fused = (sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=5, fused=each).y for each in (False, True))
+    assert not np.array_equal(plain, with_fused)
+
+
+def test_a_member_alone_and_batches_of_two_axes() -> None:
+    for batch in ((), (2, 3)):
+        omega = np.broadcast_to(np.float64(1.3), batch)
+        for method in ("false_euler", "leapfrog", "rk4"):
+            assert_equal(*runs(sw.Oscillator(omega), sw.method(method), 0.2, 1.0, dt=0.1, steps=7, every=3))
+
+
+def test_neither_company_nor_threads_change_a_bit() -> None:
+    omega = np.linspace(0.5, 2.0, 1000)
+    together = sw.integrate(sw.Oscillator(omega, 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=500, fused=True, threads=2)
+    for i in (0, 499, 999):
+        alone = sw.integrate(sw.Oscillator(float(omega[i]), 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=500, fused=True)
+        assert alone.y[-1] == together.y[-1, i]
+    # A number that all have in common is one of each: nothing that is hoisted is fused.
+    common = sw.integrate(sw.Oscillator(2.0, 0.1), "rk4", v=0.0, y=np.ones(3), dt=0.1, steps=500, fused=True)
+    own = sw.integrate(sw.Oscillator(np.full(3, 2.0), 0.1), "rk4", v=0.0, y=np.ones(3), dt=0.1, steps=500, fused=True)
+    assert np.array_equal(common.y, own.y)
+
+
+def test_one_free_oscillator_is_two_operations() -> None:
+    model = engine.model(engine.Plan(sw.Oscillator(), sw.method("false_euler"), (), 0.1, fused=True))
+    told = _core.compiled(model, 1)
+    assert told is not None
+    counts = told["computed"]
+    assert (counts["fused"], counts["additions"], counts["multiplications"]) == (2, 0, 0)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_what_cannot_be_fused_says_so(backend: str) -> None:
+    with pytest.raises(sw.errors.ArgumentError, match=r"fused: a step of about \d+ operations is too long"):
+        sw.integrate(sw.Chain(500), "rk4", v=np.zeros(500), y=np.ones(500), dt=0.1, steps=2, fused=True, backend=backend)
+    with pytest.raises(sw.errors.UnsupportedError, match="fused: goes with form='direct' only"):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=2, fused=True, form="matrix", backend=backend)
+    with pytest.raises(sw.errors.DTypeError, match="fused: expected True or False"):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=2, fused=WRONG, backend=backend)

@@ -1,0 +1,165 @@
+"""Memory: what a run takes is counted before any work, is not more than was counted, and what is not there is not asked for."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _checks, engine
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks are asked of Linux")
+
+
+def aside(code: str) -> str:
+    """What the code prints, in a process of its own."""
+    code = "import resource, sys, time, numpy as np, stepwell as sw\n" + textwrap.dedent(code)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("steps", [10**9, 10**15])
+def test_more_kept_states_than_memory_are_refused_at_once(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(20e9, "memory of this machine")]))
+    monkeypatch.setattr(engine, "advance", None)  # no work is begun
+    with pytest.raises(
+        sw.StepwellError, match=r"the saved states of 1 members need .* GiB, but 18\.6 GiB are available \(memory of"
+    ):
+        sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=1)
+
+
+@LINUX
+@pytest.mark.parametrize("how", ["steps=20_000_000, every=1", "at=np.linspace(0, 1e6, 20_000_001), tolerance=1e-3"])
+def test_a_limit_of_the_address_space_is_heard(how: str) -> None:
+    """20 million states of 32 bytes do not fit where 400 MB are left; what does fit is made."""
+    said = aside(f"""
+        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + 400_000_000,) * 2)
+        try:
+            sw.integrate(sw.Oscillator(1.0), "dop853", v=0.0, y=1.0, dt=0.1, {how})
+        except MemoryError as error:
+            print(type(error).__name__, error)
+        print(len(sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=5_000_000, every=1).t))
+    """)
+    if how.startswith("at"):
+        assert "MemoryError" in said or "TooLargeError" in said  # NumPy may be the first to want more than there is
+    else:
+        assert said.startswith("TooLargeError the saved states of 1 members need 610 MiB, but ")
+        assert "MiB are available (limit of the address space, ulimit -v); keep less with every=" in said
+    assert said.endswith("5000001\n")
+
+
+@LINUX
+def test_a_system_that_does_not_fit_is_an_error_and_no_abort() -> None:
+    """A long chain: its stages would take 1.3 GB."""
+    said = aside("""
+        n = 4_000_000
+        system, y = sw.Chain(n), np.zeros(n)
+        v = np.zeros(n)
+        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + 300_000_000,) * 2)
+        for make in (
+            lambda: sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=1),
+            lambda: sw.World(system, "rk4", v=v, y=y, dt=0.1),
+        ):
+            try:
+                make()
+            except MemoryError as error:
+                print("refused")
+    """)
+    assert said == "refused\nrefused\n"
+
+
+@LINUX
+def test_threads_that_cannot_be_had_are_done_without() -> None:
+    """A stack for each of 64 threads is more than there is."""
+    said = aside("""
+        used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + 60_000_000,) * 2)
+        run = sw.integrate(sw.Oscillator(np.linspace(1, 2, 5000)), "rk4", v=0.0, y=1.0, dt=0.1, steps=300, threads=64)
+        print(run.y.shape)
+    """)
+    assert said == "(1, 5000)\n"
+
+
+@LINUX
+@pytest.mark.parametrize(
+    "run",
+    [
+        "sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=4_000_000, every=1",
+        "sw.Oscillator(1.0), 'verlet', v=0.0, y=1.0, dt=0.1, steps=4_000_000, every=1",
+        "sw.Oscillator(np.ones(1000)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=4000, every=1, threads=2",
+        "sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=4_000_000, every=1, form='matrix'",
+        "sw.NBody(), 'rk4', v=0.0, y=np.eye(3, 2), dt=1e-6, steps=1_000_000, every=1, record=['energy']",
+    ],
+)
+def test_the_peak_is_what_was_counted(run: str) -> None:
+    """As it was counted, within a tenth, and 24 MB for what does not depend on the number of states: kernels, threads, imports.
+
+    Of three bodies the energy is counted beside the states. The peak without the run is that of a run of few states.
+    """
+    said = aside(f"""
+        counted = []
+        from stepwell import _checks
+        fits = _checks.fits
+        def count(what, rows, batch, remedy, beside=0.0):
+            counted.append(8 * rows * int(np.prod(batch)) + beside)
+            fits(what, rows, batch, remedy, beside=beside)
+        _checks.fits = count
+        def go(*arguments, steps, **options):
+            sw.integrate(*arguments, steps=min(steps, most), **options)
+            # Not ru_maxrss, which begins with that of the process that started this one.
+            return 1024 * int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])
+        most = 1000
+        before = go({run})
+        most = 10**9
+        print(go({run}) - before, counted[-1])
+    """)
+    peak, counted = map(float, said.split())
+    assert peak < 1.1 * counted + 24e6
+    assert peak > 0.5 * counted - 24e6  # nor is it counted at random
+
+
+def test_the_least_bound_counts(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Control groups of both kinds, whatever this machine has; files that nobody reads are no usage."""
+    files = {
+        "/proc/self/cgroup": "4:cpu,memory:/box\n3:cpuset:/other\n0::/box/inner\n",
+        "/proc/self/statm": "1000 1 1 1 1 1 1\n",
+        "/proc/meminfo": "MemTotal: 99999999 kB\nMemAvailable:    8000000 kB\n",
+        "/sys/fs/cgroup/memory/box/memory.limit_in_bytes": "9223372036854771712\n",
+        "/sys/fs/cgroup/memory/box/memory.usage_in_bytes": "1000000\n",
+        "/sys/fs/cgroup/box/inner/memory.max": "max\n",
+        "/sys/fs/cgroup/box/inner/memory.current": "2000000\n",
+        "/sys/fs/cgroup/box/memory.max": "5000000000\n",
+        "/sys/fs/cgroup/box/memory.current": "3000000000\n",
+        "/sys/fs/cgroup/box/memory.stat": "anon 100\ninactive_file 1000000000\n",
+    }
+
+    def read(path: str) -> str:
+        try:
+            return files[path]
+        except KeyError:
+            raise FileNotFoundError(path) from None
+
+    monkeypatch.setattr(_checks, "_read", read)
+    assert _checks.available_memory() == (3e9, "memory limit of the control group")
+    del files["/proc/self/cgroup"]
+    assert _checks.available_memory() == (8e6 * 1024, "memory of this machine")
+
+
+def test_what_is_kept_is_counted_as_it_is() -> None:
+    for steps in (1, 2, 7, 9):
+        for every in (None, 1, 2, 3, 9, 100):
+            plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=steps, every=every)
+            assert plan.kept == len(plan.saves)
+            run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=every)
+            assert len(run.t) == plan.kept
+            np.testing.assert_array_equal(run.t, 0.1 * plan.saves)

@@ -1,0 +1,109 @@
+"""What could be misread without a word: it is refused, or warned of."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, DTypeError
+
+START: dict[str, Any] = {"v": 0.0, "y": 1.0}
+FIXED = START | {"dt": 0.1, "steps": 10}
+
+
+def test_a_list_as_tolerance() -> None:
+    """As a list it was one for each member, as a tuple a pair."""
+    for wrong in ([1e-3], [1e-3, 1e-6], [1e-3, 1e-6, 1e-9]):
+        with pytest.raises(
+            DTypeError, match=re.escape("tolerance: expected a number, an array over the batch, or a tuple (relative")
+        ):
+            sw.integrate(sw.Oscillator(), "merson", **START, at=[1.0], tolerance=wrong)
+    members = sw.integrate(sw.Oscillator(), "merson", **START, at=[1.0], tolerance=np.array([1e-3, 1e-6]))
+    pair = sw.integrate(sw.Oscillator(), "merson", **START, at=[1.0], tolerance=(1e-3, [1e-6, 1e-9]))
+    assert members.y.shape == pair.y.shape == (1, 2)
+
+
+def test_masks_are_not_lost() -> None:
+    masked = np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False])
+    for call in (
+        lambda: sw.Oscillator(masked),
+        lambda: sw.integrate(sw.Oscillator(), "rk4", **FIXED | {"y": masked}),
+        lambda: sw.NBody(masked),
+        lambda: sw.World(sw.Oscillator(), "rk4", v=np.zeros(3), y=masked, dt=0.1),
+    ):
+        with pytest.raises(ArgumentError, match="got a masked array in which 1 are masked"):
+            call()
+    whole = np.ma.masked_array([1.0, 2.0, 3.0], False)
+    assert sw.integrate(sw.Oscillator(), "rk4", **FIXED | {"y": whole}).y.shape == (1, 3)
+
+
+@pytest.mark.parametrize("most", ["junk", 5, 1_000_000])
+def test_the_most_steps_of_a_run_of_fixed_ones(most: Any) -> None:
+    with pytest.raises(ArgumentError, match="max_steps: goes with tolerance= and at= only"):
+        sw.integrate(sw.Oscillator(), "rk4", **FIXED, max_steps=most)
+
+
+def test_a_time_that_does_not_move() -> None:
+    for wrong in ({"t0": 1e300}, {"t0": 1e16, "dt": 1e-3}, {"dt": 1e308}, {"dt": 5e-324, "t0": 1.0}):
+        with pytest.raises(ArgumentError, match="dt, t0: expected a time that moves on and stays finite"):
+            sw.integrate(sw.Oscillator(), "rk4", **FIXED | wrong)
+
+
+def test_nothing_to_record() -> None:
+    assert sw.integrate(sw.Oscillator(), "rk4", **FIXED, record=None).recorded == {}
+
+
+class TestAnotherSystemsRun:
+    """The errors of a run mean something only beside the scene's own system."""
+
+    scene = sw.scenes.kepler()
+
+    @pytest.mark.parametrize("measure", ["state_error", "energy_error", "amplitude"])
+    def test_is_refused(self, measure: str) -> None:
+        of = getattr(self.scene, measure)
+        for other in (sw.NBody([1.0, 0.5], force="newton"), sw.NBody([1.0, 0.0], force="newton", G=2.0), sw.NBody([1.0, 0.0])):
+            run = sw.integrate(other, "rk4", v=self.scene.v, y=self.scene.y, dt=0.001, steps=10)
+            with pytest.raises(ArgumentError, match="run: expected a run of the scene kepler, one member of NBody"):
+                of(run)
+        batch = sw.integrate(self.scene.system, "rk4", v=self.scene.v[..., None], y=self.scene.y[..., None], dt=0.001, steps=10)
+        with pytest.raises(ArgumentError, match="one member"):
+            of(batch)
+        with pytest.raises(DTypeError, match=r"run: expected what scene\.run returns, got float"):
+            of(1.0)
+
+    def test_its_own_and_a_controlled_one_are_not(self) -> None:
+        for control in (None, sw.EnergyControl(0.1), sw.Projection()):
+            run = self.scene.run("rk4", 0.001, steps=10, control=control)
+            assert self.scene.state_error(run).max() < 1e-3
+
+
+def test_an_angle_without_a_sine() -> None:
+    with pytest.warns(
+        sw.AccuracyWarning, match=r"an angle grew to 9\.01e\+15 rad, and beyond 1\.13e\+15 rad its sine means nothing"
+    ):
+        sw.integrate(sw.Pendulum(), "rk4", **FIXED | {"y": [1.0, 2.0**53]})
+    with pytest.warns(sw.AccuracyWarning, match="an angle grew"):
+        sw.integrate(sw.Pendulum(), "merson", v=1e15, y=1.0, at=[2.0], tolerance=1.0)
+    sw.integrate(sw.Pendulum(), "rk4", **FIXED | {"y": 2.0**50 - 10})  # no warning, which would be an error
+
+
+def test_bodies_whose_energy_the_method_made() -> None:
+    scene = sw.scenes.pythagorean()
+    for method, steps in (("rk4", 30_000), ("false_heun", 3000)):
+        match = (
+            rf"1 of 1 member\(s\) have another energy at the end: the only member has .* instead of -12\.8, so {method} did not"
+        )
+        with pytest.warns(sw.AccuracyWarning, match=match):
+            scene.run(method, scene.horizon / steps, every=100, record="energy")
+    scene.run("dop853", scene.horizon / 30_000, every=100, record="energy")
+    # Whoever diverges is named as that alone; what is no invariant of the motion is not looked at.
+    with pytest.warns(sw.DivergenceWarning) as told:
+        sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=0.0, y=np.zeros((2, 2)), dt=0.1, steps=9, every=1, record="energy")
+    assert len(told) == 1
+    printed = sw.NBody([3.0, 4.0, 5.0], force="printed")
+    wild: dict[str, Any] = {"dt": 0.1, "steps": 100, "every": 10, "record": "energy"}
+    run = sw.integrate(printed, "standard_euler", v=scene.v, y=scene.y, **wild)
+    assert abs(run.energy[-1] - run.energy[0]) > abs(run.energy[0])

@@ -1,0 +1,208 @@
+"""Where files go is tried before any work, and a file that cannot be written in the end costs no result."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import stepwell as sw
+from stepwell import _checks, charts, cli
+from stepwell.errors import ArgumentError, DTypeError
+
+#: Each command that writes: its words, what its work is done by, the name of a file, or one that it writes into a folder.
+COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
+    "run": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.csv", None),
+    "run npz": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.npz", None),
+    "run picture": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.png", None),
+    "run animation": (["run", "clover", "--method", "rk4", "--steps", "5"], "stepwell.scenes.Scene.run", "run.gif", None),
+    "advise": (
+        ["advise", "oscillator", "--methods", "rk4", "--cost", "evaluations", "--tolerance", "0.1"],
+        "stepwell.cli.advise.advise",
+        "a.json",
+        None,
+    ),
+    "criteria": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.md", None),
+    "criteria json": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.json", None),
+    "chart": (["chart", "oscillator", "--methods", "false_euler"], "stepwell.cli.chart.work_precision", "", "oscillator.csv"),
+    "chart panel": (
+        ["chart", "oscillator", "--methods", "false_euler", "--panel"],
+        "stepwell.cli.chart.work_precision",
+        "",
+        "panel.json",
+    ),
+    "figures": (["figures", "rk4"], "stepwell.cli.figures.figures", "", None),
+    "stability": (["stability", "rk4", "--charts", "loci"], "stepwell.cli.stability.stability", "", "stability.csv"),
+}
+
+EACH = pytest.mark.parametrize("command", COMMANDS)
+
+
+def told(capsys: Any, *words: str) -> tuple[int, str, str]:
+    code = cli.main(list(words))
+    return code, *capsys.readouterr()
+
+
+def places(tmp_path: Path, file: str) -> dict[str, Path]:
+    """Where nothing can be written, even by root: each with a word of why."""
+    (tmp_path / "a file").write_text("kept")
+    (tmp_path / "folder" / (file or "x")).mkdir(parents=True)
+    long = "x" * 300
+    found = {
+        "Not a directory": tmp_path / "a file" / (file or "sub"),
+        "File name too long": tmp_path / (f"{long}{Path(file).suffix}" if file else long) / ("" if file else "sub"),
+    }
+    if file:
+        found |= {"No such file": tmp_path / "no" / file, "Is a directory": tmp_path / "folder" / file}
+    return found
+
+
+@EACH
+def test_a_place_is_tried_before_any_work(command: str, capsys: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words, work, file, _ = COMMANDS[command]
+
+    def worked(*_: Any, **__: Any) -> Any:
+        raise AssertionError("it worked before it looked at -o")
+
+    monkeypatch.setattr(work, worked)
+    for why, path in places(tmp_path, file).items():
+        before = sorted(tmp_path.rglob("*"))
+        code, out, err = told(capsys, *words, "-o", str(path))
+        assert (code, out) == (2, "")
+        assert err.startswith("stepwell: -o: expected a f")
+        assert why in err
+        assert err.count("\n") == 1
+        assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "a file").read_text() == "kept"
+
+
+@pytest.mark.parametrize(("words", "inside"), [(words, inside) for words, _, _, inside in COMMANDS.values() if inside])
+def test_a_file_in_a_folder_is_tried_too(words: list[str], inside: str, capsys: Any, tmp_path: Path) -> None:
+    (tmp_path / inside).mkdir()
+    code, out, err = told(capsys, *words, "-o", str(tmp_path))
+    assert (code, out) == (2, "")
+    assert f"{inside}': Is a directory" in err
+
+
+@EACH
+@pytest.mark.parametrize("form", [["--json"], []])
+def test_what_was_found_is_printed_though_it_cannot_be_written(
+    command: str, form: list[str], capsys: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when the disk is full in the end."""
+    words, _, file, _ = COMMANDS[command]
+    monkeypatch.setattr(charts.work_precision.__globals__["measure"], "REPEATS", 1)
+
+    def full(*_: Any, **__: Any) -> Any:
+        raise OSError(28, "No space left on device")
+
+    from matplotlib.animation import PillowWriter
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    monkeypatch.setattr(PillowWriter, "saving", full)
+    monkeypatch.setattr("numpy.savez", full)
+    monkeypatch.setattr("csv.writer", full)
+    monkeypatch.setattr(Path, "write_text", full)
+    code, out, err = told(capsys, *words, *form, "-o", str(tmp_path / file))
+    assert code == 2
+    assert err.strip() == "stepwell: [Errno 28] No space left on device"  # after the line of a bar
+    if form:
+        json.loads(out)
+    else:
+        assert "written" not in out
+    assert len(out) > 100
+
+
+def test_charts_try_their_place_before_they_draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = sw.scenes.clover()
+    picture = charts.run_picture(scene, scene.run("rk4", steps=5, every=1))
+    loci, map_, figures = charts.stability(["rk4"]), charts.stability_map("rk4", size=8), charts.figures(["rk4"])
+    curves = charts.work_precision("oscillator", ["false_euler"], [100], tolerances=[])
+    panel = charts.Panel((curves,))
+    whole: dict[str, Callable[[Any], Any]] = {
+        "figure": figures.plot,
+        "a method's figure": lambda path: figures.plot(path, method="rk4"),
+        "loci": loci.plot,
+        "map": map_.plot,
+        "run": picture.plot,
+        "work precision": curves.plot,
+        "panel": panel.plot,
+        "csv": picture.to_csv,
+        "json": picture.to_json,
+        "curves csv": curves.to_csv,
+        "curves json": curves.to_json,
+        "panel csv": panel.to_csv,
+        "panel json": panel.to_json,
+        "animation": picture.animate,
+        "criteria": sw.criteria(["rk4"]).to_json,
+    }
+    for name in (
+        "picture",
+        "figures_picture",
+        "zplane_picture",
+        "map_picture",
+        "runs_picture",
+        "panel_picture",
+        "runs_animation",
+    ):
+        module = __import__(f"stepwell.charts.{name}", fromlist=["x"])
+        for drawer in ("draw", "loci", "overview", "one", "write"):
+            if hasattr(module, drawer):
+                monkeypatch.setattr(module, drawer, lambda *_: pytest.fail("it drew before it looked at the path"))
+    for name, write in whole.items():
+        ending = ".gif" if name == "animation" else ".png"
+        for wrong, error, why in (
+            (tmp_path / "no" / f"x{ending}", ArgumentError, "No such file or directory"),
+            (tmp_path, ArgumentError, "Is a directory"),
+            (f"x\0{ending}", ArgumentError, "null"),
+            (3, DTypeError, "expected the path of a file, got 3"),
+        ):
+            with pytest.raises(error, match="path: expected ") as caught:
+                write(wrong)
+            assert why in str(caught.value), name
+    for wrong, error in ((tmp_path / "x" / "\0", ArgumentError), (None, DTypeError)):
+        with pytest.raises(error, match="folder: expected "):
+            figures.save(wrong)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_path_is_left_as_it_was(tmp_path: Path) -> None:
+    old = tmp_path / "old"
+    old.write_bytes(b"kept")
+    os.utime(old, (1e9, 1e9))
+    assert _checks.file("path", str(old)) == old
+    assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
+    _checks.file("path", tmp_path / "new")
+    (tmp_path / "link").symlink_to(tmp_path / "not yet")
+    _checks.file("path", tmp_path / "link")
+    (tmp_path / "link").unlink()
+    _checks.folder("path", tmp_path / "new" / "and" / "deep")
+    _checks.folder("path", str(tmp_path), ["old", "new"])
+    assert list(tmp_path.iterdir()) == [old]
+    assert (old.read_bytes(), old.stat().st_mtime) == (b"kept", 1e9)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no such files here")
+def test_what_is_no_file_is_not_opened_twice(tmp_path: Path) -> None:
+    """A pipe would wait for its reader."""
+    os.mkfifo(tmp_path / "pipe")
+    begin = time.perf_counter()
+    _checks.file("path", tmp_path / "pipe")
+    _checks.file("path", os.devnull)
+    assert time.perf_counter() - begin < 1.0
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_what_may_not_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").touch(0o400)
+    (tmp_path / "folder").mkdir(0o500)
+    for path in (tmp_path / "file", tmp_path / "folder" / "x"):
+        with pytest.raises(ArgumentError, match="Permission denied"):
+            _checks.file("path", path)
+    with pytest.raises(ArgumentError, match="Permission denied"):
+        _checks.folder("path", tmp_path / "folder" / "deep")

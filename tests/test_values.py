@@ -1,0 +1,224 @@
+"""Public objects are what they hold: equal by value, and the same after a copy or a pickle."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import warnings
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from stepwell import charts
+from stepwell._value import Value, same
+
+FREE = sw.Oscillator(omega=2.0)
+BODIES = sw.NBody([3.0, 4.0, 5.0], force="newton", softening=0.1)
+STATE: dict[str, Any] = {"v": 0.0, "y": np.array([[1.0, 3.0], [-2.0, -1.0], [1.0, -1.0]]), "dt": 0.01}
+
+
+def quiet(make: Callable[[], Any]) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return make()
+
+
+def diverged() -> sw.Run:
+    y = np.stack([STATE["y"], np.zeros((3, 2))], axis=-1)  # the second member's bodies meet
+    return quiet(
+        lambda: sw.integrate(BODIES.__class__([3.0, 4.0, 5.0]), "verlet", **STATE | {"y": y}, steps=5, every=2, record="energy")
+    )
+
+
+@cache
+def point() -> charts.WorkPrecision:
+    return charts.work_precision("oscillator", ["false_euler"], [100])
+
+
+#: How to make one of each, and others of the class that differ in one thing.
+MAKERS: dict[str, list[Callable[[], Any]]] = {
+    "Oscillator": [
+        sw.Oscillator,
+        lambda: sw.Oscillator(2.0),
+        lambda: sw.Oscillator(damping=0.0),
+        lambda: sw.Oscillator(form="physical"),
+        lambda: sw.Oscillator([1.0, 2.0]),
+        lambda: sw.Oscillator([1.0, 3.0]),
+        lambda: sw.Oscillator([[1.0], [2.0]]),
+        lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 2.0)),
+        lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 3.0)),
+        lambda: sw.Oscillator(a=sw.Sampled([1.0, 2.0], 0.1)),
+    ],
+    "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
+    "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
+    "Chain": [
+        lambda: sw.Chain(3),
+        lambda: sw.Chain(4),
+        lambda: sw.Chain(3, mass=2.0),
+        lambda: sw.Chain(3, stiffness=[1, 2, 3, 4]),
+    ],
+    "LinearSystem": [
+        lambda: sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]]),
+        lambda: sw.LinearSystem([[0.0, -2.0], [1.0, 0.0]]),
+        lambda: sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]], [1.0, 0.0], x=1.0),
+        lambda: sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]], velocities=[1]),
+    ],
+    "NBody": [
+        sw.NBody,
+        lambda: sw.NBody(force="newton"),
+        lambda: sw.NBody(dim=3),
+        lambda: sw.NBody([1.0, 1.0]),
+        lambda: sw.NBody(G=2.0),
+        lambda: quiet(lambda: sw.integrate(BODIES, "rk4", **STATE, steps=1, control=sw.Projection())).system,
+        lambda: quiet(lambda: sw.integrate(BODIES, "rk4", **STATE, steps=1, control=sw.EnergyControl(0.1))).system,
+    ],
+    "Sinusoid": [lambda: sw.Sinusoid(1.0, 2.0), lambda: sw.Sinusoid(1.0, 2.0, 0.5)],
+    "Sampled": [lambda: sw.Sampled([1.0], 0.1), lambda: sw.Sampled([1.0], 0.2), lambda: sw.Sampled([2.0], 0.1)],
+    "EnergyControl": [
+        lambda: sw.EnergyControl(0.1),
+        lambda: sw.EnergyControl(relative=0.1),
+        lambda: sw.EnergyControl(0.1, "printed"),
+        lambda: sw.EnergyControl(0.1, target=1.0),
+    ],
+    "Projection": [sw.Projection, lambda: sw.Projection("nacozy"), lambda: sw.Projection(target=[1.0, 2.0])],
+    "Run": [
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]),
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]),
+        diverged,
+    ],
+    "Paces": [
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).paces,
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).paces,
+    ],
+    "AdaptiveState": [
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]).stand,
+        lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]).stand,
+    ],
+    "Mode": [
+        lambda: sw.stability_limit(FREE, "false_euler").mode,
+        lambda: sw.stability_limit(FREE, "rk4").mode,
+    ],
+    "At": [lambda: sw.criteria(["rk4"])[0].at[0], lambda: sw.criteria(["false_euler"])[0].at[0]],
+    "Explanation": [
+        lambda: sw.explain(FREE, "rk4"),
+        lambda: sw.explain(FREE, "verlet"),
+        lambda: sw.explain(FREE, "rk4", members=9),
+        lambda: sw.explain(FREE, "rk4", fused=True),
+        lambda: sw.explain(FREE, "merson", attempt=True),
+        lambda: sw.explain(sw.Chain(1000), "rk4"),
+    ],
+    "Method": [lambda: sw.method("rk4"), lambda: sw.method("verlet")],
+    "Scene": [lambda: sw.Scene(sw.Oscillator(), v=0.0, y=1.0, until=9.0), lambda: sw.scenes.kepler(), lambda: sw.scenes.clover()],
+    "Status": [lambda: sw.Status.OK, lambda: sw.Status.UNDERFLOW],
+    "WorkPrecision's curve": [lambda: point().curves[0]],
+    "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
+    "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
+    "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
+    "Powers": [lambda: charts.powers("rk4")],  # with measured times
+    "Solved": [
+        lambda: charts.Solved(np.ones(2), np.ones(2), None, 0.1),
+        lambda: charts.Solved(np.ones(2), np.ones(3), None, 0.1),
+    ],
+}
+
+MAKERS["any system"] = [partial(make, np.random.default_rng(1), 2) for make in SYSTEMS.values()]
+
+PAIRS = [pytest.param(make, id=f"{name} {i}") for name, makers in MAKERS.items() for i, make in enumerate(makers)]
+
+
+@pytest.mark.parametrize("make", PAIRS)
+def test_a_copy_is_the_same(make: Callable[[], Any]) -> None:
+    one = make()
+    for other in (
+        copy.copy(one),
+        copy.deepcopy(one),
+        *(pickle.loads(pickle.dumps(one, k)) for k in (2, pickle.HIGHEST_PROTOCOL)),
+    ):
+        assert type(other) is type(one)
+        assert other == one
+        assert (other != one) is False  # a named tuple has both apart
+        assert hash(other) == hash(one)
+        assert repr(other) == repr(one)
+    assert one != 1
+    assert one != "one"
+
+
+@pytest.mark.parametrize("name", [name for name, makers in MAKERS.items() if len(makers) > 1 and name != "any system"])
+def test_others_are_not(name: str) -> None:
+    ones, twos = ([make() for make in MAKERS[name]] for _ in range(2))
+    for i, a in enumerate(ones):
+        for k, b in enumerate(twos):
+            assert (a == b) is (i == k), (i, k)
+
+
+def test_every_public_class_is_here() -> None:
+    """Exceptions are Python's own, a world is no value; advice and stability are elsewhere."""
+    public = {name for module in (sw, charts) for name in module.__all__ if isinstance(getattr(module, name), type)}
+    elsewhere = {name for name in public if issubclass(getattr(sw, name, int), (Exception, Warning))} | {"World", "System"}
+    parts = {
+        "Curve",
+        "Held",
+        "Locus",
+        "Observation",
+        "Panel",
+        "Peer",
+        "Point",
+        "Samples",
+        "Timing",
+        "WorkPrecision",
+        "ControlSweep",
+    }
+    elsewhere |= {name for name in public if issubclass(getattr(sw, name, int), sw.System)}  # each is among the cases
+    assert public - elsewhere - parts - {"RunPicture"} <= set(MAKERS)
+    for name in parts | {"RunPicture"}:
+        assert issubclass(getattr(charts, name), Value)
+
+
+def test_a_method_is_one_of_its_kind() -> None:
+    for method in sw.methods():
+        assert pickle.loads(pickle.dumps(method)) is copy.deepcopy(method) is copy.copy(method) is method
+
+
+def test_collisions_after_a_pickle() -> None:
+    run = diverged()
+    assert run.collisions
+    assert pickle.loads(pickle.dumps(run)).collisions == run.collisions
+
+
+def test_a_run_under_a_bar_can_be_pickled() -> None:
+    """The bar is gone by then, and what finds collisions must not hold it."""
+    pytest.importorskip("rich")
+    run = sw.integrate(BODIES, "rk4", **STATE, steps=5, progress=True)
+    assert pickle.loads(pickle.dumps(run)) == run
+
+
+def test_a_pickled_state_goes_on() -> None:
+    first = sw.integrate(BODIES, "rk4", **STATE | {"v": 0.1}, steps=5, control=sw.EnergyControl(relative=0.1))
+    state = pickle.loads(pickle.dumps(first.resume))
+    a, b = (sw.integrate(BODIES, "rk4", steps=5, **each) for each in (state, first.resume))
+    assert a == b
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "equal"),
+    [
+        (np.array([1.0, np.nan]), np.array([1.0, np.nan]), True),
+        (np.array([1.0]), np.array([1]), False),
+        (np.array([1.0]), 1.0, False),
+        (np.ones((2, 1)), np.ones(2), False),
+        (np.nan, float("nan"), True),
+        ({"a": (1, [np.nan])}, {"a": (1, [float("nan")])}, True),
+        ({"a": 1}, {"b": 1}, False),
+        ([1], (1,), False),
+        ((1, 2), (1,), False),
+        (np.array(["a"]), np.array(["a"]), True),
+    ],
+)
+def test_same(a: Any, b: Any, equal: bool) -> None:
+    assert same(a, b) is same(b, a) is equal

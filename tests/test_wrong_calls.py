@@ -1,0 +1,413 @@
+"""Wrong calls by the hundred: each argument of every public function, given what it is not made for.
+
+Such a call either works or ends, quickly, in one of stepwell's own errors that names an argument. Everything raw that is raised
+by something below (NumPy, the core, Python inside a function) is a failure of the checks.
+"""
+
+from __future__ import annotations
+
+import datetime
+import inspect
+import random
+import signal
+import time
+import warnings
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import charts, stability
+
+#: What a call may take: ten times what the slowest right one does on a busy machine. What takes longer was accepted and works.
+SECONDS = 1.0
+
+
+class Refuses:
+    """Something that NumPy asks for an array, and that has none."""
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("no array here")
+
+
+def _misaligned(shape: tuple[int, ...]) -> Any:
+    size = int(np.prod(shape))
+    return np.frombuffer(b"x" + np.ones(size).tobytes(), np.float64, offset=1).reshape(shape)
+
+
+def _recursive() -> Any:
+    whole: list[Any] = []
+    whole.append(whole)
+    return whole
+
+
+def _readonly() -> Any:
+    array = np.ones(3)
+    array.flags.writeable = False
+    return array
+
+
+def _matrix() -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        return np.asmatrix(np.ones((2, 2)))
+
+
+RAGGED: Any = [[1.0], [1.0, 2.0]]
+
+#: What is given in the place of each argument.
+JUNK: dict[str, Callable[[], Any]] = {
+    "None": lambda: None,
+    "True": lambda: True,
+    "NumPy's True": lambda: np.True_,
+    "0": lambda: 0,
+    "-1": lambda: -1,
+    "10**12": lambda: 10**12,
+    "2**70": lambda: 2**70,
+    "10**400": lambda: 10**400,
+    "10**5000": lambda: 10**5000,
+    "1.5": lambda: 1.5,
+    "0.0": lambda: 0.0,
+    "the least float": lambda: 5e-324,
+    "the largest float": lambda: 1.7e308,
+    "nan": lambda: float("nan"),
+    "inf": lambda: float("inf"),
+    "-inf": lambda: -np.inf,
+    "1j": lambda: 1j,
+    "junk": lambda: "junk",
+    "a long word": lambda: "x" * 10**6,
+    "no word": lambda: "",
+    "a number in words": lambda: "1.0",
+    "bytes": lambda: b"rk4",
+    "[]": list,
+    "[[]]": lambda: [[]],
+    "()": lambda: (),
+    "{}": dict,
+    "a set": lambda: {1.0},
+    "a mapping": lambda: {"a": 1},
+    "an object": object,
+    "a class": lambda: sw.Oscillator,
+    "a function": lambda: lambda *_: None,
+    "a module": lambda: np,
+    "a generator": lambda: (x for x in "ab"),
+    "ragged": lambda: RAGGED,
+    "recursive": _recursive,
+    "refuses": Refuses,
+    "['rk4', 3]": lambda: ["rk4", 3],
+    "[None]": lambda: [None],
+    "[nan]": lambda: [float("nan")],
+    "a range": lambda: range(3),
+    "a fraction": lambda: Fraction(1, 3),
+    "a decimal": lambda: Decimal(1),
+    "a date": lambda: datetime.date(2002, 1, 1),
+    "a path": lambda: Path("x"),
+    "empty": lambda: np.zeros(0),
+    "empty too": lambda: np.zeros((2, 0)),
+    "(3,)": lambda: np.ones(3),
+    "(7,)": lambda: np.full(7, 0.5),
+    "(2, 3)": lambda: np.ones((2, 3)),
+    "(1000, 1)": lambda: np.ones((1000, 1)),
+    "26 axes": lambda: np.ones((1,) * 26),
+    "32 axes": lambda: np.ones((1,) * 32),
+    "0 axes": lambda: np.array(0.5),
+    "words": lambda: np.array(["rk4", "x"]),
+    "a word of an array": lambda: np.array("rk4"),
+    "objects": lambda: np.array([1.0, None], dtype=object),
+    "numbers as objects": lambda: np.array([1.0, 2**70], dtype=object),
+    "complex": lambda: np.ones(3, complex),
+    "truths": lambda: np.array([True, False]),
+    "dates": lambda: np.array(["2002-01-01"], dtype="datetime64[D]"),
+    "a record": lambda: np.zeros(3, dtype=[("a", float)]),
+    "masked": lambda: np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False]),
+    "all masked": lambda: np.ma.masked,
+    "a matrix": _matrix,
+    "other byte order": lambda: np.ones(3, ">f8"),
+    "half": lambda: np.ones(3, np.float16),
+    "long double": lambda: np.ones(3, np.longdouble),
+    "too long double": lambda: np.full(3, np.finfo(np.longdouble).max),
+    "int8": lambda: np.ones(3, np.int8),
+    "uint64": lambda: np.full(3, 2**64 - 1, np.uint64),
+    "read-only": _readonly,
+    "backwards": lambda: np.ones(3)[::-1],
+    "every other": lambda: np.ones(6)[::2],
+    "misaligned": lambda: _misaligned((3,)),
+    "misaligned too": lambda: _misaligned((3, 2)),
+    "one number wide": lambda: np.broadcast_to(np.float64(1.0), (3,)),
+    "a system": lambda: sw.Pendulum(),
+    "a control": lambda: sw.EnergyControl(0.1),
+    "an input": lambda: sw.Sampled(np.ones((2, 5)), 0.1),
+    "a method": lambda: sw.method("verlet"),
+    "a run": lambda: sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=np.ones(2), dt=0.1, steps=2),
+    "a scene": lambda: sw.scenes.clover(),
+}
+
+FREE: dict[str, Any] = {"system": sw.Oscillator(), "method": "rk4", "v": 0.0, "y": 1.0}
+BODIES: dict[str, Any] = {"system": sw.NBody(), "method": "rk4", "v": 0.0, "y": np.arange(6.0).reshape(3, 2)}
+PLANE = [[0.0, -1.0], [1.0, 0.0]]
+OF_METHODS = {"methods": ["rk4"]}
+KEPLER = sw.scenes.kepler()
+
+
+def _world(**given: Any) -> sw.World:
+    arrays = {name: np.full(3, given[name]) for name in ("v", "y") if isinstance(given.get(name), float)}
+    return sw.World(**given | arrays)
+
+
+def _of_run(name: str) -> Callable[..., Any]:
+    return getattr(sw.integrate(**FREE, dt=0.1, steps=3, every=1), name)
+
+
+#: Every public function and class that users call, with arguments that are right and quick. Several entries of one name are
+#: several ways to call it, told apart by what follows a blank.
+CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+    "Oscillator": (sw.Oscillator, {"omega": 1.0, "damping": 0.1, "x": 0.0, "a": 0.0, "form": "physical"}),
+    "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
+    "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
+    "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
+    "LinearSystem": (
+        sw.LinearSystem,
+        {"A": PLANE, "B": [[1.0], [0.0]], "C": [[1.0, 0.0]], "D": [[1.0]], "x": [1.0], "velocities": 1},
+    ),
+    "LinearSystem.split": (sw.LinearSystem(PLANE).split, {"state": [1.0, 0.0]}),
+    "LinearSystem.state": (sw.LinearSystem(PLANE).state, {"v": [1.0], "y": [0.0]}),
+    "NBody": (sw.NBody, {"masses": [1.0, 1.0], "force": "newton", "G": 1.0, "softening": 0.1, "dim": 2}),
+    "Sinusoid": (sw.Sinusoid, {"amplitude": 1.0, "omega": 1.0, "phase": 0.0}),
+    "Sampled": (sw.Sampled, {"values": [1.0, 2.0], "interval": 0.1, "start": 0.0}),
+    "EnergyControl": (sw.EnergyControl, {"gain": 0.1, "form": "limited", "target": 1.0}),
+    "EnergyControl relative": (sw.EnergyControl, {"relative": 0.1}),
+    "Projection": (sw.Projection, {"way": "scaling", "target": 1.0}),
+    "method": (sw.method, {"name": "rk4"}),
+    "integrate": (
+        sw.integrate,
+        FREE
+        | {"dt": 0.1, "steps": 10, "every": 2, "record": ["energy"], "t0": 0.0, "start_step": 0, "threads": 1, "backend": "rust"}
+        | {
+            "form": "direct",
+            "progress": False,
+            "start": None,
+            "carry": None,
+            "carried_by": None,
+            "first_bad_step": None,
+            "dt_before": None,
+        }
+        | {"control": None, "tolerance": None, "at": None, "max_steps": None},
+    ),
+    "integrate bodies": (
+        sw.integrate,
+        BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
+    ),
+    "integrate Verlet": (
+        sw.integrate,
+        FREE
+        | {
+            "method": "verlet",
+            "dt": 0.1,
+            "steps": 10,
+            "start": "first_order",
+            "carry": 1.0,
+            "carried_by": "verlet",
+            "backend": "numpy",
+        },
+    ),
+    "integrate matrix": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "form": "matrix"}),
+    "integrate power": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "form": "power", "every": 5}),
+    "integrate tolerance": (
+        sw.integrate,
+        FREE
+        | {"method": "merson", "tolerance": (1e-3, 1e-3), "at": [0.5, 1.0], "max_steps": 100, "dt": 0.1, "threads": 1}
+        | {"t0": 0.0, "record": ["energy"], "backend": "rust", "progress": False},
+    ),
+    "Run.quantity": (_of_run("quantity"), {"name": "energy"}),
+    "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None}),
+    "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
+    "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
+    "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),
+    "scenes.forced_oscillator": (
+        sw.scenes.forced_oscillator,
+        {"omega": 1.0, "damping": 0.1, "amplitude": 1.0, "drive": 0.7, "phase": 0.5},
+    ),
+    "scenes.kepler": (sw.scenes.kepler, {"e": 0.9, "share": 0.5}),
+    "scenes.oscillator": (sw.scenes.oscillator, {"omega": 1.0}),
+    "scenes.pendulum": (sw.scenes.pendulum, {"amplitude": 90.0, "omega": 1.0}),
+    "scenes.plummer": (sw.scenes.plummer, {"n": 8, "seed": 1, "softening": 0.05}),
+    "Scene": (sw.Scene, {"system": sw.Oscillator(), "v": 0.0, "y": 1.0, "until": 10.0}),
+    "Scene.run": (KEPLER.run, {"method": "rk4", "dt": 0.1, "steps": 10, "every": None, "control": None}),
+    "Scene.steps_for": (KEPLER.steps_for, {"dt": 0.1}),
+    "Scene.state_error": (KEPLER.state_error, {"run": KEPLER.run("rk4", 0.1, steps=3)}),
+    "Scene.energy_error": (KEPLER.energy_error, {"run": KEPLER.run("rk4", 0.1, steps=3)}),
+    "Scene.amplitude": (KEPLER.amplitude, {"run": KEPLER.run("rk4", 0.1, steps=3)}),
+    "analyse": (sw.analyse, {"system": sw.Oscillator(), "method": "rk4", "dt": 0.1, "at": None, "t": 0.0}),
+    "analyse at": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "at": (0.0, 1.0), "t": 0.0}),
+    "stability_limit": (sw.stability_limit, {"system": sw.Oscillator(), "method": "rk4", "at": None, "t": 0.0}),
+    "stability_limit at": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "at": (0.0, 1.0), "t": 0.0}),
+    "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
+    "explain": (
+        sw.explain,
+        {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False},
+    ),
+    "explain bodies": (sw.explain, {"system": sw.NBody(), "method": "rk4", "members": 2, "control": sw.EnergyControl(0.1)}),
+    "stability.operations": (stability.operations, {"method": "rk4", "system": sw.Oscillator()}),
+    "stability.series": (stability.series, {"method": "rk4"}),
+    "advise": (
+        sw.advise,
+        {
+            "scene": "oscillator",
+            "frame": 0.1,
+            "tolerance": 0.1,
+            "budget": None,
+            "methods": ["rk4"],
+            "cost": "evaluations",
+            "fixed": True,
+        },
+    ),
+    "charts.figures": (charts.figures, OF_METHODS | {"phi": 0.5, "periods": 2.0}),
+    "charts.stability": (charts.stability, OF_METHODS | {"phi": [0.1, 0.2]}),
+    "charts.stability_map": (charts.stability_map, {"method": "rk4", "phi": (0.0, 3.0), "damping": (0.0, 1.0), "size": 16}),
+    "charts.powers": (
+        charts.powers,
+        {"method": "rk4", "system": None, "v": 0.0, "y": 1.0, "dt": 0.3, "steps": [1, 10], "progress": None},
+    ),
+    "charts.run_picture": (charts.run_picture, {"scene": KEPLER, "run": KEPLER.run("rk4", 0.1, steps=9, every=3)}),
+    "charts.control": (
+        charts.control,
+        {"scene": KEPLER, "methods": ["rk4"], "v": None, "y": None, "horizon": 1.0, "evaluations": 100, "relative": [0.1]}
+        | {"exact": None, "forms": ["limited"], "ways": ["scaling"], "title": None, "progress": None},
+    ),
+    "charts.work_precision": (
+        charts.work_precision,
+        {"scene": "oscillator", "methods": ["false_euler"], "steps": [100], "tolerances": [], "peers": [], "progress": None},
+    ),
+    "charts.panel": (charts.panel, {"scenes": ["oscillator"], "methods": ["false_euler"], "steps": [100], "progress": None}),
+    "charts.Peer": (charts.Peer, {"name": "a", "solve": len, "settings": [0.1], "by": "step", "order": 1}),
+    "charts.peers.peer": (charts.peers.peer, {"given": len}),
+    "charts.peers.scipy": (charts.peers.scipy, {"method": "RK45", "settings": [1e-3]}),
+    "charts.peers.rebound": (charts.peers.rebound, {"integrator": "ias15", "settings": [1e-3]}),
+    "charts.peers.heyoka": (charts.peers.heyoka, {"settings": [1e-3]}),
+}
+
+
+#: A system that is not there has arguments with defaults.
+for _name, _each in vars(sw).items():
+    if isinstance(_each, type) and issubclass(_each, sw.System) and _each is not sw.System and _name not in CALLS:
+        CALLS[_name] = _each, {name: each.default for name, each in inspect.signature(_each).parameters.items()}
+
+timer = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer here")
+
+
+class TookLongError(Exception):
+    """A call was accepted and works."""
+
+
+def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: Callable[[], Any]) -> str | None:
+    """What is wrong with how a call treats something strange, or None."""
+
+    def enough(*_: Any) -> None:
+        raise TookLongError
+
+    value = make()
+    before = signal.signal(signal.SIGALRM, enough)
+    signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    begin = time.perf_counter()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for kind in (sw.DivergenceWarning, sw.ToleranceWarning, sw.ControlWarning, sw.AccuracyWarning):
+                warnings.simplefilter("ignore", kind)
+            call(**given | {argument: value})
+    except TookLongError:
+        return None
+    except sw.StepwellError as error:
+        text, took = str(error), time.perf_counter() - begin
+        if took > SECONDS:
+            return f"refused after {took:.1f} s: {text[:200]}"
+        if len(text) > 1500:
+            return f"a message of {len(text)} characters: {text[:200]}"
+        names = [argument, *given, "method", "scene", "peers", "not installed"]
+        return None if any(name in text for name in names) else f"names no argument: {text[:200]}"
+    except BaseException as error:  # a panic of the core is no Exception
+        return f"{type(error).__name__}: {str(error)[:200]}"
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    return None
+
+
+#: What is known and left: steps so long that the elements of P overflow are not refused, and NumPy warns of them.
+KNOWN = {("analyse at", "dt", "10**12")}
+
+#: Which of them an ordinary run of the tests takes: every so manieth, others for each argument.
+SHARE = 7
+
+
+def calls(share: int) -> list[Any]:
+    """Calls with one strange argument, and what it is given."""
+    arguments = [(name, call, given, argument) for name, (call, given) in CALLS.items() for argument in given]
+    return [
+        pytest.param(
+            call,
+            given,
+            argument,
+            [each for each in list(JUNK)[i % share :: share] if (name, argument, each) not in KNOWN],
+            id=f"{name}: {argument}",
+        )
+        for i, (name, call, given, argument) in enumerate(arguments)
+    ]
+
+
+def check(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
+    bad = {name: text for name in junk if (text := wrong(call, given, argument, JUNK[name])) is not None}
+    assert not bad, "\n" + "\n".join(f"{argument} = {name}: {text}" for name, text in bad.items())
+
+
+@timer
+@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls(SHARE))
+def test_some_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
+    check(call, given, argument, junk)
+
+
+@timer
+@pytest.mark.long
+@pytest.mark.parametrize(("call", "given", "argument", "junk"), calls(1))
+def test_all_work_or_say_what_is_wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, junk: list[str]) -> None:
+    check(call, given, argument, junk)
+
+
+@timer
+def test_several_strange_arguments_at_once() -> None:
+    """What is looked at first may hide what comes next: two to four arguments of ``integrate``, drawn once and for all."""
+    draw = random.Random(1)
+    names = [name for name in CALLS if name.startswith("integrate")]
+    for _ in range(2000):
+        call, given = CALLS[name := draw.choice(names)]
+        chosen = {argument: draw.choice(list(JUNK)) for argument in draw.sample(list(given), draw.randint(2, 4))}
+        (last, junk), *others = chosen.items()
+        text = wrong(call, given | {argument: JUNK[each]() for argument, each in others}, last, JUNK[junk])
+        assert text is None, f"{name} with {chosen}: {text}"
+
+
+def test_right_calls_are_right() -> None:
+    """Else what is strange would hide behind what is wrong anyway; peers are not installed everywhere."""
+    for name, (call, given) in CALLS.items():
+        if not name.startswith("charts.peers."):
+            call(**given)
+
+
+def test_every_public_function_is_here() -> None:
+    """And every class that users make, which is what has no base beside ``Exception`` and is not returned by a function."""
+    modules = (sw, charts, stability, charts.peers, sw.scenes)
+    every = {name: getattr(module, name) for module in modules for name in dir(module) if not name.startswith("_")}
+    made = (sw.System, sw.Sinusoid, sw.Sampled, sw.EnergyControl, sw.Projection, charts.Peer, sw.Scene)
+    wanted = {
+        name
+        for name, each in every.items()
+        if getattr(each, "__module__", "").startswith("stepwell.")
+        and (inspect.isfunction(each) or (isinstance(each, type) and issubclass(each, made)))
+        and inspect.signature(each).parameters
+    }
+    here = {call for call, _ in CALLS.values()}
+    assert {name for name in wanted if every[name] not in here} <= {"known", "count", "numbers", "short", "same"}, "imported"
+    assert len(wanted) > 30
