@@ -43,7 +43,8 @@ class World:
 
     ``step(n)`` steps in place and allocates nothing: it is meant for the few microseconds of a frame, and keeps the GIL for
     them. A method that carries something else than v (Verlet, leapfrog) keeps it inside; if you change ``v`` or ``y`` between
-    steps, it starts anew from what you wrote. Ctrl-C leaves the world at the last step that was made whole.
+    steps, it starts anew from what you wrote. Ctrl-C leaves the world at the last step that was made whole, or the
+    one before (leapfrog of many bodies, whose velocity there would take long to find).
     Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that goes on from where this one stands.

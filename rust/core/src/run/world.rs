@@ -14,8 +14,8 @@ struct Share {
     group: Box<dyn Group>,
     first: usize,
     count: usize,
-    /// Both slots before the step that is being made, if that can be stopped.
-    before: (Vec<f64>, Vec<f64>),
+    /// Both slots before the step that is being made, if that can be stopped, and before the one that was made last.
+    before: [(Vec<f64>, Vec<f64>); 2],
 }
 
 impl Share {
@@ -91,8 +91,9 @@ impl World {
             group.prepare(&model.spec, first, count);
             group.compile_now();
             group.heed(&stop);
-            let before =
-                if patience.is_none() { (group.slots().0.to_vec(), group.slots().1.to_vec()) } else { Default::default() };
+            let before = std::array::from_fn(|_| {
+                if patience.is_none() { (group.slots().0.to_vec(), group.slots().1.to_vec()) } else { Default::default() }
+            });
             shares.push(Share { group, first, count, before });
             first += count;
         }
@@ -173,7 +174,7 @@ impl World {
     }
 
     /// As `step`, by another thread. When the monitor, which is called on this one, answers no, the world stays at the last step that
-    /// was made whole.
+    /// was made whole or, where its velocities would take long to find, at the one before.
     pub fn step_in_background(
         &mut self,
         n: i64,
@@ -201,9 +202,10 @@ impl World {
         }
         let mut made = 0;
         while made < n {
-            for Share { group, before: (v, y), .. } in &mut self.shares {
-                v.copy_from_slice(group.slots().0);
-                y.copy_from_slice(group.slots().1);
+            for Share { group, before, .. } in &mut self.shares {
+                before.swap(0, 1);
+                before[0].0.copy_from_slice(group.slots().0);
+                before[0].1.copy_from_slice(group.slots().1);
                 group.advance(from + made, 1);
             }
             if !go_on(1) {
@@ -215,13 +217,16 @@ impl World {
             self.step = from + n;
             return Ok(());
         }
-        for Share { group, before: (v, y), .. } in &mut self.shares {
+        // The arrays are still those of the start. To bring them to where the slots are takes, of a method that carries something else
+        // than v, a rate there, which cannot be stopped. Systems whose rates take long keep the last that they found: that of the
+        // step made last, so it is the state before that step that can be shown at once.
+        let back = usize::from(self.carries && 0 < made && made < n);
+        for Share { group, before, .. } in &mut self.shares {
+            let (v, y) = &before[back];
             group.slots_mut().0.copy_from_slice(v);
             group.slots_mut().1.copy_from_slice(y);
         }
-        made = made.min(n - 1);
-        // The arrays are still those of the start. To bring them to where the slots are takes one rate of a method that carries
-        // something else than v, which cannot be stopped.
+        made = (made - back as i64).min(n - 1);
         if made > 0 {
             self.stop.store(false, Relaxed);
             self.publish(from + made, v, y);

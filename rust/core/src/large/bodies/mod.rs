@@ -41,9 +41,11 @@ struct Bodies {
     shares: Vec<Share>,
     record: Vec<Quantity>,
     stop: Stop,
-    /// Places whose forces and potentials are at hand, until others are asked for: those of a state that is projected or
-    /// recorded, at which the next step begins.
-    at_hand: bool,
+    /// Whether `dv` are the forces at `y`: a state that is projected or recorded, at which the next step begins; of many bodies the
+    /// last that was asked for, so that a run that is stopped within a step has the forces at the end of the step before.
+    has_forces: bool,
+    /// Whether `potential` is at these places, too.
+    has_potentials: bool,
     y: Vec<f64>,
     dv: Vec<f64>,
 }
@@ -75,7 +77,8 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         slabs,
         record: asked.record.iter().filter_map(|name| Quantity::named(name)).collect(),
         stop: Stop::default(),
-        at_hand: false,
+        has_forces: false,
+        has_potentials: false,
         y: Vec::new(),
         dv: Vec::new(),
     })
@@ -108,19 +111,33 @@ impl Bodies {
         }
     }
 
-    /// Whether the forces and potentials of these places are at hand.
-    fn has(&self, y: &[f64]) -> bool {
-        self.at_hand && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
+    /// Whether the forces at these places, and the potentials if they are wanted, are at hand.
+    fn has(&self, energy: bool, y: &[f64]) -> bool {
+        self.has_forces
+            && (self.has_potentials || !energy)
+            && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
     /// Finds the forces, if they are not at hand.
     fn find(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
-        if self.has(y) {
+        if self.has(energy, y) {
             out[..y.len()].copy_from_slice(&self.dv);
-        } else {
-            self.at_hand = false;
-            self.meet(energy, y, out);
+            return;
         }
+        self.has_potentials &= !energy;
+        self.meet(energy, y, out);
+        if self.n >= THREADED && !self.stop.load(Relaxed) {
+            self.dv.clear();
+            self.dv.extend_from_slice(&out[..y.len()]);
+            self.keep(energy, y);
+        }
+    }
+
+    /// `dv` are the forces at these places.
+    fn keep(&mut self, energy: bool, y: &[f64]) {
+        self.y.clear();
+        self.y.extend_from_slice(y);
+        (self.has_forces, self.has_potentials) = (true, energy);
     }
 
     fn gradient_in<const D: usize>(&self, v: &[f64], dv: &[f64], along_v: &mut [f64], along_y: &mut [f64]) -> f64 {
@@ -147,7 +164,7 @@ impl Rates for Bodies {
             self.mass[i] = row("masses", i);
             self.half[i] = (0.5 * self.h) * self.mass[i];
         }
-        self.at_hand = false;
+        (self.has_forces, self.has_potentials) = (false, false);
     }
 
     fn heed(&mut self, stop: &Stop) {
@@ -159,13 +176,15 @@ impl Rates for Bodies {
     }
 
     fn cache_forces(&mut self, y: &[f64]) {
-        if !self.has(y) {
+        if !self.has(true, y) {
             let mut dv = std::mem::take(&mut self.dv);
             dv.resize(y.len(), 0.0);
+            (self.has_forces, self.has_potentials) = (false, false);
             self.meet(true, y, &mut dv);
-            (self.dv, self.at_hand) = (dv, !self.stop.load(Relaxed));
-            self.y.clear();
-            self.y.extend_from_slice(y);
+            self.dv = dv;
+            if !self.stop.load(Relaxed) {
+                self.keep(true, y);
+            }
         }
     }
 
