@@ -113,9 +113,7 @@ impl Bodies {
 
     /// Whether the forces at these places, and the potentials if they are wanted, are at hand.
     fn has(&self, energy: bool, y: &[f64]) -> bool {
-        self.has_forces
-            && (self.has_potentials || !energy)
-            && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
+        self.has_forces && (self.has_potentials || !energy) && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
     /// Finds the forces, if they are not at hand.
