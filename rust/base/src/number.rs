@@ -68,7 +68,7 @@ pub trait Number:
 
     /// Held between two constants; a NaN stays one.
     #[must_use]
-    fn held(self, least: f64, most: f64) -> Self {
+    fn clamped(self, least: f64, most: f64) -> Self {
         let (least, most) = (Self::of(least), Self::of(most));
         let x = Self::choose(self.below(least), least, self);
         Self::choose(most.below(x), most, x)

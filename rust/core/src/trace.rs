@@ -9,7 +9,7 @@ use std::{
 use crate::{
     controls,
     error::Error,
-    large::{Facts, STRAIGHT, group::Courses, tapes::Rated},
+    large::{Facts, MAX_TAPE_OPERATIONS, group::Courses, tapes::Rated},
     method::Record,
     number::{Number, Symbol, record},
     pace::{Pace, attempt},
@@ -304,8 +304,8 @@ impl Scene {
         Cache::find(CACHE.get_or_init(Mutex::default), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
-            if self.fused && operations.1 > STRAIGHT {
-                return Err(Error::TooLongToFuse { operations: operations.1, most: STRAIGHT });
+            if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
@@ -324,18 +324,18 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            Ok((traced, operations.1.min(4 * STRAIGHT)))
+            Ok((traced, operations.1.min(4 * MAX_TAPE_OPERATIONS)))
         })
     }
 }
 
-/// Operations of a step that take longer than a user who wants to stop should wait, or nearly so.
-const LONG_STEP: usize = 1 << 24;
+/// Operations of a step from which on it may take so long that Ctrl-C must be answered within it.
+const LONG_STEP_OPERATIONS: usize = 1 << 24;
 
 impl Traced {
     /// Whether a step of so many members may take long.
     pub fn is_long(&self, members: usize) -> bool {
-        self.operations.1.saturating_mul(members) >= LONG_STEP
+        self.operations.1.saturating_mul(members) >= LONG_STEP_OPERATIONS
     }
 
     /// How many steps of so many members have that many operations; one or more.
@@ -411,11 +411,11 @@ impl Scene {
     }
 }
 
-/// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each
-/// interleaved vector, as machine code. When something new would pass it, what was there is forgotten.
-const MOST_OPERATIONS: usize = 200_000;
+/// The most operations of all tapes in a cache: about 50 bytes each on the tape, and at most as much again, for each interleaved vector,
+/// as machine code. When a new entry would exceed it, the cache is emptied first.
+const MAX_CACHED_OPERATIONS: usize = 200_000;
 
-/// Rates, by the system and what is recorded of it: methods have them in common.
+/// The cache of rates, by the system and its recorded quantities; all methods share it.
 fn rated() -> &'static Mutex<RatedCache> {
     static CACHE: OnceLock<Mutex<RatedCache>> = OnceLock::new();
     CACHE.get_or_init(Mutex::default)
@@ -435,9 +435,9 @@ impl<K, V> Default for Cache<K, V> {
 }
 
 impl<K: Clone + Eq + Hash, V> Cache<K, V> {
-    /// What belongs to a key; it is made, with its number of operations, if it is not there.
+    /// The value of a key. If it is missing, `make` makes it and returns it with its number of operations.
     fn find(cache: &Mutex<Self>, key: &K, make: impl FnOnce() -> Result<(V, usize), Error>) -> Result<Arc<V>, Error> {
-        // A thread that panicked while it held the lock has left a map that is whole: entries are made outside.
+        // A thread that panicked while it held the lock has left the map intact: entries are made outside the lock.
         let lock = || cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().known.get(key) {
             return Ok(Arc::clone(known));
@@ -445,7 +445,7 @@ impl<K: Clone + Eq + Hash, V> Cache<K, V> {
         let (made, size) = make()?;
         let made = Arc::new(made);
         let mut cache = lock();
-        if cache.operations + size > MOST_OPERATIONS {
+        if cache.operations + size > MAX_CACHED_OPERATIONS {
             *cache = Cache::default();
         }
         cache.operations += size;

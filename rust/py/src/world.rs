@@ -69,14 +69,14 @@ impl Loop {
     fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
         let Loop { world, arrays } = self;
         arrays.with(py, |v, y| {
-            let Some(patience) = world.patience() else {
+            let Some(steps_between_checks) = world.steps_between_checks() else {
                 let result = interruptible(py, None, |monitor| world.step_in_background(n, v, y, monitor));
                 at.store(world.step_number(), Relaxed);
                 return result;
             };
-            while n > patience {
-                py.detach(|| world.step(patience, v, y));
-                n -= patience;
+            while n > steps_between_checks {
+                py.detach(|| world.step(steps_between_checks, v, y));
+                n -= steps_between_checks;
                 at.store(world.step_number(), Relaxed);
                 py.check_signals()?;
             }

@@ -53,5 +53,5 @@ pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) 
 
 /// √x with x held between ¼ and 4: a factor of velocities between ½ and 2.
 fn factor<N: Number>(square: N) -> N {
-    square.held(0.25, 4.0).sqrt()
+    square.clamped(0.25, 4.0).sqrt()
 }

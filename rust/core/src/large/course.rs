@@ -1,9 +1,9 @@
-//! Courses: what is done to which row of an arena, and when, to carry out a program.
+//! Courses: the schedule of the operations of a program over the rows of an arena.
 //!
-//! A program says what comes of what. Between two rates it only adds and multiplies, number by number, so all of that is one pass over
-//! the rows: it is traced into a tape whose state is the arena, a number for each row, and becomes a kernel like any other. A block is
-//! kept in a row only if a rate reads it, if it is a result, or if it would take long to compute again. A row serves another block as
-//! soon as nobody reads the first any more; the new state goes straight into the rows of the old one where that is so.
+//! A program says which block is computed from which. Between two rates it only adds and multiplies, elementwise, so all of that is one
+//! pass over the rows: it is traced into a tape whose state is the arena, a number for each row, and becomes a kernel like any other. A
+//! block is kept in a row only if a rate reads it, if it is a result, or if it would be expensive to compute again. A row is reused as
+//! soon as its block is not read any more; the new state is written straight into the rows of the old one where that is so.
 
 use std::collections::BTreeSet;
 
@@ -15,8 +15,8 @@ use crate::{
     tape::{Id, Op, Tape, split::split},
 };
 
-/// Operations from which on it is quicker to keep a block than to compute it again.
-const WORTH_A_ROW: usize = 4;
+/// Operations from which on it is faster to keep a block in a row than to compute it again.
+const MIN_OPERATIONS_PER_ROW: usize = 4;
 
 /// The rows of the state, at the start of the step and, if it is the state that is changed, at its end.
 pub const V: usize = 0;
@@ -129,7 +129,7 @@ impl Course {
     /// For blocks of that shape; blocks of no numbers are left alone.
     pub fn new(program: &Program, results: &[Block], goal: Goal, facts: Facts, shape: Shape) -> Course {
         let mut plan = Plan::new(program, results, goal, facts, shape);
-        plan.keep_what_is_long();
+        plan.keep_expensive();
         plan.place(goal)
     }
 }
@@ -229,14 +229,14 @@ impl Plan {
         self.nodes[node].operands().map(|operand| self.cost(operand, pass)).fold(1, usize::saturating_add)
     }
 
-    /// Keeps what more than one pass would compute, if that is long.
-    fn keep_what_is_long(&mut self) {
+    /// Keeps blocks that more than one pass would compute, if they are expensive.
+    fn keep_expensive(&mut self) {
         for pass in 0..self.writes.len() {
             loop {
                 let later: BTreeSet<usize> = (pass + 1..self.writes.len()).flat_map(|later| self.work(later).0).collect();
                 let (now, _) = self.work(pass);
                 let twice = now.into_iter().rev().filter(|node| later.contains(node) && self.pass[*node] != Some(pass));
-                let Some(node) = { twice }.find(|node| self.cost(*node, pass) >= WORTH_A_ROW) else { break };
+                let Some(node) = { twice }.find(|node| self.cost(*node, pass) >= MIN_OPERATIONS_PER_ROW) else { break };
                 self.write(node, pass);
             }
         }

@@ -5,9 +5,9 @@ use std::{sync::Arc, thread, time::Instant};
 use super::{
     Machine, Model,
     columns::{Columns, cut},
-    crew::{self, Crew, POLL, Stop},
     group::Group,
     stage::Clock,
+    workers::{self, POLL, Stop, Workers},
 };
 use crate::{error::Error, spec::Row, trace::Traced};
 
@@ -165,9 +165,9 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         (first, left) = (first + count, later);
     }
 
-    let crew = Crew { threads, background: traced.is_long(lanes), total, stop: Stop::default() };
-    let worker = || Worker::new(plan, &traced, machine, &crew.stop);
-    crew::share(parts, &crew, monitor, worker(), || Ok(worker()), Worker::part)
+    let workers = Workers { threads, background: traced.is_long(lanes), total, stop: Stop::default() };
+    let worker = || Worker::new(plan, &traced, machine, &workers.stop);
+    workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
 /// Both slots and the tally when everybody was last looked at, and room for what is carried while the v slot holds velocities and for what
@@ -202,7 +202,7 @@ impl<'a> Worker<'a> {
     fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
         let make = |members| -> Result<_, Error> {
             let mut group = self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
-            group.heed(self.stop);
+            group.set_stop_flag(self.stop);
             Ok(group)
         };
         if left >= lanes {

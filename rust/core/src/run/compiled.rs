@@ -109,7 +109,7 @@ impl Model<'_> {
         let traced = self.traced()?;
         let steps = if paced { 0.0 } else { f64::INFINITY };
         let mut way = self.way(&traced, machine, members, steps);
-        if paced && !matches!(way, Way::Tape | Way::Map) {
+        if paced && !matches!(way, Way::Tape | Way::Matrix) {
             way = match (way, self.way(&traced, machine, 1, steps)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => Way::Long(long),
                 _ => Way::Rates(1),
@@ -117,10 +117,10 @@ impl Model<'_> {
         }
         Ok(match way {
             Way::Tape => None,
-            Way::Map if paced => None,
+            Way::Matrix if paced => None,
             Way::Rates(lanes) => Some(("rates", traced.operations.1, lanes)),
             Way::Long(_) => Some(("hand", traced.operations.1, 1)),
-            Way::Map => Some(("matrix", traced.operations.1, 1)),
+            Way::Matrix => Some(("matrix", traced.operations.1, 1)),
         })
     }
 }

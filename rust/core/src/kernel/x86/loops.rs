@@ -100,7 +100,7 @@ impl<'a> Writer<'a> {
             for id in step.of() {
                 let value = self.value(*id, vector);
                 reads[value as usize] += 1;
-                if !self.uses.tell(value, now) {
+                if !self.uses.add_earlier_use(value, now) {
                     continue;
                 }
                 last[value as usize] = now;
@@ -108,7 +108,7 @@ impl<'a> Writer<'a> {
                 if let Source::State(s) = plan.sources[*id as usize]
                     && let Some(next) = plan.next[s as usize].map(|next| self.value(next, vector))
                     && made[next as usize] < now
-                    && self.uses.tell(next, now + 1)
+                    && self.uses.add_earlier_use(next, now + 1)
                 {
                     last[next as usize] = now;
                 }

@@ -76,14 +76,14 @@ impl Shape {
             && self.interleaved > 0
             && self.blocks > 0
             && self.level.here()
-            && body.ops.len().saturating_mul(self.block_vectors) < MOST_OPERATIONS
+            && body.ops.len().saturating_mul(self.block_vectors) < MAX_OPERATIONS
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])
             && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.block_vectors])
     }
 }
 
 /// More operations than that are no kernel: jumps could not be named by 31 bits.
-const MOST_OPERATIONS: usize = 1 << 22;
+const MAX_OPERATIONS: usize = 1 << 22;
 
 /// A kernel as machine code.
 #[derive(Debug)]
