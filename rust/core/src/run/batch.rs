@@ -1,4 +1,4 @@
-//! The driver: many members, some threads, what to keep, and who diverged.
+//! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
 use std::{sync::Arc, thread, time::Instant};
 
@@ -73,17 +73,19 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
     every.map_or(1, |every| steps.div_euclid(every.max(1)) + i64::from(steps % every.max(1) != 0) + 1) as usize
 }
 
-/// Steps between two looks at the clock, and at whether everything is finite, at most; and about how many numbers are stepped until the
-/// first look, and between later ones at most.
-const LOOK: i64 = 1 << 14;
-const FIRST: i64 = 1 << 19;
-const PATIENCE: i64 = 1 << 23;
-/// Who has more numbers than that begins with one step, and shows how long it takes: a step of many bodies costs more than they tell.
-const LARGE: i64 = 1 << 16;
-/// Where somebody diverged between two looks is found by as many looks in between, and so on.
-const LOOKS_BETWEEN: i64 = 16;
-/// Numbers × steps below which a second thread costs more than it brings.
-const WORTH_A_THREAD: f64 = 3e6;
+/// The most steps between two checks of the clock and of whether all states are finite.
+const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 14;
+/// Numbers × steps until the first check, about.
+const NUMBERS_TO_FIRST_CHECK: i64 = 1 << 19;
+/// Numbers × steps between two later checks, at most.
+const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
+/// A group of more numbers than this is first checked after one step, to see how long that takes: the cost of a step of many bodies
+/// grows faster than their numbers.
+const LARGE_MEMBER_NUMBERS: i64 = 1 << 16;
+/// If a member diverged between two checks, the steps between them are repeated with so many checks in between, and so on.
+const RETRACE_INTERVALS: i64 = 16;
+/// Numbers × steps below which a second thread costs more time than it saves.
+const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
 
 /// One thread's share of the members, as slices of every row.
 struct Part<'a> {
@@ -101,8 +103,8 @@ pub(crate) fn expect(what: &'static str, expected: usize, got: usize) -> Result<
     if expected == got { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
 }
 
-/// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the share that is done;
-/// when it answers no, the run ends soon.
+/// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the fraction that is done;
+/// when it returns false, the run ends soon.
 pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
@@ -133,15 +135,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
-        0 if work < WORTH_A_THREAD => 1,
+        0 if work < MIN_NUMBER_STEPS_FOR_THREADS => 1,
         0 => thread::available_parallelism().map_or(1, usize::from),
         n => n,
     };
     let threads = threads.min(groups).max(1);
     plan.model.room(traced.shape, threads)?;
-    // A group alone may have all threads for itself; it knows whether they pay.
+    // A single group may use all threads; it decides whether they are worthwhile.
     let machine = Machine { threads: if groups == 1 { plan.machine.threads } else { 1 }, ..plan.machine };
-    // Several shares a thread, so that one that is late does not keep the others waiting.
+    // Several shares per thread, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { groups.min(threads * 4) };
     let shares: Vec<usize> = (0..shares)
         .map(|i| {
@@ -170,8 +172,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots and the tally when everybody was last looked at, and room for what is carried while the v slot holds velocities and for what
-/// is recorded.
+/// Both slots and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded quantities.
 #[derive(Default)]
 struct Good {
     v: Vec<f64>,
@@ -283,8 +284,12 @@ impl Job<'_, '_> {
         self.remember(plan.first);
 
         let mut k = plan.first;
-        let longest = (PATIENCE / numbers).clamp(1, LOOK);
-        let mut piece = if numbers > LARGE { 1 } else { (FIRST / numbers).clamp(1, LOOK) };
+        let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
+        let mut piece = if numbers > LARGE_MEMBER_NUMBERS {
+            1
+        } else {
+            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL)
+        };
         let mut began = Instant::now();
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && !self.carries && self.group.recorded() == 0;
@@ -400,7 +405,7 @@ impl Job<'_, '_> {
     /// Whether a member that was finite so far has a number in its slots that is not below this size.
     fn any_new(&self, size: f64) -> bool {
         let (v, y) = self.group.slots();
-        // All of a chunk are looked at, which is vector code; who it is is asked only if there is one.
+        // All numbers of a chunk are compared, which is vector code; only if one is not below is its member searched.
         let all_below = |slot: &[f64]| slot.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)));
         !(all_below(v) && all_below(y)) && (0..self.count).any(|l| self.is_new(l, size))
     }
@@ -412,8 +417,8 @@ impl Job<'_, '_> {
         self.part.first_bad[self.from + l] < 0 && !(all_below(v) && all_below(y))
     }
 
-    /// Infinities and NaN stay in the slots, so it is enough to look now and then. Velocities that are made of what a method carries may
-    /// be infinite and finite again, but only of numbers that are [`HUGE`].
+    /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a method's carry
+    /// may be infinite and later finite again, but only if its numbers are [`HUGE`].
     fn is_suspect(&self) -> bool {
         let most = if self.carries { HUGE * self.plan.clock.h.min(1.0) } else { f64::INFINITY };
         self.any_new(most)
@@ -427,7 +432,7 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Finds out who diverged since the last look and when, and looks at step `k`, in whose state the group is.
+    /// Finds which members diverged since the last check and at which step, and checks step `k`, in whose state the group is.
     fn retrace(&mut self, k: i64) {
         let steps = k - self.looked;
         if steps == 1 {
@@ -439,12 +444,12 @@ impl Job<'_, '_> {
             self.unfinish();
             return self.remember(k);
         }
-        // Back to the last look, and on in shorter pieces.
+        // Back to the last check, and on in shorter pieces.
         let (v, y) = self.group.slots_mut();
         v.copy_from_slice(&self.good.v);
         y.copy_from_slice(&self.good.y);
         self.group.tally_mut().copy_from_slice(&self.good.tally);
-        let piece = (steps as u64).div_ceil(LOOKS_BETWEEN as u64) as i64;
+        let piece = (steps as u64).div_ceil(RETRACE_INTERVALS as u64) as i64;
         let mut at = self.looked;
         while at < k {
             let n = piece.min(k - at);
@@ -454,7 +459,7 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Notes who has a number in the slots that is not finite after step `k`.
+    /// Notes the members with a number in the slots that is not finite after step `k`.
     fn note(&mut self, k: i64) {
         for l in 0..self.count {
             if self.is_new(l, f64::INFINITY) {
@@ -474,7 +479,7 @@ fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
     to.extend_from_slice(numbers);
 }
 
-/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method that carries something
-/// else are looked at after every step. The difference of two coordinates over the step overflows only beyond 2¹⁰²³ times the step, so that
-/// such a one between two looks at smaller numbers would have to grow by 2⁶⁰ and shrink again within [`LOOK`] steps.
+/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method with a carry are
+/// checked after every step. The difference of two coordinates divided by the step overflows only beyond 2¹⁰²³ times the step. To miss
+/// that between two checks, it would have to grow by 2⁶⁰ and shrink again within [`DIVERGENCE_CHECK_INTERVAL`] steps.
 const HUGE: f64 = f64::from_bits((1023 + 960) << 52);
