@@ -34,14 +34,14 @@ from .systems.base import a_system
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
 
-#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final state),
-#: and so many bytes for each saved time (its step number and the time).
+#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final
+#: state), and so many bytes for each saved time (its step number and the time).
 NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
 #: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
 MOST_STEPS = 1_000_000
 
-#: A warning names the bodies that collided if repeating the run of the member takes at most so many steps × numbers, which is a moment.
-#: Otherwise they are found by ``Run.collisions``.
+#: A warning names the bodies that collided if repeating the run of the member takes at most so many steps × numbers, which is a
+#: moment. Otherwise they are found by ``Run.collisions``.
 MAX_RERUN = 10_000_000
 
 #: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
@@ -86,9 +86,9 @@ def integrate(
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step to
-            try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of time
-            from rest.
+        dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
+            to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
+            time from rest.
         steps: number of steps, one or more.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
             each stays below this. The error of a block is relative to the largest length (norm) of the block so far, so that the
@@ -105,8 +105,8 @@ def integrate(
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how to start a method that has several ways; see ``method(…).starts``.
-        carry: what a method carries in place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, the state of the
-            run.
+        carry: what a method carries in place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, the state of
+            the run.
         carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
             meaning.
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
