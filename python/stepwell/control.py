@@ -1,4 +1,4 @@
-"""Control terms: what keeps a quantity that should be constant from drifting (§12, Appendix D)."""
+"""Control terms, which keep a quantity that should be constant from drifting (§12, Appendix D)."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ FORMS = ("limited", "printed")
 class EnergyControl(Value):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
 
-    As the document prints it (Appendix D), the push is h·C·ΔE in a step, and overflows where h·C·K passes 1, K being the kinetic
-    energy, which has no bound at close encounters. The limited form decays ΔE by backward Euler instead, and scales
-    velocities by a factor between ½ and 2: it is the same to first order and stays finite.
+    In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
+    kinetic energy, which is not bounded at close encounters. The limited form integrates the decay of ΔE by backward Euler
+    instead, and scales velocities by a factor between ½ and 2: it is the same to first order and stays finite.
 
     Args:
         gain: C, in 1 per energy and unit of time; broadcasts over the batch.
         form: ``"limited"`` or ``"printed"``.
-        relative: in place of C, the number h·C·K at the start, without a unit: the share of ΔE that a step takes away is twice
-            that. Broadcasts.
+        relative: in place of C, the dimensionless h·C·K at the start: a step removes twice that fraction of ΔE. Broadcasts.
         target: the energy to keep; that of the start if None. Broadcasts.
 
     Raises:
@@ -55,7 +54,7 @@ class EnergyControl(Value):
         return f"EnergyControl({strength}, form={self.form!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> EnergyControl:
-        """The same control with its gain and its target in numbers, from the energies at the start.
+        """The same control with numbers for its gain and its target, from the energies at the start.
 
         Warns:
             ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
@@ -78,16 +77,16 @@ class EnergyControl(Value):
         return aimed
 
     def around(self, s: Any, h: float) -> reference.Controlled:
-        """The NumPy reference, round that of a system, both scaled to the step h."""
+        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
         return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
-        """What describes it to the core, beside what describes the system."""
+        """Its parameters for the core, in addition to those of the system."""
         numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
         return {"control": "energy", "control.form": self.form} | numbers
 
     def member(self, one: Callable[[Array], Array]) -> EnergyControl:
-        """That of one member."""
+        """The same for a single member."""
         alone = copy.copy(self)
         alone.gain, alone.target = one(np.asarray(self.gain)), one(np.asarray(self.target))
         return alone
@@ -97,10 +96,10 @@ WAYS = ("scaling", "nacozy")
 
 
 class Projection(Value):
-    """Sets the state back onto the energy after every step.
+    """Projects the state back to the target energy after every step.
 
-    ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the least change of the state that
-    does it to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971).
+    ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
+    that suffices to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971).
 
     Args:
         way: ``"scaling"`` or ``"nacozy"``.
@@ -123,22 +122,22 @@ class Projection(Value):
         return f"Projection({self.way!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> Projection:
-        """The same projection with its target in numbers."""
+        """The same projection with a number for its target."""
         aimed = copy.copy(self)
         if aimed.target is None:
             aimed.target = np.asarray(energy)
         return aimed
 
     def around(self, s: Any, h: float) -> reference.Projected:
-        """The NumPy reference, round that of a system, both scaled to the step h."""
+        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
         return reference.Projected(s, h, self.way, np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
-        """What describes it to the core, beside what describes the system."""
+        """Its parameters for the core, in addition to those of the system."""
         return {"control": "projection", "control.way": self.way, "control.target": np.asarray(self.target)}
 
     def member(self, one: Callable[[Array], Array]) -> Projection:
-        """That of one member."""
+        """The same for a single member."""
         alone = copy.copy(self)
         alone.target = one(np.asarray(self.target))
         return alone

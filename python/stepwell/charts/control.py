@@ -28,10 +28,10 @@ from .style import Drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Methods, unless told otherwise: one that pumps energy in, one that keeps it, and two more accurate ones.
+#: Default methods: one that adds energy, one that keeps it, and two more accurate ones.
 METHODS = ("standard_euler", "false_euler", "standard_heun", "rk4")
 
-#: Gains h·C·K at the start, unless told otherwise: six decades.
+#: Default gains h·C·K at the start: six decades.
 RELATIVE = tuple(float(gain) for gain in 10.0 ** np.linspace(-4.0, 2.0, 25))
 
 #: Ways of projection, the limit of a control with an infinite gain.
@@ -40,7 +40,7 @@ WAYS: tuple[str, ...] = controls.WAYS
 #: States of a run, evenly spaced, that are saved to measure energy and coordinates.
 SAVED_STATES = 1000
 
-#: In how many places an exact solution is asked for its scale.
+#: Number of times at which the exact solution is evaluated for its scale.
 SCALE_SAMPLES = 1001
 
 Whole = np.ndarray[Any, np.dtype[np.int64]]
@@ -49,10 +49,10 @@ Exact = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Held(Value):
-    """One method under one kind of control, over the gains. What diverged has infinite errors.
+    """One method under one kind of control, over the gains. Runs that diverged have infinite errors.
 
     Attributes:
-        method: which.
+        method: the method.
         kind: ``"none"``, a form of ``EnergyControl`` or a way of ``Projection``.
         dt: the step, in units of time.
         steps: how many steps were made.
@@ -75,7 +75,7 @@ class Held(Value):
 
     @property
     def diverged(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Where it left the finite numbers."""
+        """The gains at which a run diverged."""
         return self.first_bad_step >= 0
 
 
@@ -84,12 +84,12 @@ class ControlSweep(Drawn, Value):
     """Errors of energy and state against the gain of a control.
 
     Attributes:
-        title: of what.
-        system: what was stepped.
-        horizon: over what time.
-        evaluations: rate evaluations of each run.
-        lines: one for each method and kind that go together.
-        refused: why others do not, by method and kind.
+        title: title of the picture.
+        system: the system.
+        horizon: the time of each run.
+        evaluations: function (rate) evaluations of each run.
+        lines: one for each method and kind that can be combined.
+        refused: why others cannot, by method and kind.
         exact: whether the exact state at the end is known.
     """
 

@@ -1,4 +1,4 @@
-"""What a chart holds, and how it is written down."""
+"""The data of a chart, and how they are written to files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Timing(Value):
 
     @classmethod
     def unknown(cls) -> Timing:
-        """What was not measured."""
+        """A time that was not measured."""
         return cls(math.nan, math.nan, math.nan)
 
 
@@ -56,18 +56,18 @@ class Point(Value):
     """One method with one step, or one tolerance.
 
     Attributes:
-        steps: how many steps were made over the horizon; with a tolerance all that were tried. None if a peer does not tell.
-        dt: the step, in units of time; with a tolerance the mean of all that were tried.
-        cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not tell.
-        state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the times that are asked for.
+        steps: number of steps over the horizon; for adaptive steps all attempts. None if a peer does not report it.
+        dt: the step, in units of time; for adaptive steps the mean of all attempts.
+        cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not report them.
+        state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the output times.
         energy_error: the largest of ``Scene.energy_error`` over the run, likewise; NaN if the system has no energy.
         unstable: the state left the finite numbers, or is wrong altogether (an error above 1) and grew: its largest
             amplitude in the second half of the run is more than a tenth above that in the first half, and above the
             exact one. With a tolerance: the run stopped early.
         end_error: the state error at the end of the run.
-        phase_error: how far the end is ahead of the exact motion, in periods, behind is negative; None of a scene without a
-            period, and of a state without a digit right.
-        tolerance: with which the steps were chosen, or None.
+        phase_error: by how many periods the end is ahead of the exact motion (negative: behind); None for a scene without a
+            period, and for a state without a correct digit.
+        tolerance: the tolerance of adaptive steps, or None.
     """
 
     steps: int | None

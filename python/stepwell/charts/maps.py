@@ -25,7 +25,7 @@ from .zplane import largest, within
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Points of a map over each of its axes, unless told otherwise.
+#: Points of a map over each of its axes, by default.
 SIZE = 512
 
 #: Rounding of a step, in parts of the state.

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Forms that are compared, in the order of the legend.
 FORMS = ("direct", "matrix", "power")
 
-#: Numbers of steps, unless told otherwise.
+#: Numbers of steps, by default.
 STEPS = tuple(10**k for k in range(8))
 
 #: Each run is repeated so often, and the median taken.

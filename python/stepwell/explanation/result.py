@@ -1,4 +1,4 @@
-"""What is said of a step, as text, as a table of a notebook, and as JSON."""
+"""The explanation of a step, as text, as a table of a notebook, and as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..methods import Method
 from ..systems import System
 from .listing import Section
 
-#: How often, in words; of what all members have in common it is said if there are several.
+#: How often, in words; the part about members is used if there are several.
 WHEN = {
     "run": "once a run",
     "member": "once a run, for each member",
@@ -23,7 +23,7 @@ WHEN = {
     "member step": "in each step, for each member",
 }
 
-#: What makes the rates of a step that is no single tape.
+#: How the rates are computed in a step that is not a single tape.
 PARTS = {
     "rates": "the rates are a tape of their own, {lanes} at a time",
     "hand": "the rates are computed by a loop that was compiled beforehand, one member after the other",
@@ -32,16 +32,16 @@ PARTS = {
 
 @dataclass(frozen=True)
 class MachineCode:
-    """What a step becomes on a CPU.
+    """The machine code of a step.
 
     Attributes:
         size: its length in bytes.
-        width: how many numbers are in a vector, one for each member.
-        vectors: how many vectors a turn of the loop steps.
-        turns: how many turns step a tile, the members that go together.
-        resident: whether the state stays in registers over all steps of a turn; else it is read and written in each step.
-        registers: how many vector registers there are.
-        spills: how many values are kept beside the registers at most, because these do not suffice.
+        width: numbers in a vector, one for each member.
+        vectors: vectors that one iteration of the loop steps.
+        turns: iterations for a tile, the members that are stepped together.
+        resident: whether the state stays in registers over all steps of an iteration; else it is loaded and stored in each step.
+        registers: vector registers of the CPU.
+        spills: the most values that are kept in memory at once because there are not enough registers.
     """
 
     size: int
@@ -55,30 +55,30 @@ class MachineCode:
 
 @dataclass(frozen=True, eq=False)
 class Explanation(Value):
-    """What a step computes, and what it becomes on this machine. ``print`` it.
+    """The operations of a step and its machine code on this machine. ``print`` it.
 
     Attributes:
-        system: what is stepped, with its control.
-        method: by what.
-        members: how many trajectories.
-        fused: whether with fused multiply-adds.
+        system: the system, with its control.
+        method: the method.
+        members: number of trajectories.
+        fused: whether it uses fused multiply-adds.
         attempt: whether it is an attempt at an adaptive step.
-        sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
-            blocks.
+        sections: the values, grouped by how often they are computed. For a step that is too long for one tape, the operations of
+            the method on blocks.
         level: the CPU level in use.
-        lanes: how many members go together.
-        written: operations of a step, by kind, as the method and the system are written down. What does not change from step to
-            step is not counted, for it is computed before; changes of sign are not either. Empty if the step is too long for one
-            tape.
-        computed: operations of a step, by kind, that each member makes: without what was found equal or needless. ``fused``
-            counts fused multiply-adds.
-        hoisted: how many operations are made once a run, once for each member, and once a step for all members, instead of by
-            each member in each step: ``"run"``, ``"member"``, ``"step"``.
+        lanes: number of members that are stepped together.
+        written: operations of a step, by kind, as the method and the system are written down. Values that do not change from step
+            to step are computed before and not counted; changes of sign are not counted either. Empty if the step is too long for
+            one tape.
+        computed: operations of a step, by kind, that are performed for each member, after equal and unused ones were removed.
+            ``fused`` counts fused multiply-adds.
+        hoisted: numbers of operations that are computed once a run, once for each member, and once a step for all members,
+            instead of for each member in each step: ``"run"``, ``"member"``, ``"step"``.
         code: the machine code, or None.
         interpreted_because: why there is none, in words, or None. Runs too short to be worth machine code are interpreted anyway.
-        parts: of a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
+        parts: for a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
             loop that was compiled beforehand. None if it is one tape.
-        about: about how many operations such a step has; 0 if it is one tape, of which they are counted.
+        about: approximate number of operations of such a step; 0 if it is one tape, whose operations are counted.
     """
 
     system: System

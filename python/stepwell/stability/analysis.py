@@ -1,4 +1,4 @@
-"""``analyse``: a step of any system by any method, in the words of the document's §4."""
+"""``analyse``: the stability of a step of any system by any method, in the words of the document's §4."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from .eigen import Complex
 from .exact import MAX_ROWS
 from .parts import spectra
 
-#: What a sequence of samples does (§4), by the eigenvalue that decides. A single negative eigenvalue, which the document does not
-#: name, changes its sign at every step: an oscillation of two samples per period. Where so many eigenvalues nearly
-#: meet that rounding hides whether they are outside the unit circle, it is not decided, and not called stable.
+#: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
+#: list, changes the sign at every step: an oscillation of two samples per period. If so many eigenvalues nearly
+#: coincide that rounding hides whether they are outside the unit circle, the kind is "not decided", and not stable.
 KINDS = (
     "monotonic stable",
     "constant",
@@ -40,29 +40,28 @@ KINDS = (
 
 
 class Analysis(Value):
-    """What one step does to a state. ``members`` is the shape to which dt, the parameters and the states broadcast.
+    """One step as a linear map. ``members`` is the shape to which dt, the parameters and the states broadcast.
 
     Attributes:
-        system: what is stepped.
-        method: how.
+        system: the system.
+        method: the method.
         dt: the step, in units of time, of shape ``members``.
         P: transition matrix, shape (n, n, *members): rows and columns are the slots.
-        Q: input matrix of a linear system, shape (n, inputs, *members): what a step makes, from rest, of an input of 1
-            that is held over the step.
-        slots: names of the n numbers that a step maps; ``y_prev`` in the place of ``v`` for Verlet.
+        Q: input matrix of a linear system, shape (n, inputs, *members): the state after a step from rest with an input held at 1.
+        slots: names of the n numbers that a step maps; ``y_prev`` in place of ``v`` for Verlet.
         inputs: names of the inputs.
         polynomial: coefficients of det(Iz − P), highest power first, shape (n + 1, *members).
         p: half the trace of P, for two states; the polynomial is z² − 2pz + q. None for other numbers of states.
         q: the determinant of P, for two states, and r₁² of a conjugate pair; else None.
         eigenvalues: of P, shape (n, *members): the largest first, of equal ones the fastest first.
-        rates: for each eigenvalue of P the eigenvalue λ of the rates whose mode it continues; e^(λ·dt) would be exact.
+        rates: for each eigenvalue of P the eigenvalue λ of the rates of the same mode; e^(λ·dt) would be exact.
         radius: r₁, the largest magnitude of an eigenvalue.
         angle: Ψ in 0 … π, the angle per step of that eigenvalue, by atan2.
         true_angle: Φ, the angle per step of the same mode of the exact solution: ω₀·dt for the undamped oscillator.
         omega: Ω₀ = Ψ/dt, the frequency of the numerical solution, in radians per unit of time.
         frequency_ratio: Ψ/Φ; NaN where the exact solution does not oscillate.
         samples_per_period: 2π/Ψ; infinite where nothing oscillates.
-        kind: one of ``KINDS``, the document's words for what the samples do.
+        kind: one of ``KINDS``, the document's words for the behaviour of the samples.
         stable: whether the samples stay bounded.
     """
 

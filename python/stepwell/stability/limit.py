@@ -1,4 +1,4 @@
-"""``stability_limit``: the largest step below which nothing grows that should not, and the mode that then does.
+"""``stability_limit``: the largest step below which no mode grows that should not, and the mode that grows beyond it.
 
 A linear system of more than two states is taken apart first (``parts``). Each part, or a system of two states, is then searched:
 the step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
@@ -83,14 +83,14 @@ PAST_LIMIT, NEVER_STABLE_STEP = 1e-4, 0.1
 
 @by_value
 class Mode(NamedTuple):
-    """What begins to grow at a stability limit.
+    """The mode that begins to grow at a stability limit.
 
     Attributes:
         eigenvalue: z of P at the limit, on the unit circle.
         angle: Ψ in 0 … π, its angle per step.
         rate: λ of the mode in the exact solution, in 1 per unit of time; its imaginary part is its frequency.
-        kind: what it does past the limit, in the document's words.
-        v: its shape in the velocities, complex, shape (*block); its largest number in both blocks is 1.
+        kind: its behaviour past the limit, in the document's words.
+        v: its shape in the velocities, complex, shape (*block); the largest number of both blocks is 1.
         y: its shape in the coordinates.
     """
 
@@ -105,11 +105,11 @@ class Mode(NamedTuple):
 class StabilityLimit(float):
     """A stability limit: the largest stable step, in units of time, 0 for never and infinity for always.
 
-    It is a number. Where rounding hides what happens between two steps, it is the smaller of them: below it nothing grows.
+    It is a number. If rounding hides the limit between two steps, it is the smaller of them: below it no mode grows.
 
     Attributes:
-        mode: what begins to grow there; None if nothing does.
-        grows: the smallest step that is known to grow: the limit itself if it is ``decided``.
+        mode: the mode that begins to grow there; None if none does.
+        grows: the smallest step at which a mode is known to grow: the limit itself if it is ``decided``.
     """
 
     mode: Mode | None
@@ -123,16 +123,16 @@ class StabilityLimit(float):
         return limit
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        """What pickle and copy make it of."""
+        """Arguments for pickle and copy."""
         return float(self), self.mode, self.grows
 
     @property
     def decided(self) -> bool:
-        """Whether the limit is known. It is not where so many eigenvalues nearly meet that rounding hides what grows."""
+        """Whether the limit is known. It is not if so many eigenvalues nearly coincide that rounding hides which modes grow."""
         return self.grows == float(self)
 
     def __repr__(self) -> str:
-        """A number, or between which two it is."""
+        """The number, or the two numbers between which it lies."""
         return f"{float(self)!r}" if self.decided else f"<between {float(self)!r} and {self.grows!r}, not decided>"
 
     __str__ = __repr__
@@ -164,7 +164,7 @@ class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
         return np.asarray(self.grows == np.asarray(self))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What pickle and copy make it of."""
+        """Arguments for pickle and copy."""
         return _limits, (np.array(self), self.modes, self.grows)
 
     def __copy__(self) -> StabilityLimits:
