@@ -83,7 +83,7 @@ def isa_levels() -> list[str]:
     return _core.isa_levels()
 
 
-#: What is imported when it is first used, so that importing stepwell stays quick, and where it is.
+#: Attributes that are imported on first use, so that importing stepwell stays fast, and their modules.
 _LATER = {
     "advice": "advice",
     "Scene": "scenes.Scene",

@@ -19,10 +19,10 @@ class Steps(Protocol):
         """One step."""
 
     def start(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """What the method carries in the place of v."""
+        """The carry, in place of v."""
 
     def finish(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """The velocity from what the method carries."""
+        """The velocity from the carry."""
 
 
 class Method:
@@ -126,7 +126,7 @@ def choice(methods: Any) -> list[Method]:
     """The methods named by an argument ``methods``, each once; all if None.
 
     Raises:
-        ArgumentError: if they are no list of methods, or none.
+        ArgumentError: if it is not a list of methods, or is empty.
     """
     chosen = list(_catalogue().values()) if methods is None else _checks.several("methods", methods, "names")
     if not chosen:

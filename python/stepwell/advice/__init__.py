@@ -145,7 +145,7 @@ def advise(
 
 
 def _refusal(scene: Scene, candidate: Candidate) -> str | None:
-    """Why the method cannot do the scene with its control, or None: a step tells."""
+    """Why the method cannot step the scene with its control, or None; found by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps do not go with a control"
     dt = TIMED_STEP * scene.dt

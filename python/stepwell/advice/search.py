@@ -60,7 +60,7 @@ class Found(NamedTuple):
         trial: the confirming run.
         robust: from here on every k that was tried, up to twice as large, is good enough too; k itself as a rule, and None if
             there is no such k.
-        expected: error that the order tells from a run with longer steps, or None.
+        expected: error that is extrapolated by the order from a run with longer steps, or None.
     """
 
     k: int
@@ -94,8 +94,8 @@ class Search:
         tolerance: the error that is allowed.
         spans: the cost is that of one of so many parts of a run.
         prices: what a step costs, by the candidate's name.
-        longest: rate evaluations that a run may make.
-        spent: tells how many all runs have made so far.
+        longest: the most function evaluations of a run.
+        spent: returns how many all runs have made so far.
     """
 
     def __init__(
@@ -190,7 +190,7 @@ class Search:
         return found, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
-        """The k that the order of the method asks for, if the error is small enough to tell."""
+        """The k that is predicted by the order of the method, if the error is small enough for that."""
         if not trial.error < ASYMPTOTIC_ERROR:
             return None
         return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
@@ -301,7 +301,7 @@ class Search:
         return next((rung for rung in above if rung > bad[-1]), None)
 
     def expected(self, candidate: Candidate, k: int) -> float | None:
-        """The error that the order tells from the finest doubling below k whose error falls."""
+        """The error extrapolated by the order from the finest doubling below k whose error falls."""
         rung = candidate.first
         while 2 * rung < k:
             rung *= 2

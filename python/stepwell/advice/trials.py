@@ -63,7 +63,7 @@ class Trials:
         self.numbers = self.scene.v.size + self.scene.y.size
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
-        #: Runs, and rate evaluations of all.
+        #: Number of runs, and their function evaluations in total.
         self.made, self.work = 0, 0.0
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
@@ -93,7 +93,7 @@ class Trials:
         return self._dense[key]
 
     def unstable(self, method: Method, dt: float, steps: int) -> bool:
-        """Whether the run grew and is wrong altogether. The true motion is asked for only if it grew."""
+        """Whether the run grew and has no correct digit. The true motion is computed only if it grew."""
         key = (method.name, steps, dt)
         if key in self._done:
             return self._done[key].unstable

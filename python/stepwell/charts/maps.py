@@ -31,7 +31,7 @@ SIZE = 512
 #: Rounding of a step, in parts of the state.
 ROUNDING = 1000.0 * 2.0**-53
 
-#: Rows of the map that the summary tells, evenly spread from the least damping to the most.
+#: Rows of the map in the summary, evenly spread from the least damping to the most.
 SUMMARY_ROWS = 5
 
 Truths = np.ndarray[Any, np.dtype[np.bool_]]

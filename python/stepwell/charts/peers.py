@@ -33,7 +33,7 @@ class Solved(Value):
     Attributes:
         v: velocity blocks at the times that were asked for, shape (times, *block).
         y: coordinate blocks, likewise.
-        evaluations: rate evaluations that it took, or None if it does not tell; it is then charted by its time alone.
+        evaluations: function (rate) evaluations, or None if not reported; it is then charted by its time alone.
         seconds: that it took, without what is prepared once.
     """
 

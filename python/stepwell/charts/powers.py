@@ -206,7 +206,7 @@ class _Exact:
         return self.found[n]
 
     def length(self, n: int) -> float:
-        """The length of the exact coordinates and velocities, or what stands in their place."""
+        """The length of the exact coordinates and velocities, or of their replacement."""
         return _length(self.state(n))
 
     def distance(self, n: int, run: Run) -> float:

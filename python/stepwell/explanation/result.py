@@ -169,7 +169,7 @@ class Explanation(Value):
             "Φ": "h·omega, the true angle of a step",
             "Gm": "G·masses",
             "fma": "fma(a, b, c) = a·b + c, rounded once",
-            "v2": "v2, y2: the state at which rates are asked for the second time",
+            "v2": "v2, y2: the state at which rates are evaluated the second time",
             "dv": "h times the rate of v" if self.parts is None else "dv(t, v, y) = h times the rate of v",
         }
         shown = []
@@ -177,7 +177,7 @@ class Explanation(Value):
             if any(_names(name, each) for each in text):
                 shown.append(meaning if name in ("fma", "v2") else f"{name}: {meaning}")
         if self.method.carry:
-            shown.append(f"{self.method.carry}: what stands in the place of v between steps")
+            shown.append(f"{self.method.carry}: what is carried in place of v between steps")
         return [f"Here {'; '.join(shown)}."] if shown else []
 
     def as_dict(self) -> dict[str, Any]:

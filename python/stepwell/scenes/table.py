@@ -48,7 +48,7 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
     starts, lengths, v, y = (np.concatenate(each) for each in zip(*good, strict=True))
     order = np.argsort(starts)
     starts, lengths = starts[order], lengths[order]
-    # For each node the numbers of a state as rows, for operations on long rows are the quick ones.
+    # For each node the numbers of a state as rows, since operations on long rows are the fastest.
     tables = [np.ascontiguousarray(block[order].reshape(*block.shape[:2], -1).transpose(1, 2, 0)) for block in (v, y)]
 
     return Table(starts, lengths, tables, [block.shape[2:] for block in (v, y)])

@@ -165,7 +165,7 @@ def units_of(matrix: Array) -> Array:
 def slot_units(finish: Array, units: Array) -> Array:
     """Units of the slots whose states have these units, shape (n, *members): in both, what a slot makes of a state is at most 1.
 
-    A step is looked at in the units of the rates. Those that suit its own matrix may miss what it rounds: near z = −1 velocity
+    A step is analysed in the units of the rates. Units that suit its own matrix may hide its rounding: near z = −1 velocity
     and coordinate of a mode leave each other alone, whatever happened between.
     """
     with np.errstate(all="ignore"):
@@ -265,7 +265,7 @@ def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex,
 
 
 def nearest(values: Complex, rates: Complex, exact: Complex) -> Complex:
-    """For each eigenvalue of one step the rate that it continues, told by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
+    """For each eigenvalue of one step the rate of the same mode, found by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
     with np.errstate(all="ignore"):
         distance = np.nan_to_num(np.abs(values[:, np.newaxis] - exact), nan=np.inf)
     found = np.empty_like(values)

@@ -1,4 +1,4 @@
-//! From a system and a method to tapes: what a run needs of them, cut by how often it changes.
+//! Traces a system and a method to the tapes of a run, split by how often their values change.
 
 use std::{
     collections::HashMap,
@@ -21,7 +21,7 @@ use crate::{
     tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
 };
 
-/// What makes a step.
+/// The kind of step.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum How {
     /// A method, by its name, started in its `choice`-th way.
@@ -43,7 +43,7 @@ pub enum How {
     },
 }
 
-/// What a tape is made for.
+/// The key of a tape.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Scene {
     /// What is given.
@@ -52,7 +52,7 @@ pub struct Scene {
     pub how: How,
     /// Quantities that are recorded beside states.
     pub record: Vec<String>,
-    /// Whether steps are computed with fused multiply-adds: see [`fuse`]. What is recorded is not.
+    /// Whether steps are computed with fused multiply-adds: see [`fuse`]. Recorded quantities are not.
     pub fused: bool,
 }
 
@@ -70,18 +70,18 @@ pub struct Tapes {
     pub written: Counts,
 }
 
-/// What is known of a scene. What takes long to find is found when it is asked for first.
+/// The properties and tapes of a scene. Expensive ones are found on first use.
 pub struct Traced {
     scene: Scene,
     /// How large the blocks are.
     pub shape: Shape,
-    /// Whether the system adds something up, in a number of the state behind v and y.
+    /// Whether the system has a tally, a sum over the steps in a number of the state behind v and y.
     pub tally: bool,
     /// How many numbers are recorded.
     pub recorded: usize,
-    /// Whether the method carries something else than v between steps.
+    /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
-    /// About how many operations the rates take, and a step.
+    /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
     /// By what is known of rates.
@@ -129,7 +129,7 @@ pub(crate) fn method(name: &str) -> Result<&'static Record, Error> {
     crate::method::record(name).ok_or_else(|| Error::UnknownMethod { name: name.to_owned(), known: known() })
 }
 
-/// How large the blocks of a scene are, or why its system cannot be made of what was given, or not be stepped so.
+/// The size of the blocks of a scene, or an error if its parameters are wrong or the method cannot step it.
 pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
     match how {
         How::Matrix { .. } => {
@@ -280,7 +280,7 @@ pub(crate) fn cut(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
 }
 
-/// About how many operations the rates of a scene take, and a step.
+/// Approximate numbers of operations of the rates of a scene and of a step.
 fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), Error> {
     Ok(match how {
         How::Matrix { nodes } => {

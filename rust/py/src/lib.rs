@@ -168,7 +168,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
-/// Runs without the GIL, tells how far it is and hears Ctrl-C.
+/// Runs without the GIL, reports progress and answers Ctrl-C.
 fn interruptible(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -209,7 +209,7 @@ pub fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, Py
     Ok(d)
 }
 
-/// A body's operations, and the places of what comes of them.
+/// A body's operations, and the indices of its results.
 fn body_of(body: &Body) -> (Vec<Operation>, Vec<usize>) {
     let operations = body.ops.iter().map(|op| operation(*op, |operand| operand as usize)).collect();
     (operations, body.next.iter().map(|id| *id as usize).collect())
@@ -244,7 +244,7 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
 /// A name, the places of operands, and a time or a factor.
 type BlockOperation = (&'static str, Vec<usize>, f64);
 
-/// What a method does to blocks: names, operands, times or factors, and the places of the results; see `_core.pyi`.
+/// The operations of a method on blocks: names, operands, times or factors, and the indices of the results; see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (method, *, attempts=false))]
 fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
@@ -275,7 +275,7 @@ fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
 }
 
-/// What a step becomes, traced and compiled anew for so many members: see `_core.pyi`.
+/// The tape and machine code of a step, made anew for so many members: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
 fn compiled<'py>(
@@ -318,7 +318,7 @@ fn compiled<'py>(
     Ok(Some(d))
 }
 
-/// By what a step is made that is too long for one tape; None if it is one: see `_core.pyi`.
+/// How a step that is too long for one tape is computed; None if it is one tape: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
 fn in_parts(

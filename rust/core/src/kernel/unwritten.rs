@@ -1,4 +1,4 @@
-//! The kernel writer of a machine that has none: everything is interpreted.
+//! The kernel writer for a CPU that has none: everything is interpreted.
 
 use super::{Layout, interpret::Interpreter};
 use crate::{isa::Level, tape::split::Body};

@@ -46,7 +46,7 @@ pub enum Act {
         v: usize,
         /// Row of the coordinates.
         y: usize,
-        /// Row of what comes of it.
+        /// Row of the result.
         out: usize,
     },
     /// Both rates of one state.
@@ -55,7 +55,7 @@ pub enum Act {
         at: Time,
         /// Rows of the state.
         state: [usize; 2],
-        /// Rows of what comes of it.
+        /// Rows of the results.
         out: [usize; 2],
     },
     /// One pass over the rows.

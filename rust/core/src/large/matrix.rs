@@ -112,7 +112,7 @@ impl Group for Matrix {
         self.state[..self.shape.v + self.shape.y].split_at_mut(self.shape.v)
     }
 
-    // What a method carries is its own affair: the caller starts and finishes.
+    // The caller converts between velocities and the carry.
     fn start(&mut self, _k: i64) {}
 
     fn advance(&mut self, k: i64, n: i64) {

@@ -1,7 +1,7 @@
 //! The kernel writer for x86-64: a body becomes a vector loop, with AVX-512 or AVX2.
 //!
-//! [`plan`] says which instructions a body is, [`write`] puts values into registers and writes one step, [`loops`] the loops around it,
-//! [`encode`] the bytes. [`Shape`] says how wide and in which order; [`choose`](choose::choose) knows which is quick.
+//! [`plan`] selects instructions, [`write`] assigns registers and writes one step, [`loops`] writes the loops around it, [`encode`] the
+//! bytes. [`Shape`] has the width and the order of the loops; [`choose`](choose::choose) chooses the fastest.
 
 mod choose;
 mod encode;
