@@ -1,7 +1,7 @@
 """Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
 
-A slot is what stands in the place of a block between steps: v for most methods, something else for those with a carry. Everything
-above this file speaks of states, everything below of slots.
+A slot is the array that holds a block between steps: v for most methods, the carry for those that have one. Everything
+above this file works with states, everything below with slots.
 """
 
 from __future__ import annotations
@@ -401,7 +401,7 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
 #: As the core's ``HUGE``.
 _HUGE = 2.0**960
 
-#: Steps of a piece at whose end it is asked whether one of its velocities may have overflowed.
+#: Steps between two checks of whether a velocity may have overflowed.
 _PIECE = 1024
 
 
@@ -416,7 +416,7 @@ def _seen(
 ) -> Whole:
     """The first bad steps of a run in matrix form, whose velocities the core does not know.
 
-    Members that come near the end of the number range are stepped again from the last look before that, by the reference.
+    Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
     most = _HUGE * min(plan.dt, 1.0)
 
@@ -426,7 +426,7 @@ def _seen(
     near = np.logical_or.reduce(is_near(out.v, out.y), axis=0) | (out.first_bad > before)
     if not near.any():
         return out.first_bad
-    # Who is not finite in what is carried needs no more looks.
+    # Members whose carry is not finite need no further checks.
     last = plan.steps if (near & (out.first_bad < 0)).any() else int(out.first_bad.max()) - plan.first
     for done in range(0, last, _PIECE):
         piece = plan._replace(first=plan.first + done, steps=min(_PIECE, last - done), every=None, progress=None)
