@@ -426,7 +426,7 @@ def _warn_of_nonsense(run: Run) -> None:
             first, last = run.recorded["energy"][[0, -1]]
             moved = np.maximum(run.system.kinetic(run.v[0]), run.system.kinetic(run.v[-1]))
             wrong = np.abs(last - first) > 0.5 * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
-        wrong &= np.isfinite(last)  # who diverged was named before
+        wrong &= np.isfinite(last)  # members that diverged were named before
         if wrong.any():
             index = tuple(np.argwhere(wrong)[0].tolist())
             told.append(
