@@ -45,11 +45,11 @@ struct Trail {
     steps: usize,
 }
 
-/// Operations of a trail, at most: its code has to stay in the cache of instructions.
+/// The most operations of a trail, so that its code stays in the instruction cache.
 const TRAIL_OPERATIONS: usize = 2000;
-/// Steps of a trail at least, and at most. They divide those of a table.
+/// The fewest and the most steps of a trail. They divide the number of steps of a table.
 const TRAIL_STEPS: [usize; 2] = [4, 64];
-/// Lanes of a trail at most. A batch of many is written no quicker than memory allows as it is.
+/// The most lanes of a trail. The states of larger batches are already saved as fast as memory allows.
 const TRAIL_LANES: usize = 16;
 
 impl Trail {
