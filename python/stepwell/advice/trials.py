@@ -189,7 +189,7 @@ def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[fl
         sizes = {}
         for method in methods:
             n = 1
-            # The quicker of two, for a call that something else held up would look long enough.
+            # The faster of two, since a single call that was interrupted would seem long enough.
             while min(timed(method, n)[0], timed(method, n)[0]) < TIMED_SECONDS:
                 n *= 2
             sizes[method.name] = n

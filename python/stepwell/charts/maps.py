@@ -69,10 +69,10 @@ class StabilityMap(Value):
         return Oscillator(omega, self.damping[:, np.newaxis] if self.damped else None)
 
     def observe(self, steps: int = 4000) -> Observation:
-        """Run every point by the batch engine, and compare what it does with what the eigenvalues say.
+        """Run every point by the batch engine, and compare the motion with the prediction of the eigenvalues.
 
-        Each point starts from the two unit vectors of its slots, of which every start is a sum, and after N steps the larger
-        of the two states is looked at. Between bounded and growing stands a threshold that no stable point can reach:
+        Each point starts from the two unit vectors of its slots, of which every start is a linear combination, and after N steps
+        the larger of the two states is compared with a threshold that no stable point can reach:
         for two eigenvalues Pᴺ = z₁ᴺ·I + (z₁ᴺ − z₂ᴺ)/(z₁ − z₂)·(P − z₁I), where the fraction is a sum of N products of N − 1
         eigenvalues and so at most N·r₁ᴺ⁻¹, also where both are equal. With r₁ ≤ 1 no state is longer than 1 + N·K, where K is
         the largest norm of P − z₁I of the stable points; the threshold is T = 2·(1 + N·K), and the 2 is for

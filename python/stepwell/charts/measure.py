@@ -104,7 +104,7 @@ def asked(scene: Scene) -> Array:
 def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool = False) -> Point:
     """Run the scene with a tolerance and measure its errors.
 
-    Steps that were rejected are counted, and those that a state at the end takes, which is one of all that are looked at.
+    Its cost includes rejected steps, and the extra steps for the state at the end, but not those for the other output times.
     """
     times = asked(scene)
     with warnings.catch_warnings():

@@ -14,7 +14,7 @@ from ..errors import ArgumentError, UnsupportedError
 from ..methods import method
 from . import show
 
-#: What is drawn unless told otherwise: the pictures of all methods, and the map of each. Powers are drawn if asked for.
+#: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.
 USUAL = (*KINDS, "map")
 CHARTS = (*USUAL, "powers")
 

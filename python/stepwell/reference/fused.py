@@ -1,6 +1,6 @@
 """The second exact arithmetic: sums with a product in them are fused multiply-adds, a·b + c rounded once.
 
-Which products are fused is decided on the tape of a step, so it is the same for everybody. This file says how, evaluates a fused
+Which products are fused is decided on the tape of a step, so it is the same on every machine. This file says how, evaluates a fused
 tape operation by operation, and has a fused multiply-add of its own, since NumPy has none.
 """
 

@@ -23,7 +23,7 @@ NODE_PRODUCTS = [float(np.prod(node - np.delete(NODES, j))) for j, node in enume
 
 
 def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
-    """A quicker function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
+    """A faster function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
 
     Intervals are halved until that is so; where it would take too many, it is the same function.
     """

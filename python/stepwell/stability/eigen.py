@@ -120,7 +120,7 @@ def vector(matrix: Array, value: complex) -> Complex:
     """The eigenvector of a known eigenvalue, also of a multiple one, shape (n,): what the matrix without it makes smallest."""
     n, units = len(matrix), units_of(matrix)
     less = matrix * units / units[:, np.newaxis] - value * np.eye(n)
-    if n > SVD_MAX_ROWS:  # by inverse iteration, which is quicker, where the inverse exists
+    if n > SVD_MAX_ROWS:  # by inverse iteration, which is faster, where the inverse exists
         found = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
         try:
             for _ in range(3):

@@ -198,7 +198,7 @@ def _turning(z: complex) -> Array:
 
 
 def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -> Part:
-    """Two numbers, or those of a pair, in which an eigenvalue stands in the place of a block."""
+    """A part of two numbers, or of two pairs, with an eigenvalue in place of a block."""
     one = np.eye(2) if value.imag else np.eye(1)
     rows = [[one * (m or 0.0) for m in row] for row in multiples]
     rows[i][j] = _turning(value) if value.imag else value.real * one

@@ -124,7 +124,7 @@ struct Partners<const D: usize> {
 }
 
 impl<const D: usize> Bodies<D> {
-    /// Meets a chunk of partners; `met` has no bits where nobody meets.
+    /// Adds the forces of a chunk of partners; `met` is a mask, with no bits for pairs that do not count.
     #[inline(always)]
     fn meet<const LAW: u8, const ENERGY: bool>(&mut self, p: &mut Partners<D>, soft: f64, met: Option<&[u64; SIDE]>) {
         let mut d = [[0.0; SIDE]; D];

@@ -62,7 +62,7 @@ impl Time {
 /// One entry of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
-    /// The block in the place of v at the start of the step.
+    /// The v slot at the start of the step: v, or the carry.
     V,
     /// The coordinates at the start of the step.
     Y,

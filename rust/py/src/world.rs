@@ -152,7 +152,7 @@ impl World {
         self.alone(|of| of.advance(py, n, &self.step))
     }
 
-    /// What the method carries in the place of v, by rows; None if the next step begins with v itself.
+    /// The carry, by rows; None if the next step begins with v itself.
     fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let carry = self.alone(|Loop { world, arrays }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
         Ok(carry.map(|carry| carry.into_pyarray(py)))

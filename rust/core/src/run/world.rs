@@ -132,7 +132,7 @@ impl World {
         !(self.is_written && equal_bits(v, &self.written.0) && equal_bits(y, &self.written.1))
     }
 
-    /// What the method carries in the place of `v`, as rows of one number per member; none if the next step begins with `v` itself.
+    /// The carry of the method, as rows of one number per member; none if the next step begins with `v` itself.
     pub fn carry(&self, v: &[f64], y: &[f64]) -> Option<Vec<f64>> {
         if self.is_moved(v, y) {
             return None;

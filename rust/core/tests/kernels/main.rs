@@ -81,7 +81,7 @@ fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
 
-/// A random body in a random shape: how many inputs it was held against the interpreter with.
+/// Compares a random body in a random shape with the interpreter; returns on how many inputs.
 fn one_case(seed: u64, read_code: bool) -> usize {
     let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95));
     let operations = match random.below(8) {

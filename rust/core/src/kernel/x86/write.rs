@@ -87,7 +87,7 @@ impl Writer<'_> {
             (_, Source::Pool(i)) => Memory::new(POOL, (i as usize * self.shape.pool_copies() * 8) as i32),
             (_, Source::PerStep(i)) => Memory::new(PER_STEP, i as i32 * 8),
             (_, Source::Held(_)) => Memory { indexed: true, ..self.in_row(HELD, 0, value) },
-            (_, Source::Made) => Memory::new(SCRATCH, 0), // It is in a register, and nobody asks.
+            (_, Source::Made) => Memory::new(SCRATCH, 0), // It is in a register: never read from here.
         }
     }
 
