@@ -1,7 +1,7 @@
 """The second exact arithmetic: sums with a product in them are fused multiply-adds, a·b + c rounded once.
 
-Which products are fused is decided on the tape of a step, so it is the same on every machine. This file says how, evaluates a fused
-tape operation by operation, and has a fused multiply-add of its own, since NumPy has none.
+Which products are fused is decided on the tape of a step, so it is the same on every machine. This file says how, evaluates a
+fused tape operation by operation, and has a fused multiply-add of its own, since NumPy has none.
 """
 
 from collections.abc import Callable, Mapping, Sequence

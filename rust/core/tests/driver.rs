@@ -97,8 +97,8 @@ fn a_batch_of_any_size_is_its_members() {
 }
 
 #[test]
-fn the_first_bad_step_is_exact_on_both_sides_of_a_check() {
-    // Steps 1023, 1024 and 1025 are around the first check; growth is chosen so that members overflow there.
+fn the_first_bad_step_is_exact() {
+    // Growth is chosen so that members overflow at steps 1024 and 1025, among others.
     let omega: Vec<f64> = (0..400).map(|i| 2.10 + f64::from(i) * 2e-4).collect();
     let (_, _, bad) = last(&plan(oscillators(&omega, "false_euler"), 1.0, 3000, 400, 1)).unwrap();
     assert!(bad.contains(&1024) && bad.contains(&1025));
