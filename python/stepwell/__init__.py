@@ -1,9 +1,8 @@
 """Simple integration algorithms at the machine's speed.
 
-``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
-there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system, ``explain`` what
-a step computes; ``scenes`` and ``charts`` show what each method costs, how wrong it is and where it blows up, and ``advise`` says
-which to take.
+``integrate`` steps one trajectory or a hundred thousand; ``World`` is the real-time loop. ``methods`` and ``method`` describe the
+methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``scenes`` and
+``charts`` show the cost and error of each method and where it becomes unstable; ``advise`` recommends one.
 """
 
 from __future__ import annotations

@@ -181,8 +181,8 @@ def control(
 ) -> ControlSweep:
     """Run bodies by several methods without control, under control with many gains, and projected; measure energy and state.
 
-    All methods ask for the same number of rates, so one with k rates a step makes a k-th of the steps, each k times as long.
-    All gains of a method and a form are one batch.
+    All methods make the same number of function evaluations, so a method with k evaluations a step makes a k-th of the steps,
+    each k times as long. All gains of a method and a form are one batch.
 
     Args:
         scene: a scene of bodies or its name, or an ``NBody`` system for which ``v``, ``y``, ``horizon`` and ``evaluations``
@@ -190,18 +190,18 @@ def control(
         methods: names, or what ``stepwell.method`` returns.
         v: velocities at the start, shape (bodies, dim); those of the scene if None.
         y: coordinates at the start, likewise.
-        horizon: how long to run, in units of time; the scene's if None.
-        evaluations: how many times each run asks for rates; if None, once in each of the scene's steps.
+        horizon: the time of each run, in units of time; the scene's if None.
+        evaluations: function (rate) evaluations of each run; if None, one for each of the scene's steps.
         exact: the exact solution as a function of times of shape (n,), which returns blocks v and y of shape (n, bodies, dim),
             or the two blocks at the end; the scene's if None.
         relative: gains h·C·K at the start, shape (gains,), without a unit.
         forms: forms of ``EnergyControl``.
         ways: ways of ``Projection``.
-        title: what the picture says above; if None, the scene's title or the system.
-        progress: is called with the share that is done.
+        title: title of the picture; if None, the scene's title or the system.
+        progress: is called with the fraction that is done.
 
     Returns:
-        A ``ControlSweep``. What cannot be controlled is in its ``refused``, with the reason.
+        A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.
 
     Raises:
         ArgumentError: what was given and what was expected.

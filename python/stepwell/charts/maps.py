@@ -42,15 +42,15 @@ class StabilityMap(Value):
     """The radius r₁ of one method over angle per step and damping ratio.
 
     Attributes:
-        method: which.
+        method: the method.
         phi: Φ = ω₀·dt in radians, shape (columns,).
-        damping: damping ratios D, without a unit, shape (rows,); 0 alone for the undamped oscillator.
+        damping: damping ratios D, dimensionless, shape (rows,); 0 alone for the undamped oscillator.
         radius: r₁, the largest magnitude of an eigenvalue, shape (rows, columns).
         stable: whether the samples stay bounded, by the eigenvalues, of the same shape.
-        nonnormal: how far the transition matrix is from a multiple of the identity, as its largest eigenvalue would have
-            it: the Frobenius norm of P − z₁I, of the same shape. What is stable may grow so much before it decays.
+        nonnormal: the distance of the transition matrix from z₁ times the identity: the Frobenius norm of P − z₁I, of the same
+            shape. A stable oscillator may grow about so much before it decays.
         imaginary: the imaginary part of z₁, of the same shape; 0 where both eigenvalues are real.
-        damped: whether the oscillator has a damping term, which some methods cannot do.
+        damped: whether the oscillator has a damping term, which some methods do not support.
     """
 
     method: Method

@@ -1,7 +1,7 @@
 """Other programs on the axes of a work-precision chart.
 
-A peer is a function, or a ``Peer`` made of one, that is given a scene, times and a setting (a tolerance or a step), and returns
-the states at these times with its rate evaluations and seconds. Those of SciPy, heyoka and REBOUND are here; each
+A peer is a function of a scene, times and a setting (a tolerance or a step), or a ``Peer`` made of one. It returns
+the states at these times with its function (rate) evaluations and seconds. Peers for SciPy, heyoka and REBOUND are here; each
 package is imported when its function is called, and need not be installed otherwise.
 """
 
@@ -22,19 +22,19 @@ from ..errors import DTypeError, ShapeError, UnsupportedError
 from ..scenes import Scene
 from ..systems import NBody
 
-#: Tolerances of a peer, and of methods that choose their steps: two in each factor of ten.
+#: Tolerances of a peer, and of methods with adaptive steps: two in each factor of ten.
 TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
 
 
 @dataclass(frozen=True, eq=False)
 class Solved(Value):
-    """What a peer found.
+    """The result of a peer.
 
     Attributes:
-        v: velocity blocks at the times that were asked for, shape (times, *block).
+        v: velocity blocks at the output times, shape (times, *block).
         y: coordinate blocks, likewise.
         evaluations: function (rate) evaluations, or None if not reported; it is then charted by its time alone.
-        seconds: that it took, without what is prepared once.
+        seconds: computing time, without preparations that are made once.
     """
 
     v: Array
@@ -48,12 +48,12 @@ class Peer(Value):
     """Another program.
 
     Attributes:
-        name: in the table and the picture.
-        solve: from scene, times of shape (n,) above 0, the last at the horizon, and a setting, to what was found. It raises
-            ``UnsupportedError`` for a scene that it cannot do, which the chart lists among what is refused.
-        settings: with which to run it.
-        by: what they are, ``"tolerance"`` or ``"step"``.
-        order: of convergence, or None.
+        name: its name in the table and the picture.
+        solve: a function of scene, times of shape (n,) above 0, the last at the horizon, and a setting, that returns a
+            ``Solved``. It raises ``UnsupportedError`` for a scene that it cannot solve; the chart then lists it in ``refused``.
+        settings: the settings with which it is run.
+        by: the kind of setting, ``"tolerance"`` or ``"step"``.
+        order: order of convergence, or None.
     """
 
     name: str
@@ -92,14 +92,14 @@ def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
 
 
 def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
-    """SciPy's ``solve_ivp`` with ``rtol`` = ``atol`` = the tolerance; rates in NumPy, a call of Python for each.
+    """SciPy's ``solve_ivp`` with ``rtol`` = ``atol`` = the tolerance; rates in NumPy, with a Python call for each.
 
-    The states between its steps are interpolated, by polynomials of less order than its steps, so that errors of
+    The states between its steps are interpolated by polynomials of lower order than its steps, so the errors of
     DOP853 and RK45 include those of the interpolation, except at the end.
 
     Args:
         method: ``"RK45"``, ``"DOP853"``, or another of its explicit methods.
-        settings: tolerances; it takes none below 100 times the rounding of a float.
+        settings: tolerances; SciPy accepts none below 100 times the rounding of a float.
 
     Raises:
         UnsupportedError: if SciPy is not installed.

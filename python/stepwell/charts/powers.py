@@ -1,4 +1,4 @@
-"""Powers against steps: what n steps of a linear system cost and how wrong they are, made one by one or by a power of P (§4)."""
+"""Powers against steps: cost and error of n steps of a linear system, made one by one or by a power of P (§4)."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Powers(Drawn, Value):
     """Cost and error of n steps in each form.
 
     Attributes:
-        system: what was stepped.
-        method: how.
+        system: the system.
+        method: the method.
         dt: the step, in units of time.
         steps: numbers of steps, shape (n,).
         seconds: measured median of the repeats, by form, each of shape (n,).
@@ -130,7 +130,7 @@ def powers(
         y: coordinate block at the start.
         dt: the step, in units of time, above zero.
         steps: numbers of steps.
-        progress: is called with the share that is done.
+        progress: is called with the fraction that is done.
 
     Returns:
         A ``Powers``.
