@@ -34,7 +34,7 @@ pub enum Rate {
     Velocity,
 }
 
-/// One thing to be done.
+/// One act of a course.
 pub enum Act {
     /// A rate, from two rows into another. Of [`Rate::Velocity`] the increment is in the row `y`.
     Ask {
@@ -62,7 +62,7 @@ pub enum Act {
     Pass(Box<Stage>),
 }
 
-/// What is done to an arena.
+/// The schedule for an arena.
 pub struct Course {
     /// In order.
     pub acts: Vec<Act>,
@@ -72,10 +72,10 @@ pub struct Course {
     pub results: Vec<usize>,
 }
 
-/// What a course is for.
+/// The purpose of a course.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// The first two results take the place of the state.
+    /// The first two results replace the state.
     State,
     /// The state stays, and rates are those of a system scaled to a step of 1, stretched to the step.
     Attempt,
@@ -113,7 +113,7 @@ impl Node {
     }
 }
 
-/// Pass k stands before the rates of turn k, which may be asked for side by side; the last pass makes the results.
+/// Pass k comes before the rates of turn k, which are independent of each other; the last pass computes the results.
 struct Plan {
     nodes: Vec<Node>,
     results: Vec<usize>,
@@ -294,7 +294,7 @@ impl Plan {
         for pass in 0..=turns {
             let mut writes: Vec<(usize, usize)> = self.writes[pass].iter().map(|node| (row(*node), *node)).collect();
             if pass == turns && goal == Goal::State {
-                // Results that stand elsewhere come home.
+                // Results in other rows are copied to theirs.
                 let away = [V, Y].into_iter().map(|home| (home, self.results[home]));
                 writes.extend(away.filter(|(home, node)| row(*node) != *home));
             }

@@ -17,7 +17,7 @@ use crate::{
     trace::{How, method},
 };
 
-/// What a method does to blocks, for one kind of rates.
+/// The courses of a method, for one kind of rates.
 pub struct Courses {
     /// A step, or an attempt at one.
     pub step: Course,
@@ -138,7 +138,7 @@ impl Group for LargeGroup {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        // What all members have in common is taken once: a large matrix takes longer to take than a step.
+        // Parameters that all members share are copied once: copying a large matrix takes longer than a step.
         if !std::mem::replace(&mut self.prepared, spec.is_common()) {
             self.blocks.rates.prepare(spec, first, count);
         }

@@ -22,7 +22,7 @@ use crate::{
 pub struct Rated {
     shape: Shape,
     facts: Facts,
-    /// Whether the system adds something up.
+    /// Whether the system has a tally, a sum over the steps.
     tally: bool,
     dv: Option<Stage>,
     dy: Option<Stage>,
@@ -32,7 +32,7 @@ pub struct Rated {
     record: Option<(Stage, bool)>,
 }
 
-/// The numbers of a state before what is made.
+/// The numbers of a state before the result.
 fn before(shape: Shape) -> usize {
     shape.v + shape.y
 }
@@ -42,7 +42,7 @@ fn behind(shape: Shape) -> usize {
     before(shape) + shape.v.max(shape.y)
 }
 
-/// Traces what is made of the system, v and y: a block or none, v and y.
+/// Traces a function of the system, v and y. Its results are a block or none, v and y.
 fn rate(
     kind: &Kind,
     given: &Given,

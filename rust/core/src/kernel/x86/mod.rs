@@ -26,7 +26,7 @@ pub struct Shape {
     pub width: usize,
     /// Vectors of a block: those that one turn of the loop steps.
     pub block_vectors: usize,
-    /// How many of them are interleaved, operation by operation; so many after so many. All, or fewer where registers are scarce and
+    /// How many of them are interleaved at a time, operation by operation: all, or fewer where registers are scarce and
     /// out-of-order execution overlaps them by itself.
     pub interleaved: usize,
     /// Blocks, which are stepped one after the other.
@@ -52,7 +52,7 @@ impl Shape {
         if self.level == Level::Avx512 { 32 } else { 16 }
     }
 
-    /// How often a number of the pool stands there: AVX-512 can take one for all lanes.
+    /// Copies of each number in the pool: AVX-512 can broadcast a single one to all lanes.
     fn pool_copies(&self) -> usize {
         match (self.level, self.width) {
             (Level::Avx512, _) => 1,
@@ -61,7 +61,7 @@ impl Shape {
         }
     }
 
-    /// Whether this machine has it, and all places of a body in it can be named by 31 bits.
+    /// Whether this machine has it, and all addresses of a body in it fit into 31 bits.
     fn is_possible(&self, body: &Body) -> bool {
         let is_known = match self.width {
             1 | 4 => self.level >= Level::Avx2,
@@ -82,7 +82,7 @@ impl Shape {
     }
 }
 
-/// More operations than that are no kernel: jumps could not be named by 31 bits.
+/// The most operations of a kernel, so that jumps fit into 31 bits.
 const MAX_OPERATIONS: usize = 1 << 22;
 
 /// A kernel as machine code.

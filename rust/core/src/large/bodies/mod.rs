@@ -111,12 +111,12 @@ impl Bodies {
         }
     }
 
-    /// Whether the forces at these places, and the potentials if they are wanted, are at hand.
+    /// Whether the forces at these coordinates, and the potentials if needed, are known.
     fn has(&self, energy: bool, y: &[f64]) -> bool {
         self.has_forces && (self.has_potentials || !energy) && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
-    /// Finds the forces, if they are not at hand.
+    /// Computes the forces, unless they are known.
     fn find(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
         if self.has(energy, y) {
             out[..y.len()].copy_from_slice(&self.dv);
