@@ -39,7 +39,7 @@ class World:
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
 
     ``step(n)`` makes n steps in place and allocates nothing: it is meant for the few microseconds of a frame, and holds the GIL
     for them. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between

@@ -30,7 +30,7 @@ class Candidate(Protocol):
     """A method, and how its steps are chosen.
 
     Attributes:
-        method: which.
+        method: the method.
         by: ``"step"`` or ``"tolerance"``.
         name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``.
         first: the least k.

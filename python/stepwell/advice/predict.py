@@ -138,7 +138,7 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
 
     Args:
         trials: runs of the scene.
-        method: which.
+        method: the method.
         stable: a number of steps over the horizon with which the method is stable.
     """
     horizon = trials.scene.horizon

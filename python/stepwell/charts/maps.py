@@ -211,22 +211,22 @@ def stability_map(
     damping: tuple[float, float] | None = (0.0, 2.0),
     size: int | tuple[int, int] = SIZE,
 ) -> StabilityMap:
-    """The largest eigenvalue of a method on the damped oscillator, over angle per step and damping ratio (§3, §4).
+    """Map the largest eigenvalue of a method on the damped oscillator over angle per step and damping ratio (§3, §4).
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
-        phi: from where to where Φ = ω₀·dt goes, in radians, from 0 to 100; the first point is one spacing above the lower end.
+        phi: the range (lower, upper) of Φ = ω₀·dt in radians, within 0 … 100; the first point is one spacing above the lower end.
             If None, from 0 to 4, or past the method's limit.
-        damping: from where to where the damping ratio D goes, without a unit, both ends included; None for the undamped
-            oscillator over Φ alone, which every method can do.
-        size: how many points over each axis, or a pair: over Φ, over D.
+        damping: the range (lower, upper) of the damping ratio D, dimensionless, both ends included; None for the undamped
+            oscillator over Φ alone, which every method can step.
+        size: number of points over each axis, or a pair: over Φ, over D.
 
     Returns:
         A ``StabilityMap``.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do a damped oscillator.
+        UnsupportedError: if the method cannot step a damped oscillator.
     """
     how = find_method(method)
     low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")

@@ -129,7 +129,7 @@ def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
     """Taylor series by heyoka, compiled for the scene; bodies, and linear systems without inputs.
 
-    A step with a series of order p is counted as p rate evaluations. States between steps are by the series. What is compiled
+    A step with a series of order p is counted as p function evaluations. States between steps are by the series. What is compiled
     before the run is not timed.
 
     Raises:
@@ -160,7 +160,7 @@ REBOUND = {"ias15": True, "bs": True, "leapfrog": False}
 def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) -> Peer:
     """REBOUND; bodies under Newton's law only.
 
-    Its rate evaluations are counted in a run of their own, which is not timed.
+    Its function evaluations are counted in a run of their own, which is not timed.
 
     Args:
         integrator: ``"ias15"`` or ``"bs"`` by tolerance (of ias15 its ``epsilon``, which is not an error but a power of one), or

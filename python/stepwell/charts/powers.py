@@ -137,7 +137,7 @@ def powers(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the system is not linear, or the method cannot do it.
+        UnsupportedError: if the system is not linear, or the method cannot step it.
     """
     how = find_method(method)
     system = Oscillator() if system is None else a_system(system)

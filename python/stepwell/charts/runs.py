@@ -147,7 +147,7 @@ class RunPicture(Drawn, Value):
 
 
 def run_picture(scene: Scene | str, run: Run) -> RunPicture:
-    """Look at a run of a scene: where it went, and how wrong it was.
+    """Make a picture of a run of a scene, with its errors.
 
     Args:
         scene: the ``Scene`` that was run, or its name.

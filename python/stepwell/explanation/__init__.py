@@ -62,7 +62,7 @@ def explain(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
     """
     how, system = find_method(method), a_system(system).sized()
     fits_together(system, how)

@@ -120,7 +120,7 @@ class Scene(Value):
 
         Raises:
             ArgumentError: what was given and what was expected.
-            UnsupportedError: if the method cannot do the system.
+            UnsupportedError: if the method cannot step the system.
 
         Warns:
             DivergenceWarning: if the state left the range of finite numbers.

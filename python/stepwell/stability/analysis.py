@@ -188,14 +188,14 @@ class Analysis(Value):
 
 
 def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0) -> Analysis:
-    """The transition matrix of a step, its eigenvalues, and what they say (§4).
+    """Find the transition matrix of a step and its eigenvalues, and classify them (§4).
 
-    P of a linear system comes from stepping unit vectors; of any other from the exact derivative of a step at a state,
-    which is then what the method does to a small disturbance of it. Verlet is analysed through its two positions; at small steps
-    up to 2⁻⁵²/Φ² of its angle is rounding.
+    P of a linear system is found by stepping unit vectors. For a nonlinear system it is the Jacobian of a step at a state, exact
+    to rounding, which maps a small disturbance to that after the step. Verlet is analysed with its two positions as the state;
+    at small steps its angle has a relative rounding error of up to 2⁻⁵²/Φ².
 
     Args:
-        system: what is stepped; its parameters may be arrays. That of a run under control is ``run.system``.
+        system: the system; its parameters may be arrays. That of a run under control is ``run.system``.
         method: its name, or what ``stepwell.method`` returns.
         dt: the step, in units of time, above zero; an array broadcasts with the parameters. Left out for a run, it is the run's.
         at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
@@ -207,7 +207,7 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
     """
     how = find_method(method)
     system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
