@@ -348,6 +348,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_class::<ModelSpec>()?;
+    m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;
     m.add_class::<world::World>()?;

@@ -9,13 +9,14 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
+    systems::equations,
     tape::{self, Id, Op, fuse::fuse, print},
     trace,
 };
 
 use crate::{
     kinds_of,
-    model::{ModelSpec, core_error},
+    model::{Equations, ModelSpec, core_error},
 };
 
 type Shared = Arc<Mutex<tape::Tape>>;
@@ -276,6 +277,24 @@ impl Tape {
             operations.push(operation(*op, |operand| place[operand as usize]));
         }
         Ok((operations, roots.into_iter().map(|root| place[root as usize]).collect()))
+    }
+
+    /// The rates of a user's own system: of v, and of y unless they are v itself.
+    #[pyo3(signature = (dv, dy=None))]
+    fn equations(&self, dv: Vec<PyRef<'_, Symbol>>, dy: Option<Vec<PyRef<'_, Symbol>>>) -> PyResult<Equations> {
+        let of_v = dv.len();
+        let is_velocity = dy.is_none();
+        let (tape, roots) = self.with(&dv.into_iter().chain(dy.into_iter().flatten()).collect::<Vec<_>>())?;
+        let needed = tape.needed(roots.iter().copied());
+        let mut place = vec![0; needed.len()];
+        let mut ops = Vec::new();
+        for (id, op) in tape.ops().iter().enumerate().filter(|(id, _)| needed[*id]) {
+            place[id] = ops.len() as Id;
+            ops.push(op.with(|operand| place[operand as usize]));
+        }
+        let mut dv: Vec<Id> = roots.into_iter().map(|root| place[root as usize]).collect();
+        let dy = dv.split_off(of_v);
+        Ok(Equations(Arc::new(equations::Equations::new(ops, dv, (!is_velocity).then_some(dy)))))
     }
 
     /// A tape with fused multiply-adds in what these values need, and the values on it.
