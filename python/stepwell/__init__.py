@@ -22,6 +22,7 @@ from .world import World
 if TYPE_CHECKING:
     from . import advice, charts, explanation, scenes, stability
     from .advice import advise
+    from .equations import system
     from .explanation import Explanation, explain
     from .scenes import Scene
     from .stability import analyse, criteria, stability_limit
@@ -67,6 +68,7 @@ __all__ = [
     "scenes",
     "stability",
     "stability_limit",
+    "system",
 ]
 
 
@@ -93,6 +95,7 @@ _LATER = {
     "explain": "explanation.explain",
     "explanation": "explanation",
     "scenes": "scenes",
+    "system": "equations.system",
     "stability": "stability",
     "analyse": "stability.analyse",
     "criteria": "stability.criteria",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .engine import AdaptiveArrays, Arrays, Pacing, Plan
 
 __all__ = [
+    "Equations",
     "ModelSpec",
     "Symbol",
     "Tape",
@@ -29,6 +30,14 @@ __all__ = [
     "systems",
 ]
 __version__: str
+
+@final
+class Equations:
+    """The rates of a user's own system, as operations; given to a ``ModelSpec`` under any name. See ``Tape.equations``."""
+
+    @property
+    def reads_v(self) -> bool:
+        """Whether a rate of v depends on v."""
 
 @final
 class ModelSpec:
@@ -139,6 +148,9 @@ class Tape:
 
     def operations(self, of: list[Symbol]) -> tuple[list[tuple[str, list[int], int]], list[int]]:
         """What these values are made of, in order: names, operands, what else is given; and the places of the values."""
+
+    def equations(self, dv: list[Symbol], dy: list[Symbol] | None = None) -> Equations:
+        """These values as the rates of a system; without ``dy``, ẏ is v."""
 
     def fused(self, of: list[Symbol]) -> tuple[Tape, list[Symbol]]:
         """A tape with fused multiply-adds in what these values need, and the values on it."""

@@ -30,6 +30,10 @@ class NotFiniteError(ArgumentError):
     """An input holds NaN or an infinity."""
 
 
+class TraceError(ArgumentError):
+    """A function of a user's own equations does what cannot be traced; the message names its line and what to write instead."""
+
+
 class TooLargeError(ArgumentError, MemoryError):
     """What was asked for does not fit in memory."""
 

@@ -52,7 +52,7 @@ def integrate(
     system: System,
     method: str | Method,
     *,
-    v: Any,
+    v: Any = None,
     y: Any,
     dt: float | None = None,
     steps: int | None = None,
@@ -84,7 +84,7 @@ def integrate(
     Args:
         system: what to step.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block at the start, shape (*block, *batch), or one number for all.
+        v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
         dt: the step, in units of time, above zero; that of before if None and the run goes on. With a tolerance, the step to try
             first; if None, a hundredth of the time in which the start changes, and where it is at rest a millionth of the unit of
@@ -138,6 +138,7 @@ def integrate(
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)
+    v = velocities(system, v)
     fits_together(system, how)
     fused = _checks.flag("fused", fused)
     if tolerance is not None or at is not None:
@@ -251,6 +252,15 @@ def integrate(
     _warn(run, before)
     _warn_of_nonsense(run)
     return run
+
+
+def velocities(system: System, v: Any) -> Any:
+    """What is given as v; a system without velocities needs none."""
+    if v is None and system.v_shape == (0,):
+        return 0.0
+    if v is None:
+        raise ArgumentError(f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none")
+    return v
 
 
 def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from math import inf, prod
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -193,6 +194,11 @@ class System(Value, ABC):
 def a_system(value: Any) -> System:
     """Return the argument ``system`` if it is one."""
     if not isinstance(value, System):
+        if type(value).__name__ == "Definition":
+            return a_system(value())
+        if isinstance(value, FunctionType):
+            name = value.__name__
+            raise DTypeError(f"system: expected a system, got the function {name}; wrap it: sw.system({name}), or @sw.system above it")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 

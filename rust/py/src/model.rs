@@ -38,6 +38,15 @@ pub fn core_error(error: Error) -> PyErr {
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct Equations(pub Arc<equations::Equations>);
 
+#[pymethods]
+impl Equations {
+    /// Whether a rate of v depends on v.
+    #[getter]
+    fn reads_v(&self) -> bool {
+        self.0.reads_v()
+    }
+}
+
 /// What is given under a name: a word, a whole number, rows of a parameter, samples with their start and interval, or rates.
 enum Value {
     Word(String),

@@ -63,7 +63,7 @@ impl Equations {
     }
 
     /// Whether a rate of v depends on v.
-    fn reads_v(&self) -> bool {
+    pub fn reads_v(&self) -> bool {
         let needed = self.needed(&self.dv);
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
     }

@@ -1,0 +1,193 @@
+"""Systems of users' own equations."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .. import _checks, _core
+from .._checks import Array, Shape
+from ..equations.definition import Definition, fits
+from ..equations.trace import Equations
+from ..errors import ShapeError, TraceError
+from ..reference.systems.equations import Equations as Reference
+from .base import Given, System, aligned, flat, shown
+from .inputs import Input, Sampled, Sinusoid
+
+#: What the function is given as, among the names of parameters; none of these can be called so.
+RATES = "equations()"
+#: Without a state the shortest vector is looked for that the function can do with, up to this length.
+LONGEST_GUESS = 32
+
+
+class OwnSystem(System):
+    """A system of equations of one's own: what a function decorated by ``stepwell.system`` returns."""
+
+    kernel = "equations"
+    reference = Reference
+
+    def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
+        self.definition = definition
+        self.parameters_given: dict[str, Any] = {}
+        batches = {}
+        for name, value in parameters.items():
+            default = definition.parameters[name]
+            own = 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+            argument = f"{definition.name}: {name}"
+            if isinstance(value, (Sinusoid, Sampled)) or callable(value):
+                if own:
+                    raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
+                self.parameters_given[name] = value
+                batches[name] = getattr(value, "batch", ())
+                continue
+            numbers = _checks.numbers(argument, value)
+            if numbers.ndim < own:
+                raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
+            self.parameters_given[name] = numbers
+            batches[name] = numbers.shape[own:]
+        self.batch = _checks.batch_shape({f"{definition.name}: {name}": shape for name, shape in batches.items()})
+        self.second_order = definition.order == 2 and definition.blocks == 1
+        self.equations: Equations | None = None
+        self._core: Any = None
+
+    def said(self) -> list[str]:
+        """The parameters."""
+        return shown(**self.parameters_given)
+
+    def __repr__(self) -> str:
+        said = self.said() + ([] if self.control is None else [repr(self.control)])
+        return f"{self.definition.name}({', '.join(said)})"
+
+    def _held(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_core"}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._held() | {"_core": None}
+
+    def __deepcopy__(self, memo: Any) -> OwnSystem:
+        again = copy.copy(self)
+        again.parameters_given = copy.deepcopy(self.parameters_given, memo)
+        again.control = copy.deepcopy(self.control, memo)
+        again._core = self._core
+        return again
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+        default = self.definition.parameters[name]
+        return 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+
+    # ---- shapes
+
+    def sized(self, *states: Any) -> OwnSystem:
+        """The same system for the states v and y of these shapes; None is what was not given."""
+        given = dict(zip(("v", "y"), states, strict=False))
+        shapes = {name: _checks.shape_of(name, state) for name, state in given.items() if state is not None}
+        if self.equations is not None and self._fits(shapes):
+            return self
+        refused: list[tuple[bool, Exception]] = []
+        for v_shape, y_shape in self._candidates(shapes):
+            try:
+                return self._bound(v_shape, y_shape)
+            except TraceError as error:
+                refused.append((y_shape == () or v_shape == (), error))
+        if not refused:
+            raise ShapeError(
+                f"{self.definition.name}: no state of the declared shape {self.definition.shape} fits what was given: "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
+            )
+        # A scalar is tried first, and what a function of an array says of it helps nobody.
+        raise next((error for is_scalar, error in refused if not is_scalar), refused[0][1])
+
+    def _fits(self, shapes: dict[str, Shape]) -> bool:
+        """Whether blocks of the known shapes can be the first axes of these."""
+        mine = {"v": self.v_shape, "y": self.y_shape}
+        return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
+
+    def _candidates(self, shapes: dict[str, Shape]) -> Iterator[tuple[Shape, Shape]]:
+        """Shapes of v and y that the function may be written for, the least first."""
+        declared_v, declared_y = self.definition.shape
+        v, y = shapes.get("v", ()), shapes.get("y", ())
+        if self.definition.blocks == 2:
+            pairs = [(v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1)]
+        elif not (v or y):
+            # Nothing is said of the state: a number, or the shortest vector.
+            shortest = [(), *((n,) for n in range(1, LONGEST_GUESS + 1))]
+            whole = declared_y is not None and None not in declared_y
+            sizes: list[Shape] = [tuple(n or 1 for n in declared_y)] if whole and declared_y is not None else shortest
+            pairs = [((0,) if self.definition.order == 1 else size, size) for size in sizes]
+        elif self.definition.order == 1:
+            pairs = [((0,), y[:n]) for n in range(len(y) + 1)]
+        else:
+            longest = max(v, y, key=len)
+            pairs = [(longest[:n], longest[:n]) for n in range(len(longest) + 1)]
+        for v_shape, y_shape in pairs:
+            if fits(v_shape, declared_v) and fits(y_shape, declared_y):
+                yield v_shape, y_shape
+
+    def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
+        """The same system for blocks of these shapes; the function is traced, twice to see that it always does the same."""
+        definition = self.definition
+        bound = copy.copy(self)
+        bound.v_shape, bound.y_shape = v_shape, y_shape
+        axes = {name: self.own_axes(name) for name in self.parameters_given}
+        bound.equations = Equations(definition.function, definition.order, definition.blocks, v_shape, y_shape, axes)
+        from ..reference.traced import Tracer
+
+        tape = _core.Tape()
+        traced = []
+        for _ in range(2):
+            tracer = Tracer(bound, tape)
+            v, y, _more = tracer.state()
+            dv, dy = tracer.scaled(1.0).rates(tape.time(), v, y)
+            traced.append((tracer.flat(dv), tracer.flat(dy)))
+        if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
+            raise TraceError(
+                f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw random "
+                f"numbers or count its calls"
+            )
+        dv, dy = traced[0]
+        bound._core = tape.equations(dv if v_shape != (0,) else [], None if bound.second_order else dy)
+        bound.velocity_term = "a force that depends on v" if bound._core.reads_v else None
+        return bound
+
+    def _known(self) -> OwnSystem:
+        """The same system, of which the shapes of its blocks are known."""
+        return self if self.equations is not None else self.sized()
+
+    # ---- what the core and the reference take
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The function, and parameters by name."""
+        made: dict[str, Any] = {RATES: self._known().equations}
+        for name, value in self.parameters_given.items():
+            if isinstance(value, (Sinusoid, Sampled)):
+                made[name] = value.signal()
+            elif isinstance(value, np.ndarray):
+                own = self.own_axes(name)
+                made[name] = aligned(value, own, batch) if own else value
+            else:
+                made[name] = value
+        return made
+
+    def parameters(self, batch: Shape) -> Given:
+        """The operations of the function, and parameters by name, as the core takes them."""
+        bound = self._retraced()
+        given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, bound._core), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+
+    def _retraced(self) -> OwnSystem:
+        """With its operations, which a copy from a file has not."""
+        known = self._known()
+        if known._core is None:
+            free = known if known._free is None else known._free
+            assert isinstance(free, OwnSystem)
+            known._core = free._bound(known.v_shape, known.y_shape)._core
+        return known
+
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs among the parameters, by name."""
+        return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}
+
