@@ -33,6 +33,9 @@ class NotFiniteError(ArgumentError):
 class TraceError(ArgumentError):
     """A function of a user's own equations does what cannot be traced; the message names its line and what to write instead."""
 
+    #: Whether it may be that the state had another shape than the function is for.
+    of_shape = False
+
 
 class TooLargeError(ArgumentError, MemoryError):
     """What was asked for does not fit in memory."""

@@ -259,7 +259,9 @@ def velocities(system: System, v: Any) -> Any:
     if v is None and system.v_shape == (0,):
         return 0.0
     if v is None:
-        raise ArgumentError(f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none")
+        raise ArgumentError(
+            f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none"
+        )
     return v
 
 
@@ -490,7 +492,7 @@ def fits_together(system: System, method: Method) -> None:
     if system.velocity_term is not None:
         raise UnsupportedError(
             f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
-            f"use false_euler, or leave {system.velocity_term} out"
+            f"use false_euler{'' if system.velocity_term == 'forces that do' else f', or leave {system.velocity_term} out'}"
         )
 
 

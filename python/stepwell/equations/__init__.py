@@ -13,4 +13,12 @@ The system itself is ``systems/own.py``, its rates in the reference are ``refere
 
 from .definition import Definition, system
 
-__all__ = ["Definition", "system"]
+
+def functions() -> list[str]:
+    """The names of NumPy's functions that own equations may use; ``np.linalg.norm`` is ``norm`` here."""
+    from .arrays import names
+
+    return names()
+
+
+__all__ = ["Definition", "functions", "system"]

@@ -12,7 +12,6 @@ from ..errors import TraceError
 from ..reference import functions
 from .values import (
     COMPARISONS,
-    Array,
     Operators,
     Scalar,
     Truth,
@@ -21,17 +20,16 @@ from .values import (
     elementwise,
     folded,
     objects,
+    of_shape,
     wrapped,
 )
 
 #: Functions of numbers, element by element, by NumPy's names.
-ELEMENTWISE: dict[str, Callable[..., Any]] = {
-    name: getattr(functions, name)
-    for name in (
-        "sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp exp2 expm1 log log2 log10 log1p sqrt cbrt hypot power square "
-        "sign copysign floor ceil trunc round mod minimum maximum deg2rad rad2deg"
-    ).split()
-}
+_OWN = (
+    "sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp exp2 expm1 log log2 "
+    "log10 log1p sqrt cbrt hypot power square sign copysign floor ceil trunc round mod minimum maximum deg2rad rad2deg"
+)
+ELEMENTWISE: dict[str, Callable[..., Any]] = {name: getattr(functions, name) for name in _OWN.split()}
 ELEMENTWISE |= {
     "absolute": functions.abs,
     "abs": functions.abs,
@@ -56,13 +54,12 @@ ELEMENTWISE |= {
 }
 
 #: Functions that only move elements: NumPy's own, on arrays of objects.
-MOVING = {
-    getattr(np, name)
-    for name in (
-        "atleast_1d atleast_2d broadcast_to column_stack concatenate diag diagonal dstack expand_dims flip fliplr flipud hstack "
-        "moveaxis ravel repeat reshape roll rollaxis rot90 split array_split squeeze stack swapaxes take tile transpose tril triu vstack"
-    ).split()
-}
+_MOVING = (
+    "atleast_1d atleast_2d broadcast_to column_stack concatenate diag diagonal dstack expand_dims flip fliplr flipud "
+    "hstack moveaxis ravel repeat reshape roll rollaxis rot90 split array_split "
+    "squeeze stack swapaxes take tile transpose tril triu vstack"
+)
+MOVING = {getattr(np, name) for name in _MOVING.split()}
 
 
 def elementwise_named(name: str, *given: Any) -> Any:
@@ -84,8 +81,20 @@ def elementwise_named(name: str, *given: Any) -> Any:
     if name == "matmul":
         return matmul(*given)
     if name not in ELEMENTWISE:
-        raise TraceError(f"there is no function {name} for own equations; known: {', '.join(sorted(ELEMENTWISE))}")
+        raise unknown(name)
     return elementwise(name, ELEMENTWISE[name], *given)
+
+
+def unknown(name: str) -> TraceError:
+    """There is no such function."""
+    import difflib  # a mistake may take its time
+
+    known = sorted({*ELEMENTWISE, *FUNCTIONS, *(each.__name__ for each in MOVING)})
+    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or ["sin", "exp", "where", "sum", "dot"]
+    return TraceError(
+        f"there is no np.{name} for own equations; near it: {', '.join(f'np.{each}' for each in near)}. "
+        f"stepwell.equations.functions() lists all"
+    )
 
 
 def _as_operand(x: Any) -> Any:
@@ -95,7 +104,9 @@ def _as_operand(x: Any) -> Any:
 def ufunc_of(ufunc: Any, method: str, given: Any, options: Any) -> Any:
     """What an element-by-element function of NumPy makes of values."""
     if options:
-        raise TraceError(f"np.{ufunc.__name__}: {', '.join(options)}= is not known to own equations, and nothing can be written to")
+        raise TraceError(
+            f"np.{ufunc.__name__}: {', '.join(options)}= is not known to own equations, and nothing can be written to"
+        )
     if method != "__call__":
         raise TraceError(f"np.{ufunc.__name__}.{method} is not known to own equations; write np.sum, np.prod or a loop")
     return elementwise_named(ufunc.__name__, *given)
@@ -109,15 +120,23 @@ def function_of(function: Any, given: Any, options: Any) -> Any:
     if name in ELEMENTWISE and not options:
         return elementwise_named(name, *given)
     if name not in FUNCTIONS:
-        known = sorted({*FUNCTIONS, *ELEMENTWISE, *(each.__name__ for each in MOVING)})
-        raise TraceError(f"there is no function np.{name} for own equations; known: {', '.join(known)}")
+        raise unknown(name)
     try:
+        if name in _OF_ARRAYS and isinstance(given[0], Scalar):
+            raise of_shape(f"np.{name}: expected an array, got one number")
         return FUNCTIONS[name](*given, **options)
     except TypeError as error:
         raise TraceError(f"np.{name}: {error}") from None
 
 
+#: Of these functions those that make an array of a number.
+_WIDENING = {np.atleast_1d, np.atleast_2d, np.broadcast_to, np.expand_dims, np.repeat, np.tile}
+
+
 def _moved(function: Any, given: Any, options: Any) -> Any:
+    if given and isinstance(given[0], Scalar) and function not in _WIDENING:
+        raise of_shape(f"np.{function.__name__}: expected an array, got one number")
+
     def plain(x: Any) -> Any:
         if isinstance(x, Operators):
             return objects(x)
@@ -132,9 +151,9 @@ def _moved(function: Any, given: Any, options: Any) -> Any:
 def reduced(name: str, function: Callable[[Any, Any], Any], x: Any, axis: Any, keepdims: bool) -> Any:
     """A function over the elements along an axis, or several, or all, from the first to the last."""
     if isinstance(x, Scalar):
-        raise TraceError(f"np.{name}: expected an array, got one number")
+        raise of_shape(f"np.{name}: expected an array, got one number")
     items = array(x).items
-    axes = tuple(range(items.ndim)) if axis is None else tuple(int(each) % items.ndim for each in np.atleast_1d(axis))
+    axes = tuple(range(items.ndim)) if axis is None else tuple(_axis(name, int(each), items.ndim) for each in np.atleast_1d(axis))
     rest = tuple(each for each in range(items.ndim) if each not in axes)
     shape = [items.shape[each] for each in rest]
     if 0 in items.shape:
@@ -146,10 +165,16 @@ def reduced(name: str, function: Callable[[Any, Any], Any], x: Any, axis: Any, k
     return wrapped(objects(made).reshape([1 if each in axes else items.shape[each] for each in range(items.ndim)]))
 
 
+def _axis(name: str, axis: int, axes: int) -> int:
+    if not -axes <= axis < axes:
+        raise of_shape(f"np.{name}: axis {axis} is out of bounds for an array of {axes} axes")
+    return axis % axes
+
+
 def _reduction(name: str) -> Callable[..., Any]:
     def of_array(a: Any, axis: Any = None, *, keepdims: bool = False) -> Any:
         if isinstance(a, Scalar):
-            raise TraceError(f"np.{name}: expected an array, got one number")
+            raise of_shape(f"np.{name}: expected an array, got one number")
         return getattr(array(a), name)(axis=axis, keepdims=keepdims)
 
     return of_array
@@ -181,7 +206,7 @@ def clip(a: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: 
 def dot(a: Any, b: Any) -> Any:
     """As ``np.dot`` of arrays of one or two axes: sums of products, from the first to the last."""
     if np.ndim(objects(a)) == 0 or np.ndim(objects(b)) == 0:
-        raise TraceError("np.dot: expected arrays, got one number; write a · b as a * b")
+        raise of_shape("np.dot: expected arrays, got one number; write a · b as a * b")
     return matmul(a, b)
 
 
@@ -189,11 +214,11 @@ def matmul(a: Any, b: Any) -> Any:
     """A @ b of arrays of one or two axes: sums of products, from the first to the last."""
     left, right = array(a).items, array(b).items
     if left.ndim not in (1, 2) or right.ndim not in (1, 2):
-        raise TraceError(f"@: expected arrays of one or two axes, got shapes {left.shape} and {right.shape}")
+        raise of_shape(f"@: expected arrays of one or two axes, got shapes {left.shape} and {right.shape}")
     rows = left if left.ndim == 2 else left[np.newaxis]
     columns = right.T if right.ndim == 2 else right[np.newaxis]
     if rows.shape[1] != columns.shape[1]:
-        raise TraceError(f"@: shapes {left.shape} and {right.shape} do not fit")
+        raise of_shape(f"@: shapes {left.shape} and {right.shape} do not fit")
     made = np.empty((len(rows), len(columns)), dtype=object)
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
@@ -208,7 +233,9 @@ def cross(a: Any, b: Any) -> Any:
     if sizes == (2, 2):
         return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     if sizes != (3, 3):
-        raise TraceError(f"np.cross: expected two or three coordinates along the last axis of both, got {sizes[0]} and {sizes[1]}")
+        raise TraceError(
+            f"np.cross: expected two or three coordinates along the last axis of both, got {sizes[0]} and {sizes[1]}"
+        )
     parts = [a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in ((1, 2), (2, 0), (0, 1))]
     return np.stack(parts, axis=-1)
 
@@ -221,7 +248,7 @@ def outer(a: Any, b: Any) -> Any:
 def norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:
     """The length: the root of the sum of squares."""
     if isinstance(x, Scalar):
-        raise TraceError("np.linalg.norm: expected an array, got one number; write abs")
+        raise of_shape("np.linalg.norm: expected an array, got one number; write abs")
     x = array(x)
     if ord not in (None, 2) or (axis is None and x.ndim > 1 and ord is not None):
         raise TraceError("np.linalg.norm: only the length, the root of the sum of squares, is known to own equations")
@@ -262,7 +289,7 @@ def full_like(a: Any, fill_value: Any, dtype: Any = None) -> Any:
 
 
 #: Functions of arrays, by NumPy's names.
-FUNCTIONS: dict[str, Callable[..., Any]] = {
+FUNCTIONS: dict[str, Any] = {
     "where": where,
     "clip": clip,
     "dot": dot,
@@ -284,4 +311,14 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "real": lambda a: a,
     "trace": lambda a: reduced("sum", operator.add, np.diagonal(a), None, False),
 } | {name: _reduction(name) for name in ("sum", "prod", "mean", "min", "max", "all", "any")}
+#: What NumPy takes a number for, too, and a function that is written for arrays must not.
+_OF_ARRAYS = {"inner", "vdot", "outer", "diff", "cumsum", "size", "trace", "amin", "amax"}
 FUNCTIONS |= {"amin": FUNCTIONS["min"], "amax": FUNCTIONS["max"]}
+
+
+def names() -> list[str]:
+    """All functions of NumPy that own equations know, by name."""
+    moving = {each.__name__ for each in MOVING}
+    return sorted(
+        {*ELEMENTWISE, *FUNCTIONS, *COMPARISONS, *moving, "divide", "matmul", "logical_and", "logical_or", "logical_not"}
+    )

@@ -45,8 +45,8 @@ class Definition:
         """The system with these parameters; what is not given has its default.
 
         Args:
-            given: by name: a number, an array over the batch (behind the axes of its own, if the default has some), a ``Sinusoid``,
-                a ``Sampled``, or a function of the time in NumPy style.
+            given: by name: a number, an array over the batch (behind the axes of its own, if the default has some), a
+                ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
 
         Raises:
             ArgumentError: if there is no such parameter, or it is no finite number.
@@ -124,14 +124,14 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
     system and never during a step. It is written for one member: batches come by themselves.
 
     Args:
-        function: ``f(t, v, y, *, parameters)`` that returns v̇ (ẏ is v); with ``order=1``, ``f(t, y, *, parameters)`` that returns ẏ, as
-            SciPy's ``solve_ivp`` takes it; with ``blocks=2``, ``f(t, v, y, *, parameters)`` that returns the pair (v̇, ẏ). v̇ and ẏ have the
-            shapes of v and y. Each parameter has a default; the axes of an array as a default are the parameter's own, those of a
-            batch come behind them.
+        function: ``f(t, v, y, *, parameters)`` that returns v̇, while ẏ is v; with ``order=1``, ``f(t, y, *, parameters)`` that
+            returns ẏ, as SciPy's ``solve_ivp`` takes it; with ``blocks=2``, ``f(t, v, y, *, parameters)`` that returns the pair
+            (v̇, ẏ). v̇ and ẏ have the shapes of v and y. Each parameter has a default. If that is an array, its axes are the
+            parameter's own, and those of a batch come behind them.
         order: 1 or 2.
         blocks: 2 for a function that gives both rates.
-        shape: the shape of the state of a member, None for a length that is open; with ``blocks=2`` a pair of shapes. If it is not
-            given, the state that a run begins with tells: its first axes, as few as the function can do with.
+        shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
+            is not given, the state that a run begins with tells: its first axes, as few as the function can do with.
 
     Returns:
         A ``Definition``: called with parameters by name, it gives a ``System``.

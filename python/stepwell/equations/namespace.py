@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import math
+from contextlib import suppress
 from types import CellType, FunctionType, ModuleType
 from typing import Any
 
@@ -47,8 +48,12 @@ class _Module:
         return names[name] if name in names else getattr(object.__getattribute__(self, "_module"), name)
 
 
+#: Functions of ``math`` that NumPy calls otherwise.
+OF_MATH = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power", "fabs": "abs"}
+
+
 def _of_math(name: str, function: Any) -> Any:
-    numpy_name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power", "fabs": "abs"}.get(name, name)
+    numpy_name = OF_MATH.get(name, name)
 
     def of_any(*given: Any) -> Any:
         return elementwise_named(numpy_name, *given) if any(map(_holds, given)) else function(*given)
@@ -56,14 +61,19 @@ def _of_math(name: str, function: Any) -> Any:
     return of_any
 
 
-_NUMPY = _Module(np, {"array": _array, "asarray": _asarray, "asanyarray": _asarray, "ascontiguousarray": _asarray, "float64": lambda x: x if _holds(x) else np.float64(x)})
+_NUMPY = _Module(
+    np,
+    {
+        "array": _array,
+        "asarray": _asarray,
+        "asanyarray": _asarray,
+        "ascontiguousarray": _asarray,
+        "float64": lambda x: x if _holds(x) else np.float64(x),
+    },
+)
 _MATH = _Module(
     math,
-    {
-        name: _of_math(name, getattr(math, name))
-        for name in dir(math)
-        if name in ELEMENTWISE or name in ("asin", "acos", "atan", "atan2", "pow", "fabs")
-    },
+    {name: _of_math(name, getattr(math, name)) for name in dir(math) if name in ELEMENTWISE or name in OF_MATH},
 )
 #: What names of another meaning stand for.
 _MEANING: dict[int, Any] = {
@@ -99,10 +109,8 @@ def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
             names[name] = meant(names[name])
     names["__builtins__"] = builtins
     for cell, old in zip(closure, function.__closure__ or (), strict=True):
-        try:
+        with suppress(ValueError):  # an empty cell: a name that is bound later
             cell.cell_contents = meant(old.cell_contents)
-        except ValueError:  # an empty cell: a name that is bound later
-            pass
     return again
 
 

@@ -11,42 +11,44 @@ from .._checks import Shape
 from ..errors import TraceError
 from ..reference.types import Array as Numbers
 from .namespace import rebound
-from .values import Array, Scalar, array, objects
+from .values import Array, Scalar, array, objects, of_shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .definition import Definition
+
 #: How many lines of an error are looked through for the user's own.
 MOST_FRAMES = 200
+
+#: So many characters of a line of the user's file stand in a message.
+MOST_OF_A_LINE = 80
 
 
 class Equations:
     """A user's function for blocks of known shapes.
 
     Attributes:
-        name: of the function.
-        function: the user's, of t, v, y (or t and y) and parameters by name.
-        order: 1 or 2; 2 gives v̇ alone, and ẏ is v.
-        blocks: how many rates it gives.
+        definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it gives.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
         own_axes: how many axes of its own each parameter has.
     """
 
-    def __init__(
-        self, function: Callable[..., Any], order: int, blocks: int, v_shape: Shape, y_shape: Shape, own_axes: dict[str, int]
-    ) -> None:
-        self.name = function.__name__
-        self.function = function
-        self.order, self.blocks = order, blocks
+    def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_axes: dict[str, int]) -> None:
+        self.definition = definition
         self.v_shape, self.y_shape = v_shape, y_shape
         self.own_axes = own_axes
-        self._meant = rebound(function)
+
+    @property
+    def name(self) -> str:
+        """Of the function."""
+        return self.definition.name
 
     @property
     def second_order(self) -> bool:
         """Whether ẏ is v."""
-        return self.order == 2 and self.blocks == 1
+        return self.definition.order == 2 and self.definition.blocks == 1
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Equations) and self._key() == other._key()
@@ -55,19 +57,18 @@ class Equations:
         return hash(self._key())
 
     def _key(self) -> tuple[Any, ...]:
-        return self.function, self.order, self.blocks, self.v_shape, self.y_shape
+        return self.definition, self.v_shape, self.y_shape
 
     def __deepcopy__(self, memo: Any) -> Equations:
         return self  # nothing of it changes
 
     def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
         """v̇ and ẏ: of symbols, symbols; of numbers, those of every member. Where ẏ is v, it is not computed."""
-        batch = y.shape[len(self.y_shape) :] or v.shape[len(self.v_shape) :]
-        batch = np.broadcast_shapes(batch, v.shape[len(self.v_shape) :], np.shape(t))
+        batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
         with np.errstate(all="ignore"):
             parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
             state = [_scalars(y, len(self.y_shape))]
-            if self.order == 2 or self.blocks == 2:
+            if self.definition.has_v:
                 state.insert(0, _scalars(v, len(self.v_shape)))
             made = self._called(Scalar(t), state, parameters)
         dv, dy = self._checked(made)
@@ -82,7 +83,7 @@ class Equations:
         return _scalars(value, self.own_axes[name])
 
     def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
-        return self._run(self._meant, self.name, t, *state, **parameters)
+        return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
 
     def _run(self, function: Callable[..., Any], name: str, *given: Any, **named: Any) -> Any:
         try:
@@ -91,16 +92,21 @@ class Equations:
             raise
         except Exception as error:
             line = _line_of(error, getattr(function, "__code__", None))
-            said = str(error) if isinstance(error, TraceError) else f"{type(error).__name__}: {error}"
-            raise TraceError(f"{name}{line}: {said}") from error
+            known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
+            said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
+            told = TraceError(f"{name}{line}: {said}")
+            told.of_shape = (
+                known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+            )
+            raise told from error
 
     def _checked(self, made: Any) -> tuple[Any, Any]:
         """The rates of v and of y as objects, or None for what the function does not give."""
-        if self.blocks == 2:
+        if self.definition.blocks == 2:
             if not isinstance(made, (tuple, list)) or len(made) != 2:
                 raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {_kind(made)}")
             return self._block("v̇", made[0], self.v_shape), self._block("ẏ", made[1], self.y_shape)
-        if self.order == 2:
+        if self.definition.order == 2:
             return self._block("v̇", made, self.v_shape), None
         return None, self._block("ẏ", made, self.y_shape)
 
@@ -110,7 +116,7 @@ class Equations:
         except TraceError as error:
             raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {_kind(made)} ({error})") from None
         if items.shape != shape:
-            raise TraceError(f"{self.name}: expected {what} of shape {shape}, that of its block, got shape {items.shape}")
+            raise of_shape(f"{self.name}: expected {what} of shape {shape}, that of its block, got shape {items.shape}")
         return items
 
 
@@ -136,10 +142,11 @@ def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
         made = np.empty(len(values), dtype=object)
         made[:] = values
         return made.reshape(shape)
-    numbers = np.empty((len(values), *batch))
+    # Analysis steps numbers whose imaginary part is infinitesimal.
+    numbers = np.empty((len(values), *batch), dtype=np.result_type(np.float64, *(np.asarray(value).dtype for value in values)))
     for i, value in enumerate(values):
         numbers[i] = value
-    return numbers.reshape(*shape, *batch)
+    return numbers.reshape((*shape, *batch))
 
 
 def _line_of(error: BaseException, code: Any) -> str:
@@ -155,4 +162,5 @@ def _line_of(error: BaseException, code: Any) -> str:
         return ""
     file, line = found.tb_frame.f_code.co_filename, found.tb_lineno
     text = linecache.getline(file, line).strip()
+    text = text if len(text) <= MOST_OF_A_LINE else f"{text[:MOST_OF_A_LINE]}…"
     return f" ({file.replace(chr(92), '/').rsplit('/', 1)[-1]}, line {line}{f': {text}' if text else ''})"

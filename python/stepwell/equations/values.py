@@ -1,7 +1,7 @@
 """What a user's function is run with: numbers and arrays that stand for those of a state.
 
-A ``Scalar`` holds one number: a symbol, which writes the tape of a step, or an array with that number of every member of a batch, by
-which the NumPy reference computes. An ``Array`` holds scalars in a shape. Both do what NumPy's arrays do, one operation
+A ``Scalar`` holds one number: a symbol, which writes the tape of a step, or an array with that number of every member of a batch,
+by which the NumPy reference computes. An ``Array`` holds scalars in a shape. Both do what NumPy's arrays do, one operation
 after the other in a fixed order; what cannot be traced is an error that says what to write instead.
 """
 
@@ -16,6 +16,13 @@ import numpy as np
 
 from ..errors import TraceError
 from ..reference import functions
+
+
+def of_shape(text: str) -> TraceError:
+    """An error of a function that was run with an array of a wrong shape: another may do."""
+    error = TraceError(text)
+    error.of_shape = True
+    return error
 
 
 #: Numbers that are known while a function is traced.
@@ -61,7 +68,7 @@ def elementwise(name: str, function: Callable[..., Any], *given: Any) -> Any:
     try:
         made = np.frompyfunc(of_scalars, len(given), 1)(*map(objects, given))
     except ValueError as error:
-        raise TraceError(f"{name}: {error}") from None
+        raise of_shape(f"{name}: {error}") from None
     return wrapped(made)
 
 
@@ -93,7 +100,7 @@ def array(given: Any) -> Array:
         parts = [objects(each) for each in given]
         shapes = {part.shape for part in parts}
         if len(shapes) > 1:
-            raise TraceError(f"expected parts of one shape in an array, got shapes {', '.join(map(str, sorted(shapes)))}")
+            raise of_shape(f"expected parts of one shape in an array, got shapes {', '.join(map(str, sorted(shapes)))}")
         made = np.empty((len(parts), *(shapes.pop() if shapes else ())), dtype=object)
         for i, part in enumerate(parts):
             made[i] = part if part.ndim else part[()]
@@ -217,8 +224,8 @@ class Operators:
 
     def __float__(self) -> NoReturn:
         raise TraceError(
-            "a value that depends on the state, a parameter or the time is no number yet, so it cannot become a float or be written "
-            "into an array of numbers: leave float() out, and in place of out[i] = … write np.array([…]) or np.stack"
+            "a value that depends on the state, a parameter or the time is no number yet, so it cannot become a float or be "
+            "written into an array of numbers: leave float() out, and in place of out[i] = … write np.array([…]) or np.stack"
         )
 
     __int__ = __index__ = __complex__ = __float__
@@ -373,7 +380,7 @@ class Array(Operators):
         return np.dtype(np.float64)
 
     @property
-    def T(self) -> Array:
+    def T(self) -> Array:  # noqa: N802
         """Its axes in reverse order."""
         return Array(self.items.T)
 

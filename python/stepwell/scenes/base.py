@@ -15,10 +15,11 @@ from .._checks import Array, Shape
 from .._value import Value
 from ..control import EnergyControl, Projection
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
-from ..integrate import integrate
+from ..integrate import integrate, velocities
 from ..methods import Method
 from ..result import Run
 from ..systems import System
+from ..systems.base import a_system
 
 #: How many times of the horizon give the exact solution's scale.
 SCALE_SAMPLES = 1001
@@ -32,7 +33,7 @@ class Scene(Value):
 
     Attributes:
         system: what to step, of one member.
-        v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it.
+        v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it; a first-order system has none.
         y: coordinate block at t = 0, likewise of its ``y_shape``.
         horizon: time over which errors are measured, in units of time, above zero; that of ``until`` if None.
         dt: the usual step, in units of time; the document's where it gives one, a thousandth of the horizon if None.
@@ -59,8 +60,8 @@ class Scene(Value):
     """
 
     system: System
-    v: Array
-    y: Array
+    v: Array = None  # type: ignore[assignment]  # never after __post_init__
+    y: Array = None  # type: ignore[assignment]
     horizon: float = None  # type: ignore[assignment]  # never after __post_init__
     dt: float = None  # type: ignore[assignment]
     exact: Callable[[Array], tuple[Array, Array]] | None = None
@@ -75,10 +76,11 @@ class Scene(Value):
 
     def __post_init__(self) -> None:
         """Check what was given, and find what was not."""
-        if not isinstance(self.system, System):
-            raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(self.system).__name__}")
-        given = [_checks.numbers(name, block) for name, block in (("v", self.v), ("y", self.y))]
-        system = self.system.sized(*given)
+        if self.y is None:
+            raise ArgumentError("y: expected the coordinates at t = 0, got None")
+        y = _checks.numbers("y", self.y)
+        system = a_system(self.system).sized(None if self.v is None else _checks.numbers("v", self.v), y)
+        given = [_checks.numbers("v", velocities(system, self.v)), y]
         if system.batch:
             raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
         found: dict[str, Any] = {"system": system}

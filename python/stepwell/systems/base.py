@@ -198,7 +198,7 @@ def a_system(value: Any) -> System:
             return a_system(value())
         if isinstance(value, FunctionType):
             name = value.__name__
-            raise DTypeError(f"system: expected a system, got the function {name}; wrap it: sw.system({name}), or @sw.system above it")
+            raise DTypeError(f"system: expected a system, got the function {name}; wrap it with sw.system({name}), or @sw.system")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 

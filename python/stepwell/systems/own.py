@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 
 from .. import _checks, _core
-from .._checks import Array, Shape
+from .._checks import Shape
 from ..equations.definition import Definition, fits
 from ..equations.trace import Equations
 from ..errors import ShapeError, TraceError
 from ..reference.systems.equations import Equations as Reference
+from ..reference.traced import Tracer
 from .base import Given, System, aligned, flat, shown
 from .inputs import Input, Sampled, Sinusoid
 
 #: What the function is given as, among the names of parameters; none of these can be called so.
 RATES = "equations()"
+#: Attributes that are found out of the others and kept.
+FOUND_LATER = ("_core", "_bounds")
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
 LONGEST_GUESS = 32
 
@@ -52,6 +55,8 @@ class OwnSystem(System):
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
         self._core: Any = None
+        #: For states of shapes that were met before.
+        self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
 
     def said(self) -> list[str]:
         """The parameters."""
@@ -62,16 +67,17 @@ class OwnSystem(System):
         return f"{self.definition.name}({', '.join(said)})"
 
     def _held(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_core"}
+        return {name: value for name, value in vars(self).items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self._held() | {"_core": None}
+        return self._held() | {"_core": None, "_bounds": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = copy.copy(self)
         again.parameters_given = copy.deepcopy(self.parameters_given, memo)
-        again.control = copy.deepcopy(self.control, memo)
-        again._core = self._core
+        if self.control is not None:
+            again.control = copy.deepcopy(self.control, memo)
+        again._bounds = {}
         return again
 
     def own_axes(self, name: str) -> int:
@@ -87,19 +93,19 @@ class OwnSystem(System):
         shapes = {name: _checks.shape_of(name, state) for name, state in given.items() if state is not None}
         if self.equations is not None and self._fits(shapes):
             return self
-        refused: list[tuple[bool, Exception]] = []
+        refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
             try:
                 return self._bound(v_shape, y_shape)
             except TraceError as error:
-                refused.append((y_shape == () or v_shape == (), error))
+                refused.append(error)
         if not refused:
             raise ShapeError(
-                f"{self.definition.name}: no state of the declared shape {self.definition.shape} fits what was given: "
+                f"{self.definition.name}: no state of the declared shape {self.definition.shape[1]} fits what was given: "
                 + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
             )
-        # A scalar is tried first, and what a function of an array says of it helps nobody.
-        raise next((error for is_scalar, error in refused if not is_scalar), refused[0][1])
+        # What a function of an array says when it is given a number is not what is wrong with it.
+        raise next((error for error in refused if not error.of_shape), refused[0])
 
     def _fits(self, shapes: dict[str, Shape]) -> bool:
         """Whether blocks of the known shapes can be the first axes of these."""
@@ -129,13 +135,14 @@ class OwnSystem(System):
 
     def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
         """The same system for blocks of these shapes; the function is traced, twice to see that it always does the same."""
+        if (known := self._bounds.get((v_shape, y_shape))) is not None:
+            return known
         definition = self.definition
         bound = copy.copy(self)
+        bound._bounds = {}
         bound.v_shape, bound.y_shape = v_shape, y_shape
         axes = {name: self.own_axes(name) for name in self.parameters_given}
-        bound.equations = Equations(definition.function, definition.order, definition.blocks, v_shape, y_shape, axes)
-        from ..reference.traced import Tracer
-
+        bound.equations = Equations(definition, v_shape, y_shape, axes)
         tape = _core.Tape()
         traced = []
         for _ in range(2):
@@ -145,12 +152,13 @@ class OwnSystem(System):
             traced.append((tracer.flat(dv), tracer.flat(dy)))
         if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
             raise TraceError(
-                f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw random "
-                f"numbers or count its calls"
+                f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw "
+                f"random numbers or count its calls"
             )
         dv, dy = traced[0]
         bound._core = tape.equations(dv if v_shape != (0,) else [], None if bound.second_order else dy)
-        bound.velocity_term = "a force that depends on v" if bound._core.reads_v else None
+        bound.velocity_term = "forces that do" if bound._core.reads_v else None
+        self._bounds[v_shape, y_shape] = bound
         return bound
 
     def _known(self) -> OwnSystem:
@@ -190,4 +198,3 @@ class OwnSystem(System):
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""
         return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}
-

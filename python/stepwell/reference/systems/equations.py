@@ -10,7 +10,7 @@ from ..types import Array
 class Equations:
     """The rates are what ``rates`` makes of the time, the state and what the system is given by name.
 
-    ``rates`` is the user's function over arrays whose last axes are those of the batch; of a second-order system it gives v̇ alone.
+    ``rates`` runs the user's function over arrays whose last axes are those of the batch.
     """
 
     def __init__(self, h: float, /, **given: Any) -> None:
