@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import TraceError
 from ..reference import functions
+from ..reference.functions import operations
 
 
 def of_shape(text: str) -> TraceError:
@@ -256,8 +257,8 @@ def _floored(a: Any, b: Any) -> Any:
     return functions.floor(_divided(a, b))
 
 
-def _not(function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    return lambda a, b: inverted(function(a, b))
+def _equal(a: Any, b: Any) -> Any:
+    return operations.equal(b, a) if operations.is_symbol(b) else operations.equal(a, b)
 
 
 def inverted(mask: Any) -> Any:
@@ -267,12 +268,12 @@ def inverted(mask: Any) -> Any:
 
 #: By NumPy's names. A NaN is unequal to everything, and neither below nor above anything.
 COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
-    "less": functions.less,
-    "less_equal": functions.at_most,
-    "greater": lambda a, b: functions.less(b, a),
-    "greater_equal": lambda a, b: functions.at_most(b, a),
-    "equal": functions.equal,
-    "not_equal": _not(functions.equal),
+    "less": lambda a, b: a < b,
+    "less_equal": lambda a, b: a <= b,
+    "greater": lambda a, b: a > b,
+    "greater_equal": lambda a, b: a >= b,
+    "equal": _equal,
+    "not_equal": lambda a, b: inverted(_equal(a, b)),
 }
 
 

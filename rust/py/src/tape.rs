@@ -183,6 +183,10 @@ impl Symbol {
     fn add_bits(&self, bits: u64) -> Symbol {
         self.with_bits(bits, Op::AddBits)
     }
+    /// A number on the tape of this symbol.
+    fn number(&self, x: f64) -> Symbol {
+        self.on(|_| Op::Const(x.to_bits()))
+    }
     /// Bits moved up.
     fn shift_up(&self, places: u32) -> Symbol {
         self.on(|id| Op::ShiftUp(id, places & 63))

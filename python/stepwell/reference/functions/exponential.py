@@ -1,0 +1,111 @@
+"""Exponential functions.
+
+x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²·Q(r) with one polynomial, without a division.
+``docs/coefficients.py`` finds the coefficients.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from .operations import either_bits, elementary, sign_of, where
+from .pieces import MAGIC, fast_sum, halves, polynomial, power_of_two, scaled
+
+#: ln 2; n times the first part, of 33 bits, is exact.
+LN2 = (0.6931471806019545, -4.2009150726810846e-11)
+#: ln 2 again, the first part of 26 bits.
+LN2_UPPER = (0.6931471824645996, -1.904654299957768e-09)
+LOG2_E = 1.4426950408889634
+#: (eʳ − 1 − r)/r².
+EXP = (
+    0.5,
+    0.16666666666666669,
+    0.04166666666666667,
+    0.008333333333328882,
+    0.001388888888888252,
+    0.00019841269866585198,
+    2.4801587328609384e-05,
+    2.755726454521223e-06,
+    2.7557270626199803e-07,
+    2.5101831986346174e-08,
+    2.0915713107101096e-09,
+)
+#: (2ʳ − 1 − r·ln 2)/r².
+EXP2 = (
+    0.24022650695910075,
+    0.0555041086648216,
+    0.009618129107619295,
+    0.0013333558146415914,
+    0.00015403530423870623,
+    1.5252733831061695e-05,
+    1.3215452116185932e-06,
+    1.0178061864730851e-07,
+    7.070892031492808e-09,
+    4.4550557022368883e-10,
+)
+
+
+def held(x: Any, least: float, most: float) -> Any:
+    """X held between two constants; a NaN stays one."""
+    x = where(x < least, least, x)
+    return where(most < x, most, x)
+
+
+class Reduced(NamedTuple):
+    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is the last two."""
+
+    n: Any
+    upper: Any
+    rest: Any
+
+
+def reduced(x: Any) -> Reduced:
+    """Of a number that is small enough for n to be far below 2²⁰."""
+    n = (x * LOG2_E + MAGIC) - MAGIC
+    upper, lower = x - n * LN2[0], n * LN2[1]
+    r = upper - lower
+    return Reduced(n, upper, (r * r) * polynomial(r, EXP) - lower)
+
+
+@elementary
+def exp(x: Any) -> Any:
+    """Exponential of x, eˣ, subnormal results included.
+
+    Example:
+        >>> exp(1.0)
+        2.718281828459045
+    """
+    x = held(x, -746.0, 710.0)
+    p = reduced(x)
+    return scaled(1.0 + (p.upper + p.rest), p.n, x < 0.0)
+
+
+@elementary
+def expm1(x: Any) -> Any:
+    """Exponential of x less 1, eˣ − 1, also where that is small."""
+    y = held(x, -40.0, 710.0)
+    p = reduced(y)
+    # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); of n = 1024 half a 2¹⁻ⁿ is still to be had.
+    one, one_rest = fast_sum(1.0, -0.5 * power_of_two(1.0 - p.n))
+    s, lost = fast_sum(one, p.upper)
+    value = scaled(s + (lost + (p.rest + one_rest)), p.n, y < 0.25)  # small y are not halved: they may be subnormal
+    return either_bits(value, sign_of(x))
+
+
+def exp2_of_sum(x: Any, tail: Any, low: Any) -> Any:
+    """Two to the power x + tail, for |x| below 1100 and a tail that is small beside it; ``low`` is whether x is below 0."""
+    n = (x + MAGIC) - MAGIC
+    upper = x - n  # exact
+    r = upper + tail
+    r1, _ = halves(r)
+    r2 = (upper - r1) + tail
+    s, lost = fast_sum(1.0, r1 * LN2_UPPER[0])
+    rest = (r2 * (LN2_UPPER[0] + LN2_UPPER[1]) + r1 * LN2_UPPER[1]) + (r * r) * polynomial(r, EXP2)
+    return scaled(s + (lost + rest), n, low)
+
+
+@elementary
+def exp2(x: Any) -> Any:
+    """Two to the power x; exact for whole x."""
+    x = held(x, -1080.0, 1025.0)
+    return exp2_of_sum(x, 0.0, x < 0.0)
