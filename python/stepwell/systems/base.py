@@ -40,6 +40,8 @@ class System(Value, ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
+        complex_step: whether the reference is right on numbers with an infinitesimal imaginary part, which is the quickest way to
+            its derivatives; those of others come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: what keeps its energy, if anything does; ``integrate`` puts it there.
@@ -49,6 +51,7 @@ class System(Value, ABC):
     reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
     linear: ClassVar[bool] = False
+    complex_step: ClassVar[bool] = False
     second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
