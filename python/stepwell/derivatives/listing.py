@@ -41,6 +41,7 @@ class Listing:
         roots: the lines of the values.
         marks: of each line that is a marked function, its mark.
         place: of each symbol's number, its line.
+        passed: of each line, whether a derivative passes it: not the insides of marked functions, nor what only decides a choice.
     """
 
     def __init__(self, tape: Tape, roots: Sequence[Symbol], marks: Marks) -> None:
@@ -59,6 +60,18 @@ class Listing:
                 break
             asked += missing
         self.roots = places[: len(roots)]
+        self.passed = [False] * len(self.operations)
+        for root in self.roots:
+            self.passed[root] = True
+        for line in range(len(self.operations) - 1, -1, -1):
+            if self.passed[line]:
+                for each in self.reads(line)[0][self.is_choice(line) :]:
+                    if isinstance(each, Symbol):
+                        self.passed[self.place[each.id]] = True
+
+    def is_choice(self, line: int) -> bool:
+        """Whether a line is one of two others, as a mask, its first operand, says."""
+        return self.operations[line].name == "choose" and line not in self.marks
 
     def _unknown(self, argument: Any) -> bool:
         return isinstance(argument, Symbol) and argument.id not in self.place

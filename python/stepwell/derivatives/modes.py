@@ -129,13 +129,13 @@ def _forward(listing: Listing, seeds: dict[int, dict[int, Symbol]]) -> list[dict
     by_number: dict[int, dict[int, Symbol]] = {}
     for line, symbol in enumerate(listing.symbols):
         if (row := seeds.get(symbol.id)) is None:
-            reads, mark = listing.reads(line)
+            reads = listing.reads(line)[0] if listing.passed[line] else ()
             changes = [by_number.get(each.id, {}) if isinstance(each, Symbol) else {} for each in reads]
             row = {}
             if not any(changes):
                 pass
-            elif mark is None and listing.operations[line].name == "choose":
-                truth, _, _ = reads
+            elif listing.is_choice(line):
+                truth = reads[0]
                 for k in changes[1] | changes[2]:
                     row[k] = truth.choose(changes[1].get(k, 0.0), changes[2].get(k, 0.0))
             else:
@@ -184,9 +184,9 @@ def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
         if line not in found or not changing[line] or listing.symbols[line].id in numbers:
             continue
         share, guard = found[line]
-        reads, mark = listing.reads(line)
+        reads = listing.reads(line)[0]
         wanted = [isinstance(each, Symbol) and changing[listing.place[each.id]] for each in reads]
-        if mark is None and listing.operations[line].name == "choose":
+        if listing.is_choice(line):
             truth, yes, no = reads
             if wanted[1]:
                 pass_on(yes, truth.choose(share, 0.0), guard.also(truth))
@@ -211,11 +211,8 @@ def _depends(listing: Listing, bits: dict[int, int]) -> list[int]:
     for line, symbol in enumerate(listing.symbols):
         own = bits.get(symbol.id)
         if own is None:
-            reads, mark = listing.reads(line)
-            if mark is None and listing.operations[line].name == "choose":
-                reads = reads[1:]
             own = 0
-            for each in reads:
+            for each in listing.reads(line)[0][listing.is_choice(line) :] if listing.passed[line] else ():
                 if isinstance(each, Symbol):
                     own |= depends[listing.place[each.id]]
         depends.append(own)
@@ -235,7 +232,7 @@ def _backwards_is_shorter(listing: Listing, numbers: list[int]) -> bool:
     for line in range(len(listing.symbols) - 1, -1, -1):
         if not depends[line] or listing.symbols[line].id in bits:
             continue
-        for each in listing.reads(line)[0]:
+        for each in listing.reads(line)[0][listing.is_choice(line) :]:
             if isinstance(each, Symbol) and depends[place := listing.place[each.id]]:
                 needed[place] |= needed[line]
                 forward += depends[place].bit_count()

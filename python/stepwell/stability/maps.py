@@ -64,7 +64,7 @@ def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: A
     If the system is set back onto its energy after a step, that belongs to it.
     """
     members = together(system, dt, v, y)
-    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y) if method.carry else v
+    slot = _started(system, method, dt, members, t, v, y) if method.carry else v
     if not system.complex_step:
         return traced.matrix(system, "step", method, members, slot, y, t, dt)[0]
     s: Any = _scaled(system, dt, (sum(size(system)), *members))
@@ -104,11 +104,22 @@ def finish(
         free = system.without_inputs()
         slot, y = unit(free, members)
         return rows(free, method.steps.finish(_scaled(free, dt, (n, *members)), 0, 0.0, slot, y), y)
-    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y)
+    slot = _started(system, method, dt, members, t, v, y)
     if not system.complex_step:
         return traced.matrix(system, "finish", method, members, slot, y, t, dt)[0]
     s = _scaled(system, dt, (n, *members))
     return _derivative(system, members, slot, y, lambda slot, y: (method.steps.finish(s, 0, t, slot, y), y))
+
+
+def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
+    """What a method carries in the place of v, where each member may have a step of its own."""
+
+    def spread(block: Array, shape: Shape) -> Array:
+        own = block.shape[len(shape) :]
+        return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
+
+    v, y = spread(v, system.v_shape), spread(y, system.y_shape)
+    return method.steps.start(_scaled(system, dt, members), 0, t, v, y)
 
 
 def unit(system: System, members: Shape) -> tuple[Array, Array]:
