@@ -236,8 +236,13 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
 def _solved(matrix: Array, rates: Array) -> Array:
     """The shortest x with matrix·x = rates, or nearest to it, for each column."""
     of_rows, of_columns = _units(matrix)
-    inverse = np.linalg.pinv(np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), rcond=SINGULAR)
-    return np.asarray(np.einsum("kij,jk->ik", inverse, rates / of_rows) / of_columns)
+    stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
+    singular = np.linalg.svd(stacked, compute_uv=False)
+    regular = singular[:, -1] > SINGULAR * singular[:, 0]
+    found = np.empty(right.shape)
+    found[regular] = np.linalg.solve(stacked[regular], right[regular])
+    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=SINGULAR) @ right[~regular]
+    return np.asarray(found[:, :, 0].T / of_columns)
 
 
 def _units(matrix: Array) -> tuple[Array, Array]:
@@ -276,7 +281,8 @@ def _equilibrium(
     analysis = None
     if method is not None:
         linear = system.linear  # of such a system the step is the same at every state
-        analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
+        with np.errstate(all="ignore"):  # a step of any length may be asked for
+            analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
     of_rows, of_columns = _units(matrix)
     singular = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns, compute_uv=False)
     isolated = bool(singular[-1] > SINGULAR * singular[0])

@@ -126,7 +126,8 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     each = _limits(system, how, flat)
     growth = np.where(finite, eigen.eigenvalues(flat).real.max(axis=0), np.nan).reshape(shape)
     limits = np.where(finite, each.limits, np.nan).reshape(shape)
-    rates = np.where(finite, each.rates, np.nan).reshape(shape)
+    rates = np.where(each.rates.imag < 0.0, each.rates.conj(), each.rates)  # of a pair, the one that turns forwards
+    rates = np.where(finite, rates, np.nan).reshape(shape)
     index = np.where(np.isnan(limits), np.inf, limits).argmin(axis=0)
     modes = np.empty(shape[1:], dtype=object)
     for member in np.ndindex(shape[1:]):
@@ -166,10 +167,25 @@ def _limits(system: System, method: Method, A: Array) -> _Found:
         return _smallest(_clean(eigen.eigenvalues(A)), lambda rates: _of_rates(method, rates, n_v))
     stiffness = _stiffness(A, n_v)
     if stiffness is not None:
-        squares = _clean_squares(eigen.eigenvalues(stiffness))
-        oscillator = float(stability_limit(Oscillator(1.0), method))
-        return _smallest(1j * np.sqrt(-squares), lambda rates: oscillator / np.abs(rates))
+        squares = eigen.eigenvalues(stiffness)
+        size = np.abs(squares).max(axis=0)
+        turning = np.abs(squares.imag) > REAL_ZERO * size
+        squares = np.where(np.abs(squares) <= RATE_ZERO**2 * size, np.nan, squares.real)
+        found = _smallest(-np.sqrt(squares + 0j), lambda rates: _of_second_order(method, rates))
+        if (other := turning.any(axis=0)).any():  # forces that no energy belongs to
+            tried = _by_trying(method, A[:, :, other], n_v)
+            found.limits[other], found.rates[other] = tried
+        return found
     return _by_trying(method, A, n_v)
+
+
+def _of_second_order(method: Method, rates: Complex) -> Array:
+    """The limits of modes of ÿ = λ²·y: of one that swings, or of the one of two that dies, while the other grows."""
+    swings = rates.imag != 0.0
+    found = np.full(rates.shape, float(stability_limit(Oscillator(1.0), method)))
+    if not swings.all():
+        found[~swings] = _by_trying(method, np.array([[[0.0], [1.0]], [[1.0], [0.0]]]), 1).limits
+    return np.asarray(found / np.abs(rates))
 
 
 def _smallest(rates: Complex, limit_of: Any) -> _Found:
@@ -187,13 +203,6 @@ def _clean(rates: Complex) -> Complex:
     size = np.abs(rates).max(axis=0)
     rates = np.where(np.abs(rates.real) <= REAL_ZERO * size, 1j * rates.imag, rates)
     return np.where((rates.real > 0.0) | (np.abs(rates) <= RATE_ZERO * size), np.nan, rates)
-
-
-def _clean_squares(squares: Complex) -> Complex:
-    """Squares of rates likewise: what is below zero swings for ever, and all others have a root that grows."""
-    size = np.abs(squares).max(axis=0)
-    swings = (squares.real < -(RATE_ZERO**2) * size) & (np.abs(squares.imag) <= REAL_ZERO * size)
-    return np.where(swings, squares.real + 0j, np.nan)
 
 
 def _stiffness(A: Array, n_v: int) -> Array | None:
@@ -249,8 +258,9 @@ class _Trials:
     def growth(self, dt: Array) -> tuple[Array, Array, Complex]:
         """At steps, shape (states,): by how much the mode that grows most is outside the unit circle, its tolerance, its rate."""
         P = maps.transition(self.system, self.method, dt)
-        found = eigen.eigen(P, eigen.slot_units(maps.finish(self.system, self.method, dt, dt.shape), self.true.units))
-        rates = eigen.matched(found.values, found.own, self.true)
+        finish = maps.finish(self.system, self.method, dt, dt.shape)
+        found = eigen.eigen(P, eigen.slot_units(finish, self.true.units))
+        rates = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), self.true)
         size = np.abs(self.true.values).max(axis=0)
         grows = rates.real > REAL_ZERO * size
         still = np.abs(rates) <= RATE_ZERO * size

@@ -165,4 +165,4 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
     unit_v, unit_y = unit(system, members)
     with np.errstate(all="ignore"):
         found = rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
-    return np.asarray(found.imag / COMPLEX_STEP)
+        return np.asarray(found.imag / COMPLEX_STEP)
