@@ -183,8 +183,9 @@ class _Motion:
         with np.errstate(all="ignore"):
             slot = method.steps.start(system.scaled(dt, members), 0, t0, v, y) if method.carry else v
         self.state: list[Any] = traced.rows(slot, y)
-        # One axis before the members: vector after vector.
-        start = _orthonormal(_generic(self.n, k))[0] if k < self.n else np.eye(self.n)
+        # One axis before the members: vector after vector. A unit vector might lie in a direction that never grows: at a turning
+        # point, a change of the velocity is one along the motion.
+        start = _orthonormal(_generic(self.n, k))[0]
         self.vectors = np.array(np.broadcast_to(start.reshape(self.n, k, *(1,) * len(members)), (self.n, k, *members)))
 
     def advance(self, steps: int) -> None:
