@@ -29,6 +29,12 @@ def pendulum(t: Any, v: Any, y: Any, *, omega: Any = 1.0) -> Any:
     return -(omega * omega) * np.sin(y)
 
 
+@pendulum.invariant
+def energy(v: Any, y: Any, *, omega: Any) -> Any:
+    """Of the pendulum."""
+    return 0.5 * v**2 + omega**2 * (1.0 - np.cos(y))
+
+
 @sw.system
 def springs(t: Any, v: Any, y: Any, *, k: Any = 1.0, rest: Any = 0.4) -> Any:
     """A ring of points with a spring between neighbours, in the plane or in space: a state of any shape."""
@@ -59,6 +65,12 @@ def top(t: Any, w: Any, q: Any, *, inertia: Any = THREE) -> Any:
     turning = np.cross(inertia * w, w) / inertia
     scalar, vector = q[0], q[1:]
     return turning, 0.5 * np.concatenate([[-np.dot(vector, w)], scalar * w + np.cross(vector, w)])
+
+
+@top.invariant
+def norm(w: Any, q: Any) -> Any:
+    """The square of the quaternion's length."""
+    return np.dot(q, q)
 
 
 @sw.system

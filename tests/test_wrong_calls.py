@@ -244,6 +244,22 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "analyse at": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "at": (0.0, 1.0), "t": 0.0}),
     "stability_limit": (sw.stability_limit, {"system": sw.Oscillator(), "method": "rk4", "at": None, "t": 0.0}),
     "stability_limit at": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "at": (0.0, 1.0), "t": 0.0}),
+    "analyse v y": (sw.analyse, {"system": sw.Pendulum(), "method": "rk4", "dt": 0.1, "v": 0.0, "y": 1.0}),
+    "stability_limit v y": (sw.stability_limit, {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0}),
+    "stability_along": (
+        sw.stability_along,
+        {"run": sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=4, every=2), "method": "false_euler"},
+    ),
+    "jacobian": (sw.jacobian, {"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "t": 0.0}),
+    "equilibria": (
+        sw.equilibria,
+        {"system": sw.Pendulum(), "near": (0.0, [0.3, 3.0]), "t": 0.0, "method": "rk4", "dt": 0.1},
+    ),
+    "lyapunov": (
+        sw.lyapunov,
+        {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 4, "exponents": "all"}
+        | {"transient": 2, "every": 2, "t0": 0.0},
+    ),
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,
@@ -342,7 +358,7 @@ def wrong(call: Callable[..., Any], given: dict[str, Any], argument: str, make: 
 
 
 #: What is known and left: steps so long that the elements of P overflow are not refused, and NumPy warns of them.
-KNOWN = {("analyse at", "dt", "10**12")}
+KNOWN = {("analyse at", "dt", "10**12"), ("analyse v y", "dt", "10**12")}
 
 #: Which of them an ordinary run of the tests takes: every so manieth, others for each argument.
 SHARE = 7

@@ -2,8 +2,8 @@
 
 ``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
 there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system, ``explain`` what
-a step computes; ``scenes`` and ``charts`` show what each method costs, how wrong it is and where it blows up, and ``advise`` says
-which to take.
+a step computes; ``jacobian``, ``equilibria`` and ``lyapunov`` tell what a system does near its states; ``scenes`` and ``charts``
+show what each method costs, how wrong it is and where it blows up, and ``advise`` says which to take.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .control import EnergyControl, Projection
+from .control import Control, EnergyControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
@@ -20,18 +20,20 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, explanation, scenes, stability
+    from . import advice, charts, derivatives, dynamics, explanation, scenes, stability
     from .advice import advise
+    from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
     from .explanation import Explanation, explain
     from .scenes import Scene
-    from .stability import analyse, criteria, stability_limit
+    from .stability import analyse, criteria, stability_along, stability_limit
 
 __version__: str = _core.__version__
 
 __all__ = [
     "AccuracyWarning",
     "Chain",
+    "Control",
     "ControlWarning",
     "DivergenceWarning",
     "EnergyControl",
@@ -57,16 +59,22 @@ __all__ = [
     "analyse",
     "charts",
     "criteria",
+    "derivatives",
+    "dynamics",
+    "equilibria",
     "errors",
     "explain",
     "explanation",
     "integrate",
     "isa",
     "isa_levels",
+    "jacobian",
+    "lyapunov",
     "method",
     "methods",
     "scenes",
     "stability",
+    "stability_along",
     "stability_limit",
     "system",
 ]
@@ -92,6 +100,11 @@ _LATER = {
     "advise": "advice.advise",
     "Explanation": "explanation.Explanation",
     "charts": "charts",
+    "derivatives": "derivatives",
+    "dynamics": "dynamics",
+    "equilibria": "dynamics.equilibria",
+    "jacobian": "dynamics.jacobian",
+    "lyapunov": "dynamics.lyapunov",
     "explain": "explanation.explain",
     "explanation": "explanation",
     "scenes": "scenes",
@@ -99,6 +112,7 @@ _LATER = {
     "stability": "stability",
     "analyse": "stability.analyse",
     "criteria": "stability.criteria",
+    "stability_along": "stability.stability_along",
     "stability_limit": "stability.stability_limit",
 }
 

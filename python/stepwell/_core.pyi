@@ -151,8 +151,17 @@ class Tape:
     def operations(self, of: list[Symbol]) -> tuple[list[tuple[str, list[int], int]], list[int]]:
         """What these values are made of, in order: names, operands, what else is given; and the places of the values."""
 
-    def equations(self, dv: list[Symbol], dy: list[Symbol] | None = None) -> Equations:
-        """These values as the rates of a system; without ``dy``, ẏ is v."""
+    def equations(
+        self,
+        dv: list[Symbol],
+        dy: list[Symbol] | None = None,
+        quantities: list[tuple[str, Symbol]] = ...,
+        kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
+    ) -> Equations:
+        """These values as the rates of a system; without ``dy``, ẏ is v.
+
+        ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
+        """
 
     def fused(self, of: list[Symbol]) -> tuple[Tape, list[Symbol]]:
         """A tape with fused multiply-adds in what these values need, and the values on it."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _checks, engine
 from ._checks import Array
-from .control import EnergyControl, Projection, a_control
+from .control import AnyControl, a_control
 from .errors import (
     AccuracyWarning,
     ArgumentError,
@@ -68,7 +68,7 @@ def integrate(
     carried_by: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
-    control: EnergyControl | Projection | None = None,
+    control: AnyControl | None = None,
     form: str = "direct",
     fused: bool = False,
     threads: int | None = None,

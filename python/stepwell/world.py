@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
-from .control import EnergyControl, Projection, a_control
+from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
 from .integrate import fits_together, goes_on_alike, velocities
 from .methods import Method
@@ -70,7 +70,7 @@ class World:
         t0: float = 0.0,
         start_step: int = 0,
         start: str | None = None,
-        control: EnergyControl | Projection | None = None,
+        control: AnyControl | None = None,
         carry: Array | None = None,
         carried_by: str | None = None,
         dt_before: float | None = None,

@@ -14,6 +14,7 @@ from .. import _checks
 from .._checks import Shape
 from ..errors import ArgumentError, DTypeError, UnknownNameError
 from ..systems.inputs import Sampled, Sinusoid
+from .invariants import Invariant, invariant
 
 
 class Definition:
@@ -27,6 +28,7 @@ class Definition:
         blocks: 2 if the function gives (v̇, ẏ).
         shape: the declared shapes of the blocks v and y; None where the state tells.
         parameters: names and defaults.
+        invariants: what was declared constant, by name.
     """
 
     def __init__(self, function: Callable[..., Any], order: int, blocks: int, shape: tuple[Any, Any]) -> None:
@@ -35,6 +37,7 @@ class Definition:
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
         self.parameters = _parameters(function, 3 if self.has_v else 2)
+        self.invariants: dict[str, Invariant] = {}
 
     @property
     def has_v(self) -> bool:
@@ -58,6 +61,34 @@ class Definition:
                 known = ", ".join(self.parameters) or "none"
                 raise UnknownNameError(f"{self.name}: there is no parameter {_checks.short(name)}. Known: {known}.")
         return OwnSystem(self, {**self.parameters, **given})
+
+    def invariant(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Declare what is constant in the true motion; a decorator.
+
+        It can then be recorded, charted, and kept by ``Control`` or ``Projection``, by the name of the function. Its gradient is
+        derived.
+
+        Args:
+            function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` of a first-order system, that returns one number;
+                parameters are those of the system, by name. One that is called ``energy`` is what ``run.energy`` shows.
+
+        Returns:
+            The function.
+
+        Raises:
+            ArgumentError: if the system has no such parameter.
+
+        Example:
+            >>> @sw.system
+            ... def pendulum(t, v, y, *, omega=1.0):
+            ...     return -omega**2 * np.sin(y)
+            >>> @pendulum.invariant
+            ... def energy(v, y, *, omega):
+            ...     return 0.5 * v**2 + omega**2 * (1 - np.cos(y))
+        """
+        made = invariant(self, function)
+        self.invariants[made.name] = made
+        return function
 
     def __repr__(self) -> str:
         return f"<system {self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import linecache
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from .definition import Definition
+    from .invariants import Invariant, Traced
 
 #: How many lines of an error are looked through for the user's own.
 MOST_FRAMES = 200
@@ -32,13 +34,53 @@ class Equations:
         definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it gives.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
-        own_axes: how many axes of its own each parameter has.
+        own_shapes: of each parameter the lengths of its own axes; None of one that changes with the time.
+        kept: the name of the invariant that a control or a projection keeps, or None.
+        limited: whether the control is of the limited form.
+        pushed: whether there is a control.
     """
 
-    def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_axes: dict[str, int]) -> None:
+    kept: str | None = None
+    limited = False
+    pushed = False
+
+    def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
         self.definition = definition
         self.v_shape, self.y_shape = v_shape, y_shape
-        self.own_axes = own_axes
+        self.own_shapes = own_shapes
+        self._invariants: dict[str, Traced] = {}
+
+    @property
+    def shapes(self) -> tuple[Shape, Shape]:
+        """Of both blocks."""
+        return self.v_shape, self.y_shape
+
+    def batches(self, v: Any, y: Any) -> tuple[Shape, Shape]:
+        """The axes of both blocks behind their own."""
+        return np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :]
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+        return len(self.own_shapes[name] or ())
+
+    @property
+    def invariants(self) -> dict[str, Traced]:
+        """Those that were declared, by name."""
+        from .invariants import Traced
+
+        for name, each in self.definition.invariants.items():
+            if name not in self._invariants or self._invariants[name].invariant is not each:
+                self._invariants[name] = Traced(each, self)
+        return self._invariants
+
+    def keeping(self, name: str, *, limited: bool, pushed: bool) -> Equations:
+        """The same, with an invariant that is kept."""
+        kept = copy.copy(self)
+        kept.kept, kept.limited, kept.pushed = name, limited, pushed
+        return kept
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_invariants": {}}
 
     @property
     def name(self) -> str:
@@ -48,7 +90,7 @@ class Equations:
     @property
     def second_order(self) -> bool:
         """Whether ẏ is v."""
-        return self.definition.order == 2 and self.definition.blocks == 1
+        return self.definition.order == 2 and self.definition.blocks == 1 and not self.pushed
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Equations) and self._key() == other._key()
@@ -57,7 +99,7 @@ class Equations:
         return hash(self._key())
 
     def _key(self) -> tuple[Any, ...]:
-        return self.definition, self.v_shape, self.y_shape
+        return self.definition, self.v_shape, self.y_shape, self.kept, self.limited, self.pushed
 
     def __deepcopy__(self, memo: Any) -> Equations:
         return self  # nothing of it changes
@@ -75,12 +117,25 @@ class Equations:
         v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
 
+    def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
+        """What an invariant is of a state of symbols: one symbol, or a number that is known."""
+        state = [_scalars(y, len(self.y_shape))]
+        if self.definition.has_v:
+            state.insert(0, _scalars(v, len(self.v_shape)))
+        parameters = {name: _scalars(value, self.own_axes(name)) for name, value in given.items()}
+        name = f"{self.name}: {invariant.name}"
+        made = objects(self._run(rebound(invariant.function), name, *state, **parameters))
+        if made.ndim or not isinstance(made[()], Scalar):
+            got = f"an array of shape {made.shape}" if made.ndim else _kind(made[()])
+            raise TraceError(f"{name}: expected one number of a state, got {got}")
+        return made[()].value
+
     def _parameter(self, name: str, value: Any, t: Any, batch: Shape) -> Any:
         if callable(value):
             return self._run(rebound(value), f"{self.name}: {name}", Scalar(t))
         if hasattr(value, "at"):
             return Scalar(value.at(t))
-        return _scalars(value, self.own_axes[name])
+        return _scalars(value, self.own_axes(name))
 
     def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
         return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._value import Value
-from ..control import EnergyControl, Projection
+from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
 from ..integrate import integrate, velocities
 from ..methods import Method
@@ -66,7 +66,7 @@ class Scene(Value):
     dt: float = None  # type: ignore[assignment]
     exact: Callable[[Array], tuple[Array, Array]] | None = None
     until: float = math.inf
-    control: EnergyControl | Projection | None = None
+    control: AnyControl | None = None
     period: float | None = None
     name: str = "unnamed"
     title: str = ""
@@ -101,8 +101,7 @@ class Scene(Value):
         found |= {"dt": _checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
-        if self.control is not None and not isinstance(self.control, (EnergyControl, Projection)):
-            raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(self.control).__name__}")
+        a_control(self.control)
         for name, value in (found | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 

@@ -188,7 +188,9 @@ class Analysis(Value):
         return f"{head}dt = {self.dt:g}, r₁ = {self.radius:.9g}, {angle}, {self.kind}>"
 
 
-def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0) -> Analysis:
+def analyse(
+    system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None
+) -> Analysis:
     """The transition matrix of a step, its eigenvalues, and what they say (§4).
 
     P of a linear system comes from stepping unit vectors; of any other from the exact derivative of a step at a state,
@@ -202,6 +204,8 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
             ``Run``, whose saved states then are the first axis of the members.
         t: the time of the linearisation; a run has its own.
+        v: in place of ``at``, the velocities of the state.
+        y: in place of ``at``, its coordinates.
 
     Returns:
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
@@ -211,6 +215,7 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         UnsupportedError: if the method cannot do the system.
     """
     how = find_method(method)
+    at = given_state(at, v, y)
     system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     if isinstance(at, Run):
@@ -248,6 +253,17 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
     none = np.zeros((n, 0, *P.shape[2:]))
     Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])
     return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:], t, v, y))
+
+
+def given_state(at: Any, v: Any, y: Any) -> Any:
+    """What is meant by ``at``, or by ``v`` and ``y`` in its place."""
+    if v is None and y is None:
+        return at
+    if v is None or y is None:
+        raise ArgumentError(f"v, y: expected both or neither, got {'y' if v is None else 'v'} alone")
+    if at is not None:
+        raise ArgumentError("at, v, y: expected a state as at=(v, y) or as v= and y=, got both")
+    return v, y
 
 
 def state(argument: str, system: System, at: Any, or_what: str = "of blocks") -> tuple[Array, Array]:

@@ -41,6 +41,8 @@ class System(Value, ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
+        complex_step: whether the reference is right on numbers with an infinitesimal imaginary part, which is the quickest way to
+            its derivatives; those of others come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: what keeps its energy, if anything does; ``integrate`` puts it there.
@@ -50,6 +52,7 @@ class System(Value, ABC):
     reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
     linear: ClassVar[bool] = False
+    complex_step: ClassVar[bool] = False
     second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
@@ -137,27 +140,29 @@ class System(Value, ABC):
         """The same system for states of these shapes; only a system that leaves its size open minds."""
         return self
 
-    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> Self:
+    def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Self:
         """The same system under control, the target that of the state if the control has none.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        self._controllable()
+        self._controllable(control)
         with np.errstate(all="ignore"):
             _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
         return self._held_by(control.aimed(kinetic, energy, dt))
 
-    def under(self, control: EnergyControl | Projection, batch: Shape) -> Self:
+    def under(self, control: Any, batch: Shape) -> Self:
         """The same system under control, in what a step does and not in numbers, for unknown states of that batch shape.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        self._controllable()
+        self._controllable(control)
         return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
-    def _controllable(self) -> None:
+    def _controllable(self, control: Any) -> None:
+        if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):
+            raise UnsupportedError(f"control: {control!r} is for an invariant of an own system, and {self!r} has none")
         if not hasattr(self.reference, "energies"):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 

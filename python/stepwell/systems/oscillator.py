@@ -30,6 +30,7 @@ class Oscillator(System):
 
     kernel = "oscillator"
     reference = Reference
+    complex_step = True
     linear = True
     input_names = ("x", "a")
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from .. import _checks, _core
-from .._checks import Shape
+from .._checks import Array, Shape
+from ..control import WAYS, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
 from ..equations.trace import Equations
-from ..errors import ShapeError, TraceError
+from ..errors import ShapeError, TraceError, UnsupportedError
 from ..reference.systems.equations import Equations as Reference
 from ..reference.traced import Tracer
-from .base import Given, System, aligned, flat, shown
+from .base import TINY, Given, System, aligned, flat, shown
 from .inputs import Input, Sampled, Sinusoid
 
 #: What the function is given as, among the names of parameters; none of these can be called so.
@@ -31,6 +32,8 @@ class OwnSystem(System):
 
     kernel = "equations"
     reference = Reference
+    #: What keeps an invariant as a part of the rates, if anything does.
+    push: Control | None = None
 
     def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
         self.definition = definition
@@ -63,7 +66,7 @@ class OwnSystem(System):
         return shown(**self.parameters_given)
 
     def __repr__(self) -> str:
-        said = self.said() + ([] if self.control is None else [repr(self.control)])
+        said = self.said() + [repr(each) for each in (self.control, self.push) if each is not None]
         return f"{self.definition.name}({', '.join(said)})"
 
     def _held(self) -> dict[str, Any]:
@@ -141,14 +144,28 @@ class OwnSystem(System):
         bound = copy.copy(self)
         bound._bounds = {}
         bound.v_shape, bound.y_shape = v_shape, y_shape
-        axes = {name: self.own_axes(name) for name in self.parameters_given}
-        bound.equations = Equations(definition, v_shape, y_shape, axes)
+        shapes = {
+            name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
+            for name, value in self.parameters_given.items()
+        }
+        bound.equations = Equations(definition, v_shape, y_shape, shapes)
+        bound._trace()
+        self._bounds[v_shape, y_shape] = bound
+        return bound
+
+    def _trace(self) -> None:
+        """Run the function with symbols, twice to see that it always does the same; a control is a part of the rates."""
+        equations, definition = self.equations, self.definition
+        assert equations is not None
+        plain = copy.copy(self)
+        plain.control = None  # a projection comes after the step, and is the core's
         tape = _core.Tape()
         traced = []
         for _ in range(2):
-            tracer = Tracer(bound, tape)
+            tracer = Tracer(plain, tape)
             v, y, _more = tracer.state()
-            dv, dy = tracer.scaled(1.0).rates(tape.time(), v, y)
+            s = tracer.scaled(tape.step())
+            dv, dy = s.rates(tape.time(), v, y)
             traced.append((tracer.flat(dv), tracer.flat(dy)))
         if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
             raise TraceError(
@@ -156,10 +173,16 @@ class OwnSystem(System):
                 f"random numbers or count its calls"
             )
         dv, dy = traced[0]
-        bound._core = tape.equations(dv if v_shape != (0,) else [], None if bound.second_order else dy)
-        bound.velocity_term = "forces that do" if bound._core.reads_v else None
-        self._bounds[v_shape, y_shape] = bound
-        return bound
+        quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities]
+        kept = None
+        if equations.kept is not None and not equations.pushed:
+            value = equations.invariants[equations.kept].value(v, y, s.given)
+            along_v, along_y, square = s.gradient(v, y)
+            kept = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
+        self._core = tape.equations(
+            dv if equations.v_shape != (0,) else [], None if equations.second_order else dy, quantities, kept
+        )
+        self.velocity_term = "forces that do" if self._core.reads_v else None
 
     def _known(self) -> OwnSystem:
         """The same system, of which the shapes of its blocks are known."""
@@ -178,7 +201,7 @@ class OwnSystem(System):
                 made[name] = aligned(value, own, batch) if own else value
             else:
                 made[name] = value
-        return made
+        return made if self.push is None else made | self.push.given()
 
     def parameters(self, batch: Shape) -> Given:
         """The operations of the function, and parameters by name, as the core takes them."""
@@ -190,10 +213,69 @@ class OwnSystem(System):
         """With its operations, which a copy from a file has not."""
         known = self._known()
         if known._core is None:
-            free = known if known._free is None else known._free
-            assert isinstance(free, OwnSystem)
-            known._core = free._bound(known.v_shape, known.y_shape)._core
+            known._trace()
         return known
+
+    # ---- invariants
+
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """The invariants, each one number."""
+        return dict.fromkeys(self.definition.invariants, ())
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """The invariant that is called ``energy``."""
+        if "energy" not in self.definition.invariants:
+            raise UnsupportedError(
+                f"energy: {self!r} has no invariant of that name; declare one: @{self.definition.name}.invariant above "
+                f"def energy({'v, y' if self.definition.has_v else 'y'}, *, …)"
+            )
+        return np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+
+    def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
+        """The same system with an invariant that is kept, at its value at the start if the control has no target."""
+        name = self._invariant_of(control)
+        with np.errstate(all="ignore"):
+            start = np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
+        return self._keeping(name, control.aimed(start, start, dt))
+
+    def under(self, control: Any, batch: Shape) -> OwnSystem:
+        """The same, for unknown states of that batch shape."""
+        return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
+
+    def _invariant_of(self, control: Any) -> str:
+        """The name of the invariant that a control is for."""
+        if isinstance(control, EnergyControl):
+            raise UnsupportedError(
+                f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "
+                f"Control('energy', gain), which pushes along the gradient of an invariant"
+            )
+        name = control.invariant
+        if isinstance(control, Projection) and control.way in WAYS:
+            if control.way == "scaling":
+                raise UnsupportedError(
+                    f"control: Projection('scaling') scales velocities by the kinetic energy, which {self!r} does not tell; use "
+                    f"Projection('energy'), which goes along the gradient of an invariant"
+                )
+            name = "energy"
+        return _checks.known("control", name, self.definition.invariants)
+
+    def _keeping(self, name: str, control: Any) -> OwnSystem:
+        known = self._known()
+        assert known.equations is not None
+        kept = copy.copy(known)
+        kept._bounds = {}
+        kept._free = known
+        kept.batch = _checks.batch_shape({"system": known.batch, "control": control.batch})
+        pushed = isinstance(control, Control)
+        kept.equations = known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed)
+        if pushed:
+            kept.push, kept.second_order = control, False
+        else:
+            kept.control = control
+        kept._trace()
+        kept.velocity_term = kept.velocity_term or "a control of an invariant"
+        return kept
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""

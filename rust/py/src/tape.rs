@@ -9,7 +9,7 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
-    systems::equations,
+    systems::equations::{self, Invariant},
     tape::{self, Id, Op, fuse::fuse, print},
     trace,
 };
@@ -48,6 +48,9 @@ pub struct Symbol {
     #[pyo3(get)]
     id: Id,
 }
+
+/// An invariant: its value, its derivatives by v and by y, and the square of their length.
+type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Symbol>>, PyRef<'py, Symbol>);
 
 /// A symbol, or a number that becomes one.
 enum Value<'py> {
@@ -283,22 +286,31 @@ impl Tape {
         Ok((operations, roots.into_iter().map(|root| place[root as usize]).collect()))
     }
 
-    /// The rates of a user's own system: of v, and of y unless they are v itself.
-    #[pyo3(signature = (dv, dy=None))]
-    fn equations(&self, dv: Vec<PyRef<'_, Symbol>>, dy: Option<Vec<PyRef<'_, Symbol>>>) -> PyResult<Equations> {
-        let of_v = dv.len();
-        let is_velocity = dy.is_none();
-        let (tape, roots) = self.with(&dv.into_iter().chain(dy.into_iter().flatten()).collect::<Vec<_>>())?;
-        let needed = tape.needed(roots.iter().copied());
-        let mut place = vec![0; needed.len()];
-        let mut ops = Vec::new();
-        for (id, op) in tape.ops().iter().enumerate().filter(|(id, _)| needed[*id]) {
-            place[id] = ops.len() as Id;
-            ops.push(op.with(|operand| place[operand as usize]));
-        }
-        let mut dv: Vec<Id> = roots.into_iter().map(|root| place[root as usize]).collect();
-        let dy = dv.split_off(of_v);
-        Ok(Equations(Arc::new(equations::Equations::new(ops, dv, (!is_velocity).then_some(dy)))))
+    /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the invariant that
+    /// a projection keeps its value, its derivatives by v and by y, and the square of their length.
+    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None))]
+    fn equations(
+        &self,
+        dv: Vec<PyRef<'_, Symbol>>,
+        dy: Option<Vec<PyRef<'_, Symbol>>>,
+        quantities: Vec<(String, PyRef<'_, Symbol>)>,
+        kept: Option<Kept<'_>>,
+    ) -> PyResult<Equations> {
+        let tape = lock(&self.0);
+        let known = |symbol: &PyRef<'_, Symbol>| -> PyResult<Id> {
+            let fits = Arc::ptr_eq(&self.0, &symbol.tape) && (symbol.id as usize) < tape.ops().len();
+            if fits { Ok(symbol.id) } else { Err(PyIndexError::new_err("a symbol of another tape")) }
+        };
+        let all = |symbols: &[PyRef<'_, Symbol>]| symbols.iter().map(known).collect::<PyResult<Vec<Id>>>();
+        let dv = all(&dv)?;
+        let dy = dy.map(|dy| all(&dy)).transpose()?;
+        let quantities =
+            quantities.into_iter().map(|(name, symbol)| Ok((name, known(&symbol)?))).collect::<PyResult<Vec<_>>>()?;
+        let kept = kept.map(|(value, along_v, along_y, square)| -> PyResult<Invariant> {
+            Ok(Invariant { value: known(&value)?, along_v: all(&along_v)?, along_y: all(&along_y)?, square: known(&square)? })
+        });
+        let made = equations::Equations::new(tape.ops().to_vec(), dv, dy, quantities, kept.transpose()?);
+        Ok(Equations(Arc::new(made.without_the_rest())))
     }
 
     /// A tape with fused multiply-adds in what these values need, and the values on it.

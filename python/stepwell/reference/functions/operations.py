@@ -14,9 +14,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..._checks import numbers
+from ..marks import mark
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+#: Functions that users know by another name, and what is made of products alone, whose derivatives are theirs.
+NAMES, UNMARKED = {"any_power": "power"}, {"of", "deg2rad", "rad2deg"}
 #: Of a number's bits: its sign, and all others.
 SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
 
@@ -46,6 +49,7 @@ def elementary(f: F) -> F:
     """A function of symbols, of numbers, and of arrays of either, which broadcast.
 
     Beside a symbol, numbers become symbols of its tape. What is not finite is computed with like any number, without a warning.
+    Symbols are marked as this function of others, for whoever differentiates, if its name is one that users know.
     """
     signature = inspect.signature(f)
     names = tuple(signature.parameters)
@@ -58,7 +62,10 @@ def elementary(f: F) -> F:
         if one_by_one(given):
             return np.frompyfunc(of_anything, len(given), 1)(*given)
         if (symbol := symbol_of(given)) is not None:
-            return f(*(lifted(symbol, *pair) for pair in zip(names, given, strict=True)))
+            value = f(*(lifted(symbol, *pair) for pair in zip(names, given, strict=True)))
+            return (
+                value if f.__name__ in UNMARKED else mark(NAMES.get(f.__name__, f.__name__), value, *given, function=of_anything)
+            )
         arrays = [numbers(*pair, finite=False) for pair in zip(names, given, strict=True)]
         shape = np.broadcast_shapes(*(each.shape for each in arrays))
         with np.errstate(all="ignore"):
