@@ -190,8 +190,8 @@ def test_the_exponents_of_lorenz() -> None:
     found = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.01, steps=3000, transient=2500)
     assert_lorenz(found)
     assert found.dimension.mean() == pytest.approx(2.062, abs=0.005)
-    # RK4 misses the determinant by a·h⁴ per unit of time: with half the step by a sixteenth, so that (16·S(h/2) − S(h))/15 has none
-    # of it. What is left is of the next order, and the averages of two motions differ a little: a third of what they differ by.
+    # RK4 misses the determinant by a·h⁴ per unit of time: with half the step by a sixteenth, so that (16·S(h/2) − S(h))/15 has
+    # none of it. What is left is of the next order, and the averages of two motions differ a little: a third of the difference.
     finer = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.005, steps=1000, transient=200)
     S, half = found.sum.mean(), finer.sum.mean()
     assert abs((16 * half - S) / 15 + 10.0 + 1.0 + 8.0 / 3.0) < abs(S - half) / 3 < 1e-4
