@@ -147,6 +147,8 @@ def test_states_are_given_in_one_way() -> None:
     ):
         with pytest.raises(sw.errors.ArgumentError, match="got v alone"):
             ask(v=0.0)
+        with pytest.raises(sw.errors.ArgumentError, match="v: expected the velocities"):
+            ask(y=0.0)
         with pytest.raises(sw.errors.ArgumentError, match="both"):
             ask(v=0.0, y=0.0, at=(0.0, 0.0))
 

@@ -186,7 +186,7 @@ def near_the_attractor(members: int) -> Any:
 
 def test_the_exponents_of_lorenz() -> None:
     """0.9056, 0 and −14.572 (Sprott 2003), whose sum is −σ − 1 − β at every point of the motion."""
-    given: dict[str, Any] = {"v": np.zeros((0, 64)), "y": near_the_attractor(64), "exponents": "all"}
+    given: dict[str, Any] = {"y": near_the_attractor(64), "exponents": "all"}
     found = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.01, steps=3000, transient=2500)
     assert_lorenz(found)
     assert found.dimension.mean() == pytest.approx(2.062, abs=0.005)
@@ -208,22 +208,24 @@ def assert_lorenz(found: Lyapunov) -> None:
 def test_equilibria_and_limits_of_lorenz() -> None:
     """The origin and (±√(β(ρ − 1)), ±√(β(ρ − 1)), ρ − 1)."""
     near = np.array([[0.1, 8.0, -8.0], [0.1, 8.0, -8.0], [0.1, 27.0, 27.0]])
-    found = sw.equilibria(Lorenz(), near=(np.zeros((0, 3)), near), method="rk4", dt=0.01)
+    found = sw.equilibria(Lorenz(), near=(None, near), method="rk4", dt=0.01)
     c = np.sqrt(8 / 3 * 27)
     np.testing.assert_allclose([each.y for each in found], [[0, 0, 0], [c, c, 27], [-c, -c, 27]], rtol=0, atol=27 * 20 * EPS)
     assert [each.kind for each in found] == ["saddle"] * 3
     for each in found:
         z = np.exp(each.eigenvalues * 0.01)  # RK4's is that to (λh)⁵/120, below 10⁻⁵ for λ up to 22.8
         np.testing.assert_allclose(np.sort_complex(each.analysis.eigenvalues), np.sort_complex(z), rtol=0, atol=1e-5)
-    limit = sw.stability_limit(Lorenz(), "rk4", v=np.zeros(0), y=np.zeros(3))
+    limit = sw.stability_limit(Lorenz(), "rk4", y=np.zeros(3))
     assert limit == 0.0  # the origin's own motion grows
 
 
 @pytest.mark.skipif(not hasattr(sw, "system"), reason="there are no systems of a user's own equations yet")
 def test_the_exponents_of_lorenz_as_a_users_own_equations() -> None:
-    @sw.system  # type: ignore[attr-defined]
-    def lorenz(t: Any, y: Any, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
+    @sw.system(order=1)  # type: ignore[attr-defined]
+    def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
         return [sigma * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - beta * y[2]]
 
-    v, y = np.zeros((0, 64)), near_the_attractor(64)
-    assert_lorenz(sw.lyapunov(lorenz(), "rk4", v=v, y=y, dt=0.01, steps=3000, transient=2500, exponents="all"))
+    y = near_the_attractor(64)
+    assert_lorenz(sw.lyapunov(lorenz(), "rk4", y=y, dt=0.01, steps=3000, transient=2500, exponents="all"))
+    at = y[:, 0]
+    np.testing.assert_array_equal(sw.jacobian(lorenz(), y=at).matrix, sw.jacobian(Lorenz(), y=at).matrix)
