@@ -105,6 +105,18 @@ def test_the_carry_has_the_same_exponents_as_the_state() -> None:
         np.testing.assert_allclose(each, np.sort(true)[::-1], rtol=0, atol=1e4 * EPS / 0.1)
 
 
+def test_under_a_control_volumes_change_as_the_steps_say() -> None:
+    """The sum is the logarithm of the determinant of the product of all steps, as ``analyse`` finds it in another way."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
+    start = {"v": 0.1 * y[::-1], "y": y, "dt": 0.05, "steps": 40}
+    run = sw.integrate(sw.NBody([1.0, 1.0, 1.0], softening=0.3), "rk4", **start, every=1, control=sw.EnergyControl(0.1))
+    found = sw.lyapunov(run.system, "rk4", **start, exponents="all")
+    np.testing.assert_array_equal(found.y, run.y[-1])
+    determinant = np.linalg.det(sw.analyse(run.system, "rk4", at=run).monodromy)
+    # Forty products of matrices, and one determinant of a matrix whose condition is e^(2·1.1) at most: some thousand eps.
+    assert float(found.sum) * 2.0 == pytest.approx(np.log(determinant), abs=4000 * EPS)
+
+
 def test_the_dimension_of_kaplan_and_yorke() -> None:
     def dimension(*exponents: float) -> float:
         n = len(exponents)
