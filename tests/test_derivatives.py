@@ -218,6 +218,33 @@ def test_a_wrong_rule_is_found(name: str, wrong: Any, monkeypatch: pytest.Monkey
         assert_rule(name, monkeypatch)
 
 
+@pytest.mark.parametrize("name", rules.PARTIALS)
+def test_elementary_functions_have_their_derivatives(name: str) -> None:
+    """Those of ``reference.functions`` as they are traced, forwards and backwards, against NumPy's."""
+    functions = pytest.importorskip("stepwell.reference.functions")
+    if not hasattr(functions, name):
+        pytest.skip(f"there is no {name} among the elementary functions")
+    f, points = TRIED[name]
+    at = np.array(points, dtype=float).reshape(len(points), -1).T
+    tape = _core.Tape()
+    x = [tape.state(i) for i in range(len(at))]
+    with marks.recording() as known:
+        made = getattr(functions, name)(*x)
+    back = value(tape, gradient(tape, made, x, known), *at)
+    one = tape.number(1.0)
+    for i in range(len(at)):
+
+        def along(z: Any, i: int = i) -> Any:
+            return f(*(z if k == i else each.astype(Long) for k, each in enumerate(at)))
+
+        step = Long(LONG_EPS ** (1 / 3)) * np.abs(at[i]).astype(Long)
+        true, bound = central(along, at[i].astype(Long), step, 8 * LONG_EPS * (1.0 + np.abs(at[i])))
+        bound = bound + 16 * EPS * (1.0 + np.abs(true)) ** 2  # as in ``assert_rule``
+        (forth,) = value(tape, directional(tape, [made], [(x[i], one)], known), *at)
+        for found in (back[i], forth):
+            assert (np.abs(found - true) <= bound).all(), (name, i, found, true, bound)
+
+
 def test_powers_with_known_exponents() -> None:
     """Also of 0, whose logarithm is infinite, and to the power 0, whose derivative is 0."""
     tape = _core.Tape()

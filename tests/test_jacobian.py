@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
 from differences import central
+from stepwell.derivatives import traced
 from stepwell.derivatives.traced import Traced
 from stepwell.errors import UnsupportedError
 from stepwell.stability import maps
@@ -133,6 +135,21 @@ def test_a_step_has_the_derivative_that_the_complex_step_finds(name: str, method
     np.testing.assert_allclose(one.P, other.P, rtol=0, atol=400 * EPS * size)
 
 
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_long_tape_is_differentiated_along_all_changes_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    system, v, y = SYSTEMS[name]
+    given = {"method": "rk4", "dt": 0.1, "v": v, "y": y, "t": 0.2}
+    monkeypatch.setattr(type(system), "complex_step", False)
+    whole, rates = sw.analyse(system, **given), sw.jacobian(system, v=v, y=y)
+    monkeypatch.setattr(traced, "MAX_WHOLE", 0)
+    along = sw.analyse(copy.copy(system), **given)
+    # The same sums in another order, some hundred roundings of the largest element.
+    np.testing.assert_allclose(along.P, whole.P, rtol=0, atol=200 * EPS * max(1.0, float(np.abs(whole.P).max())))
+    other = sw.jacobian(copy.copy(system), v=v, y=y)
+    np.testing.assert_allclose(other.matrix, rates.matrix, rtol=0, atol=200 * EPS * max(1.0, float(np.abs(rates.matrix).max())))
+    np.testing.assert_array_equal(other.rates, rates.rates)
+
+
 def test_limits_come_from_the_tape_too(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = sw.stability_limit(sw.Pendulum(1.0, 0.1), "rk4", v=0.1, y=1.0)
     monkeypatch.setattr(sw.Pendulum, "complex_step", False)
@@ -147,6 +164,8 @@ def test_states_are_given_in_one_way() -> None:
     ):
         with pytest.raises(sw.errors.ArgumentError, match="got v alone"):
             ask(v=0.0)
+        with pytest.raises(sw.errors.ArgumentError, match="v: expected the velocities"):
+            ask(y=0.0)
         with pytest.raises(sw.errors.ArgumentError, match="both"):
             ask(v=0.0, y=0.0, at=(0.0, 0.0))
 
@@ -156,9 +175,9 @@ def test_a_large_state_has_the_same_jacobian_by_the_complex_step() -> None:
     v, y = np.zeros((n, 2)), np.random.default_rng(0).normal(size=(n, 2))
     system = sw.NBody(np.ones(n), softening=0.3).sized(v, y)
     found = sw.jacobian(system, v=v, y=y)
-    traced = Traced(system, "rates")
-    assert traced.length == 80
-    values = np.array([np.broadcast_to(each, ()) for each in traced.jacobian()([*traced.rows(v, y), np.zeros(())])])
+    tape = Traced(system, "rates")
+    assert tape.length == 80
+    values = np.array([np.broadcast_to(each, ()) for each in tape.jacobian()([*tape.rows(v, y), np.zeros(())])])
     # Each element is a sum of twenty of size 1/0.3² at most, with some twenty roundings each.
     np.testing.assert_allclose(found.matrix.reshape(-1), values[:6400], rtol=0, atol=40 * EPS * 20 / 0.09)
     np.testing.assert_allclose(found.rates, values[6400:], rtol=0, atol=40 * EPS * 20 / 0.3)

@@ -7,8 +7,12 @@ Functions that are made of such operations are marked (``reference/marks.py``) a
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import struct
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
 from typing import Any
 
 from ..errors import UnsupportedError
@@ -89,16 +93,26 @@ def number(bits: int) -> float:
 
 
 def function(name: str, near: Callable[..., Any] | None = None) -> Callable[..., Any]:
-    """The marked function of that name: the one in the same file as another, or else any.
+    """The marked function of that name: the one in the same file as another, or that of ``reference.functions``, or any.
 
     Raises:
         UnsupportedError: if there is none.
     """
-    beside = getattr(near, "__globals__", {}).get(name)
-    found = beside if callable(beside) and hasattr(beside, "__wrapped__") else marks.FUNCTIONS.get(name)
+    beside = getattr(inspect.unwrap(near), "__globals__", {}).get(name) if near is not None else None
+    if callable(beside) and hasattr(beside, "__wrapped__"):
+        return beside  # type: ignore[no-any-return]
+    found: Callable[..., Any] | None = getattr(_elementary(), name, None) or marks.FUNCTIONS.get(name)
     if found is None:
         raise UnsupportedError(f"derivative: there is no function {name!r} here, of which it is made")
     return found
+
+
+@cache
+def _elementary() -> Any:
+    """The elementary functions, which are imported when a derivative first asks for one."""
+    with suppress(ModuleNotFoundError):
+        return importlib.import_module("stepwell.reference.functions")
+    return None
 
 
 def of_function(mark: marks.Mark, value: Any, wanted: list[bool]) -> tuple[Factor, ...]:

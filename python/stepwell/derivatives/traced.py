@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
-from functools import lru_cache
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,12 @@ from ..systems import System
 from .evaluate import Evaluation
 from .modes import directional, jacobian
 
-#: How many systems' derivatives are kept; a search for a limit asks for the same ones over and over.
+#: How many systems' derivatives are kept: a search for a limit asks for the same ones over and over.
 MAX_KEPT = 8
+
+#: Up to so many lines of a tape times numbers of a state each element of a matrix has lines of its own, of which none are for
+#: what is zero for sure. Longer ones are differentiated along one change, and NumPy does it for all changes at once.
+MAX_WHOLE = 20_000
 
 
 class Traced:
@@ -98,9 +102,33 @@ def _wide(system: System, dv: Any, dy: Any) -> tuple[Any, Any]:
     return tuple(np.broadcast_to(each, shape) for each, shape in ((dv, system.v_shape), (dy, system.y_shape)))  # type: ignore[return-value]
 
 
-@lru_cache(maxsize=MAX_KEPT)
-def _kept(system: System, what: str, method: Method | None) -> Evaluation:
-    return Traced(system, what, method).jacobian()
+class _Kept(NamedTuple):
+    """A derivative and what it is of; ``whole`` if it has a line for each element of the matrix, else it is along one change."""
+
+    system: System
+    what: str
+    method: Method | None
+    evaluation: Evaluation
+    whole: bool
+
+
+#: The last derivatives that were asked for.
+_last: deque[_Kept] = deque(maxlen=MAX_KEPT)
+
+
+def _kept(system: System, what: str, method: Method | None) -> _Kept:
+    """The derivative, traced anew unless this very system was asked for shortly before.
+
+    An equal one is not enough: a user's function may have been traced anew in between, with other numbers around it.
+    """
+    for each in tuple(_last):
+        if each.system is system and each.what == what and each.method is method:
+            return each
+    traced = Traced(system, what, method)
+    whole = len(traced.tape) * traced.length <= MAX_WHOLE
+    kept = _Kept(system, what, method, traced.jacobian() if whole else traced.tangent(), whole)
+    _last.append(kept)
+    return kept
 
 
 def matrix(
@@ -121,14 +149,21 @@ def matrix(
     Returns:
         Arrays of shapes (n, n, *members) and (n, *members).
     """
-    evaluation = _kept(system, what, method)
+    kept = _kept(system, what, method)
     n = prod(system.v_shape) + prod(system.y_shape)
     blocks = ((v, system.v_shape), (y, system.y_shape))
     rows = [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
-    values = np.empty((n * n + n, *members))
-    for k, value in enumerate(evaluation([*rows, np.zeros(())], t, h)):
-        values[k] = value
-    return values[: n * n].reshape(n, n, *members), values[n * n :]
+    nothing = np.zeros(())  # what a control has added up has no part in it
+    if kept.whole:
+        values = np.empty((n * n + n, *members))
+        for k, value in enumerate(kept.evaluation([*rows, nothing], t, h)):
+            values[k] = value
+        return values[: n * n].reshape(n, n, *members), values[n * n :]
+    changes = np.eye(n).reshape(n, n, *(1,) * len(members))  # of each number, in every direction at once
+    derivative, values = np.empty((n, n, *members)), np.empty((n, *members))
+    for k, value in enumerate(kept.evaluation([*rows, nothing, *changes], t, h)):
+        (values if k < n else derivative)[k % n] = value
+    return derivative, values
 
 
 def together(system: System, v: Array, y: Array, **more: Any) -> Shape:

@@ -12,6 +12,7 @@ from .._checks import Array, Shape
 from .._value import Value
 from ..derivatives import traced
 from ..stability import eigen, maps
+from ..stability.analysis import velocities
 from ..stability.eigen import Complex
 from ..systems import System
 from ..systems.base import a_system
@@ -78,7 +79,7 @@ class Jacobian(Value):
         return f"<Jacobian of {self.system!r}: {len(self.matrix)} × {len(self.matrix)}, {what}>"
 
 
-def jacobian(system: System, *, v: Any, y: Any, t: float = 0.0) -> Jacobian:
+def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobian:
     """The derivative of a system's rates at a state, exact but for rounding.
 
     The rates are traced and their tape is differentiated, operation by operation; nothing is approximated by differences. It does
@@ -87,8 +88,8 @@ def jacobian(system: System, *, v: Any, y: Any, t: float = 0.0) -> Jacobian:
 
     Args:
         system: whose rates; parameters may be arrays.
-        v: the velocities, shape (*block, *batch), or one number for all.
-        y: the coordinates, likewise.
+        y: the coordinates, shape (*block, *batch), or one number for all.
+        v: the velocities, likewise; a system that has none needs none.
         t: the time, which matters where the rates depend on it otherwise than by adding an input.
 
     Returns:
@@ -104,7 +105,7 @@ def jacobian(system: System, *, v: Any, y: Any, t: float = 0.0) -> Jacobian:
                [ 1.,  0.]])
     """
     system = a_system(system).sized(v, y)
-    v = _checks.block("v", v, system.v_shape, system.axes)
+    v = _checks.block("v", velocities(system, v), system.v_shape, system.axes)
     y = _checks.block("y", y, system.y_shape, system.axes)
     t = _checks.number("t", t, unit="units of time")
     n = sum(maps.size(system))

@@ -19,6 +19,7 @@ from ..methods import method as find_method
 from ..reference.log import log
 from ..reference.trig import cos
 from ..stability import maps
+from ..stability.analysis import velocities
 from ..systems import System
 from ..systems.base import a_system
 
@@ -87,10 +88,10 @@ def lyapunov(
     system: System,
     method: str | Method,
     *,
-    v: Any,
     y: Any,
     dt: float,
     steps: int,
+    v: Any = None,
     exponents: int | str = 1,
     transient: int = 0,
     every: int = EVERY,
@@ -107,10 +108,10 @@ def lyapunov(
     Args:
         system: what to step; parameters may be arrays.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocities at the start, shape (*block, *batch), or one number for all.
-        y: coordinates at the start, likewise.
+        y: coordinates at the start, shape (*block, *batch), or one number for all.
         dt: the step, in units of time, above zero.
         steps: over how many steps growth is averaged, one or more.
+        v: velocities at the start, as y; a system that has none needs none.
         exponents: how many, the largest ones; or "all".
         transient: so many steps are made before, in which the motion finds its attractor and disturbances their directions.
         every: steps from one orthonormalisation to the next. Between two, the largest exponent must not make vectors parallel
@@ -134,7 +135,7 @@ def lyapunov(
     how = find_method(method)
     system = a_system(system).sized(v, y)
     fits_together(system, how)
-    v = _checks.block("v", v, system.v_shape, system.axes)
+    v = _checks.block("v", velocities(system, v), system.v_shape, system.axes)
     y = _checks.block("y", y, system.y_shape, system.axes)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     t0 = _checks.number("t0", t0, unit="units of time")

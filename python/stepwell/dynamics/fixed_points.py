@@ -126,7 +126,7 @@ def equilibria(
 
     Args:
         system: of one member.
-        near: states (v, y) to start from, shapes (*block, *starts).
+        near: states (v, y) to start from, shapes (*block, *starts); v is None of a system that has no velocities.
         t: the time at which inputs are held.
         method: a method to analyse at each equilibrium, or None.
         dt: its step, in units of time.

@@ -92,8 +92,9 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
 
     At each saved state the rates are linearised. What grows there by itself, such as the distance of two bodies that fall past a
     third, is no fault of a step and does not count; what swings or dies must not grow, and the limit is the largest step below
-    which it does not. At an equilibrium that is ``stability_limit``. Away from one, it is that of the linearised rates held as
-    they are, while ``stability_limit`` takes the derivative of a whole step, within which the state moves.
+    which it does not. At an equilibrium near which nothing grows by itself, that is ``stability_limit``. Away from one, it is
+    that of the linearised rates held as they are, while ``stability_limit`` takes the derivative of a whole step, within which
+    the state moves.
 
     Args:
         run: a run, with the saved states to look at (``every=`` or ``at=``).

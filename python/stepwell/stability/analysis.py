@@ -259,8 +259,8 @@ def given_state(at: Any, v: Any, y: Any) -> Any:
     """What is meant by ``at``, or by ``v`` and ``y`` in its place."""
     if v is None and y is None:
         return at
-    if v is None or y is None:
-        raise ArgumentError(f"v, y: expected both or neither, got {'y' if v is None else 'v'} alone")
+    if y is None:
+        raise ArgumentError("v, y: expected both or neither, got v alone")
     if at is not None:
         raise ArgumentError("at, v, y: expected a state as at=(v, y) or as v= and y=, got both")
     return v, y
@@ -270,9 +270,18 @@ def state(argument: str, system: System, at: Any, or_what: str = "of blocks") ->
     """A state from what users give."""
     if not isinstance(at, (tuple, list)) or len(at) != 2:
         raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {_given(at)}")
-    v = _checks.block(f"{argument}[0], v", at[0], system.v_shape, system.axes)
+    v = _checks.block(f"{argument}[0], v", velocities(system, at[0]), system.v_shape, system.axes)
     y = _checks.block(f"{argument}[1], y", at[1], system.y_shape, system.axes)
     return v, y
+
+
+def velocities(system: System, v: Any) -> Any:
+    """What is given as v; a system that has no velocities needs none."""
+    if v is not None:
+        return v
+    if system.v_shape != (0,):
+        raise ArgumentError(f"v: expected the velocities of the state, since {system!r} has some, got None")
+    return 0.0
 
 
 def _given(at: Any) -> str:
