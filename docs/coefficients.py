@@ -44,7 +44,7 @@ def fit(f: Callable[[Any], Any], low: Any, high: Any, n: int) -> tuple[list[floa
         rest = [value - c * z**k for value, z in zip(rest, points, strict=True)]
         coefficients.append(c)
     between = [low + (high - low) * (mp.mpf(k) + mp.mpf(1) / 3) / 300 for k in range(300)]
-    return coefficients, float(max(abs(mp.polyval(coefficients[::-1], z) - f(z)) for z in between))
+    return coefficients, float(max(abs(sum(c * z**k for k, c in enumerate(coefficients)) - f(z)) for z in between))
 
 
 if __name__ == "__main__":

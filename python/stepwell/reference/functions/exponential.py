@@ -1,6 +1,6 @@
 """Exponential functions.
 
-x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²·Q(r) with one polynomial, without a division.
+x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²/2 + r³·Q(r) with one polynomial Q, without a division.
 ``docs/coefficients.py`` finds the coefficients.
 """
 
@@ -16,9 +16,8 @@ LN2 = (0.6931471806019545, -4.2009150726810846e-11)
 #: ln 2 again, the first part of 26 bits.
 LN2_UPPER = (0.6931471824645996, -1.904654299957768e-09)
 LOG2_E = 1.4426950408889634
-#: (eʳ − 1 − r)/r².
+#: (eʳ − 1 − r − r²/2)/r³.
 EXP = (
-    0.5,
     0.16666666666666669,
     0.04166666666666667,
     0.008333333333328882,
@@ -43,6 +42,10 @@ EXP2 = (
     7.070892031492808e-09,
     4.4550557022368883e-10,
 )
+#: Up to the first eˣ is 0 and up to the second eˣ − 1 is −1, rounded; from the last on both are infinite.
+UNDERFLOW_UNTIL, MINUS_ONE_UNTIL, OVERFLOW_FROM = -746.0, -40.0, 710.0
+#: Up to the first a power of 2 is 0, from the second on it is infinite.
+LOWEST_POWER_OF_TWO, HIGHEST_POWER_OF_TWO = -1080.0, 1025.0
 
 
 def held(x: Any, least: float, most: float) -> Any:
@@ -52,10 +55,12 @@ def held(x: Any, least: float, most: float) -> Any:
 
 
 class Reduced(NamedTuple):
-    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is the last two."""
+    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is upper − lower, rounded."""
 
     n: Any
     upper: Any
+    lower: Any
+    r: Any
     rest: Any
 
 
@@ -64,7 +69,8 @@ def reduced(x: Any) -> Reduced:
     n = (x * LOG2_E + MAGIC) - MAGIC
     upper, lower = x - n * LN2[0], n * LN2[1]
     r = upper - lower
-    return Reduced(n, upper, (r * r) * polynomial(r, EXP) - lower)
+    z = r * r
+    return Reduced(n, upper, lower, r, (0.5 * z + (z * r) * polynomial(r, EXP)) - lower)
 
 
 @elementary
@@ -72,10 +78,10 @@ def exp(x: Any) -> Any:
     """Exponential of x, eˣ, subnormal results included.
 
     Example:
-        >>> exp(1.0)
+        >>> print(exp(1.0))
         2.718281828459045
     """
-    x = held(x, -746.0, 710.0)
+    x = held(x, UNDERFLOW_UNTIL, OVERFLOW_FROM)
     p = reduced(x)
     return scaled(1.0 + (p.upper + p.rest), p.n, x < 0.0)
 
@@ -83,12 +89,14 @@ def exp(x: Any) -> Any:
 @elementary
 def expm1(x: Any) -> Any:
     """Exponential of x less 1, eˣ − 1, also where that is small."""
-    y = held(x, -40.0, 710.0)
+    y = held(x, MINUS_ONE_UNTIL, OVERFLOW_FROM)
     p = reduced(y)
     # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); of n = 1024 half a 2¹⁻ⁿ is still to be had.
     one, one_rest = fast_sum(1.0, -0.5 * power_of_two(1.0 - p.n))
     s, lost = fast_sum(one, p.upper)
-    value = scaled(s + (lost + (p.rest + one_rest)), p.n, y < 0.25)  # small y are not halved: they may be subnormal
+    # Just above ln 2/2 it matters that r was rounded.
+    rest = p.rest + (p.r * ((p.upper - p.r) - p.lower) + one_rest)
+    value = scaled(s + (lost + rest), p.n, y < 0.25)  # small y are not halved: they may be subnormal
     return either_bits(value, sign_of(x))
 
 
@@ -107,5 +115,5 @@ def exp2_of_sum(x: Any, tail: Any, low: Any) -> Any:
 @elementary
 def exp2(x: Any) -> Any:
     """Two to the power x; exact for whole x."""
-    x = held(x, -1080.0, 1025.0)
+    x = held(x, LOWEST_POWER_OF_TWO, HIGHEST_POWER_OF_TWO)
     return exp2_of_sum(x, 0.0, x < 0.0)

@@ -41,6 +41,8 @@ ASIN = (
 #: π/4: a first part of 50 bits, so that up to four times it is exact, and the rest.
 QUARTER_PI = (0.7853981633974483, 3.061616997868383e-17)
 TAN_EIGHTH = 0.41421356237309503
+#: From here on the arc tangent rounds to π/2.
+RIGHT_ANGLE_FROM = 2.0**70
 INFINITY = float("inf")
 #: The bits of 1 and of 2.
 ONE, TWO = 0x3FF0 << 48, 0x4000 << 48
@@ -69,11 +71,11 @@ def arctan(x: Any) -> Any:
     """Arc tangent of x, from −π/2 to π/2.
 
     Example:
-        >>> arctan(1.0)
+        >>> print(arctan(1.0))
         0.7853981633974483
     """
     y = magnitude(x)
-    y = where(y > 2.0**70, 2.0**70, y)
+    y = where(y > RIGHT_ANGLE_FROM, RIGHT_ANGLE_FROM, y)  # finite
     above = y > 1.0
     value = angle(where(above, 1.0, y), where(above, y, 1.0), where(above, 2.0, 0.0), where(above, -0.0, 0.0))
     return either_bits(value, sign_of(x))

@@ -78,7 +78,7 @@ def log(x: Any) -> Any:
     """Natural logarithm of x, subnormal numbers included; −∞ of zero, NaN of what is below (fdlibm's algorithm).
 
     Example:
-        >>> log(2.0)
+        >>> print(log(2.0))
         0.6931471805599453
     """
     p = reduced(x)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..._checks import numbers
+from ...errors import ShapeError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,6 +37,16 @@ def lifted(symbol: Any, name: str, value: Any) -> Any:
     return value if is_symbol(value) else symbol.number(float(numbers(name, value, finite=False)))
 
 
+def as_array(name: str, value: Any) -> Any:
+    """A list as an array, all else as it is."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{name}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+
+
 def one_by_one(given: Sequence[Any]) -> bool:
     """Whether there are arrays whose elements are symbols, or arrays beside a symbol."""
     kinds = [each.dtype == object for each in given if isinstance(each, np.ndarray)]
@@ -54,7 +65,7 @@ def elementary(f: F) -> F:
     def of_anything(*given: Any, **named: Any) -> Any:
         if named or len(given) != len(names):
             given = signature.bind(*given, **named).args
-        given = tuple(np.asarray(each) if isinstance(each, (list, tuple)) else each for each in given)
+        given = tuple(map(as_array, names, given))
         if one_by_one(given):
             return np.frompyfunc(of_anything, len(given), 1)(*given)
         if (symbol := symbol_of(given)) is not None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..._checks import numbers
-from .exponential import exp2_of_sum
+from .exponential import HIGHEST_POWER_OF_TWO, LOWEST_POWER_OF_TWO, exp2_of_sum
 from .logarithms import exponent_and_rest
 from .operations import (
     and_bits,
@@ -44,11 +44,9 @@ LOG_LONG = (
 TWO_THIRDS_LOG2_E = (0.9617967009544373, -7.028461650952758e-09, 0.9617966939259756)
 INFINITY, NAN = float("inf"), float("nan")
 #: Whole and half exponents up to this size are products.
-MOST_PRODUCTS = 16
-#: Powers of 2 beyond these are 0 or infinite.
-LEAST_EXPONENT, MOST_EXPONENT = -1080.0, 1025.0
+LARGEST_PRODUCT = 16
 #: An exponent of this size makes 0 or infinity of all numbers but 1: log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹.
-MOST = 2.0**64
+LARGEST_EXPONENT = 2.0**64
 
 
 def log2_in_two(x: Any) -> tuple[Any, Any]:
@@ -83,11 +81,11 @@ def any_power(x: Any, y: Any) -> Any:
     """X to the power y, as C's pow."""
     a = magnitude(x)
     upper, lower = log2_in_two(a)
-    e = where(y < -MOST, -MOST, where(y > MOST, MOST, y))
+    e = where(y < -LARGEST_EXPONENT, -LARGEST_EXPONENT, where(y > LARGEST_EXPONENT, LARGEST_EXPONENT, y))
     e1, e2 = halves(e)
     p, p_rest = e1 * upper, e2 * upper + e * lower
-    below, above = p < LEAST_EXPONENT, p > MOST_EXPONENT
-    p = where(below, LEAST_EXPONENT, where(above, MOST_EXPONENT, p))
+    below, above = p < LOWEST_POWER_OF_TWO, p > HIGHEST_POWER_OF_TWO
+    p = where(below, LOWEST_POWER_OF_TWO, where(above, HIGHEST_POWER_OF_TWO, p))
     p_rest = where(below, 0.0, where(above, 0.0, p_rest))
     value = exp2_of_sum(p, p_rest, p < 0.0)
     half = 0.5 * y
@@ -121,8 +119,7 @@ def _known_power(exponent: float) -> Any:
             return where(equal(x, x), 1.0, 1.0)
         value: Any = _product(x, whole)
         if whole != abs(exponent):
-            half = root(x) + 0.0  # +0 also of −0, as in C
-            value = value * half if whole else half
+            value = (value * root(x) if whole else root(x)) + 0.0  # +0 also of −0, as in C
         return 1.0 / value if exponent < 0.0 else value
 
     return of
@@ -141,11 +138,11 @@ def power(x: Any, y: Any) -> Any:
         The power, at zeros, infinities and NaN as C's ``pow``, except that the square root of −∞ is NaN.
 
     Example:
-        >>> power(2.0, 0.5), power(-8.0, 3)
-        (1.4142135623730951, -512.0)
+        >>> print(power(2.0, 0.5), power(-8.0, 3))
+        1.4142135623730951 -512.0
     """
     if isinstance(y, (int, float, np.integer, np.floating)) and not isinstance(y, bool):
         exponent = float(numbers("y", y, finite=False))
-        if abs(exponent) <= MOST_PRODUCTS and (2.0 * exponent).is_integer():
+        if abs(exponent) <= LARGEST_PRODUCT and (2.0 * exponent).is_integer():
             return _known_power(exponent)(x)
     return any_power(x, y)
