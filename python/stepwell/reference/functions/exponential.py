@@ -83,7 +83,8 @@ def exp(x: Any) -> Any:
     """
     x = held(x, UNDERFLOW_UNTIL, OVERFLOW_FROM)
     p = reduced(x)
-    return scaled(1.0 + (p.upper + p.rest), p.n, x < 0.0)
+    s, lost = fast_sum(1.0, p.upper)
+    return scaled(s + (lost + p.rest), p.n, x < 0.0)
 
 
 @elementary
