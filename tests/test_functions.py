@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core
+from stepwell.errors import ShapeError
 from stepwell.reference import functions as fn
 from stepwell.reference.functions import exponential, hyperbolic, inverse, logarithms, powers, roots, rounding, trigonometric
 from true_functions import OF_ONE, OF_TWO, PRECISION, SPECIALS, TRUE, arguments, errors, same, sizes
@@ -253,6 +254,9 @@ def test_what_is_no_number_is_refused_by_name(wrong: Any) -> None:
         fn.power(1.0, wrong)
     with pytest.raises(sw.StepwellError, match=r"^condition: "):
         fn.where(wrong, 1.0, 2.0)
+    for mismatched in (lambda: fn.hypot([1.0, 2.0], np.ones(3)), lambda: fn.where([True, False], np.ones(3), 1.0)):
+        with pytest.raises(ShapeError, match=r"expected shapes that broadcast, got \(2,\) and \(3,\)"):
+            mismatched()
     with pytest.raises(TypeError):
         fn.sin()  # type: ignore[call-arg]
 

@@ -47,6 +47,15 @@ def as_array(name: str, value: Any) -> Any:
         raise ShapeError(f"{name}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
 
 
+def shape_of(names: Sequence[str], given: Sequence[Any]) -> tuple[int, ...]:
+    """The shape that all have together."""
+    shapes = [each.shape if isinstance(each, np.ndarray) else () for each in given]
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ShapeError(f"{', '.join(names)}: expected shapes that broadcast, got {' and '.join(map(str, shapes))}") from None
+
+
 def one_by_one(given: Sequence[Any]) -> bool:
     """Whether there are arrays whose elements are symbols, or arrays beside a symbol."""
     kinds = [each.dtype == object for each in given if isinstance(each, np.ndarray)]
@@ -66,12 +75,12 @@ def elementary(f: F) -> F:
         if named or len(given) != len(names):
             given = signature.bind(*given, **named).args
         given = tuple(map(as_array, names, given))
+        shape = shape_of(names, given)
         if one_by_one(given):
             return np.frompyfunc(of_anything, len(given), 1)(*given)
         if (symbol := symbol_of(given)) is not None:
             return f(*(lifted(symbol, *pair) for pair in zip(names, given, strict=True)))
         arrays = [numbers(*pair, finite=False) for pair in zip(names, given, strict=True)]
-        shape = np.broadcast_shapes(*(each.shape for each in arrays))
         with np.errstate(all="ignore"):
             return f(*(np.atleast_1d(each) for each in arrays)).reshape(shape)[()]
 

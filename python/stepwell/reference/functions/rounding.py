@@ -18,6 +18,7 @@ from .operations import (
     lifted,
     magnitude,
     one_by_one,
+    shape_of,
     sign_of,
     symbol_of,
     turn_bits,
@@ -128,8 +129,11 @@ def where(condition: Any, x: Any, y: Any) -> Any:
 
     Raises:
         DTypeError: the condition is not made of truths, or x or y not of numbers.
+        ShapeError: their shapes do not broadcast.
     """
-    given = tuple(map(as_array, ("condition", "x", "y"), (condition, x, y)))
+    names = ("condition", "x", "y")
+    given = tuple(map(as_array, names, (condition, x, y)))
+    shape_of(names, given)
     if one_by_one(given):
         return np.frompyfunc(where, 3, 1)(*given)
     condition, x, y = given
