@@ -1,7 +1,8 @@
 """Prints the coefficients of stepwell's elementary functions (``python/stepwell/reference/functions/``); needs mpmath.
 
-Each polynomial has the least squares of weighted errors at Chebyshev nodes, and so nearly the least possible error. Its coefficients
-are rounded one after the other, the lowest power first, and the others are fitted again, so that they make up for the rounding.
+Each polynomial has the least squares of weighted errors at Chebyshev nodes, and so nearly the least possible error. Its
+coefficients are rounded one after the other, the lowest power first, and the others are fitted again, so that they make up for
+the rounding.
 """
 
 from collections.abc import Callable
