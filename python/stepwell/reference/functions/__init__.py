@@ -5,6 +5,7 @@ makes of a symbol is a straight line of additions, multiplications, divisions, s
 which are exact or correctly rounded everywhere. ``docs/functions.md`` says how accurate each is and what it costs.
 """
 
+from .comparisons import equal, greater, greater_equal, less, less_equal, not_equal
 from .exponential import exp, exp2, expm1
 from .hyperbolic import cosh, sinh, tanh
 from .inverse import arccos, arcsin, arctan, arctan2
@@ -27,11 +28,16 @@ __all__ = [
     "cos",
     "cosh",
     "deg2rad",
+    "equal",
     "exp",
     "exp2",
     "expm1",
     "floor",
+    "greater",
+    "greater_equal",
     "hypot",
+    "less",
+    "less_equal",
     "log",
     "log1p",
     "log2",
@@ -39,6 +45,7 @@ __all__ = [
     "maximum",
     "minimum",
     "mod",
+    "not_equal",
     "power",
     "rad2deg",
     "remainder",

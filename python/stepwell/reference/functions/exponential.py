@@ -1,6 +1,6 @@
 """Exponential functions.
 
-x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²·Q(r) with one polynomial, without a division.
+x is reduced by n·ln 2 to r in [−ln 2/2, ln 2/2], where eʳ = 1 + r + r²/2 + r³·Q(r) with one polynomial Q, without a division.
 ``docs/coefficients.py`` finds the coefficients.
 """
 
@@ -16,33 +16,36 @@ LN2 = (0.6931471806019545, -4.2009150726810846e-11)
 #: ln 2 again, the first part of 26 bits.
 LN2_UPPER = (0.6931471824645996, -1.904654299957768e-09)
 LOG2_E = 1.4426950408889634
-#: (eʳ − 1 − r)/r².
+#: (eʳ − 1 − r − r²/2)/r³.
 EXP = (
-    0.5,
-    0.16666666666666669,
-    0.04166666666666667,
-    0.008333333333328882,
-    0.001388888888888252,
-    0.00019841269866585198,
-    2.4801587328609384e-05,
-    2.755726454521223e-06,
-    2.7557270626199803e-07,
-    2.5101831986346174e-08,
-    2.0915713107101096e-09,
+    0.16666666666666685,
+    0.041666666666666685,
+    0.008333333333315955,
+    0.001388888888887332,
+    0.00019841269898657093,
+    2.4801587349060595e-05,
+    2.7557232875898035e-06,
+    2.755725199229993e-07,
+    2.511265401198411e-08,
+    2.0921702372435563e-09,
 )
 #: (2ʳ − 1 − r·ln 2)/r².
 EXP2 = (
-    0.24022650695910075,
-    0.0555041086648216,
-    0.009618129107619295,
-    0.0013333558146415914,
-    0.00015403530423870623,
-    1.5252733831061695e-05,
-    1.3215452116185932e-06,
-    1.0178061864730851e-07,
-    7.070892031492808e-09,
-    4.4550557022368883e-10,
+    0.24022650695910136,
+    0.05550410866482164,
+    0.009618129107592436,
+    0.0013333558146401475,
+    0.00015403530459036856,
+    1.5252733847353264e-05,
+    1.3215434398659551e-06,
+    1.0178054454579838e-07,
+    7.073924586475366e-09,
+    4.456232717843695e-10,
 )
+#: Up to the first eˣ is 0 and up to the second eˣ − 1 is −1, rounded; from the last on both are infinite.
+UNDERFLOW_UNTIL, MINUS_ONE_UNTIL, OVERFLOW_FROM = -746.0, -40.0, 710.0
+#: Up to the first a power of 2 is 0, from the second on it is infinite.
+LOWEST_POWER_OF_TWO, HIGHEST_POWER_OF_TWO = -1080.0, 1025.0
 
 
 def held(x: Any, least: float, most: float) -> Any:
@@ -52,10 +55,12 @@ def held(x: Any, least: float, most: float) -> Any:
 
 
 class Reduced(NamedTuple):
-    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is the last two."""
+    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is upper − lower, rounded."""
 
     n: Any
     upper: Any
+    lower: Any
+    r: Any
     rest: Any
 
 
@@ -64,7 +69,8 @@ def reduced(x: Any) -> Reduced:
     n = (x * LOG2_E + MAGIC) - MAGIC
     upper, lower = x - n * LN2[0], n * LN2[1]
     r = upper - lower
-    return Reduced(n, upper, (r * r) * polynomial(r, EXP) - lower)
+    z = r * r
+    return Reduced(n, upper, lower, r, (0.5 * z + (z * r) * polynomial(r, EXP)) - lower)
 
 
 @elementary
@@ -72,23 +78,26 @@ def exp(x: Any) -> Any:
     """Exponential of x, eˣ, subnormal results included.
 
     Example:
-        >>> exp(1.0)
+        >>> print(exp(1.0))
         2.718281828459045
     """
-    x = held(x, -746.0, 710.0)
+    x = held(x, UNDERFLOW_UNTIL, OVERFLOW_FROM)
     p = reduced(x)
-    return scaled(1.0 + (p.upper + p.rest), p.n, x < 0.0)
+    s, lost = fast_sum(1.0, p.upper)
+    return scaled(s + (lost + p.rest), p.n, x < 0.0)
 
 
 @elementary
 def expm1(x: Any) -> Any:
     """Exponential of x less 1, eˣ − 1, also where that is small."""
-    y = held(x, -40.0, 710.0)
+    y = held(x, MINUS_ONE_UNTIL, OVERFLOW_FROM)
     p = reduced(y)
     # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); of n = 1024 half a 2¹⁻ⁿ is still to be had.
     one, one_rest = fast_sum(1.0, -0.5 * power_of_two(1.0 - p.n))
     s, lost = fast_sum(one, p.upper)
-    value = scaled(s + (lost + (p.rest + one_rest)), p.n, y < 0.25)  # small y are not halved: they may be subnormal
+    # Just above ln 2/2 it matters that r was rounded.
+    rest = p.rest + (p.r * ((p.upper - p.r) - p.lower) + one_rest)
+    value = scaled(s + (lost + rest), p.n, y < 0.25)  # small y are not halved: they may be subnormal
     return either_bits(value, sign_of(x))
 
 
@@ -107,5 +116,5 @@ def exp2_of_sum(x: Any, tail: Any, low: Any) -> Any:
 @elementary
 def exp2(x: Any) -> Any:
     """Two to the power x; exact for whole x."""
-    x = held(x, -1080.0, 1025.0)
+    x = held(x, LOWEST_POWER_OF_TWO, HIGHEST_POWER_OF_TWO)
     return exp2_of_sum(x, 0.0, x < 0.0)

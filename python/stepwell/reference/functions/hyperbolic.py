@@ -15,31 +15,31 @@ from .pieces import MAGIC, fast_sum, halves, polynomial, power_of_two, quotient
 
 #: (sinh r − r)/r³ in powers of r².
 SINH = (
-    0.16666666666666669,
-    0.008333333333328882,
-    0.00019841269866585198,
-    2.755726454521223e-06,
-    2.5101831986346174e-08,
+    0.16666666666666677,
+    0.008333333333321454,
+    0.00019841269886514685,
+    2.7557243862350308e-06,
+    2.5109145832168022e-08,
 )
 #: (cosh r − 1 − r²/2)/r⁴ in powers of r².
 COSH = (
-    0.041666666666666664,
-    0.0013888888888889744,
-    2.4801587307577e-05,
-    2.75572935935897e-07,
-    2.090730413451327e-09,
+    0.041666666666666685,
+    0.001388888888887332,
+    2.4801587349060595e-05,
+    2.755725199229993e-07,
+    2.0921702372435563e-09,
 )
 #: Below it sinh x and tanh x round to x.
-SMALL = 2.0**-28
+IDENTITY_BELOW = 2.0**-28
 #: From here on sinh x and cosh x are infinite.
-LARGEST = 710.6
+OVERFLOW_FROM = 710.6
 #: From here on tanh x rounds to 1.
-ALMOST_ONE = 22.0
+TANH_ONE_FROM = 22.0
 
 
 def _half(x: Any) -> tuple[Any, Any]:
     """Half of sinh |x| and half of cosh |x|; their double may be infinite."""
-    x = where(x > LARGEST, LARGEST, x)
+    x = where(x > OVERFLOW_FROM, OVERFLOW_FROM, x)
     n = (x * LOG2_E + MAGIC) - MAGIC
     upper, lower = x - n * LN2[0], n * LN2[1]
     r = upper - lower
@@ -63,12 +63,12 @@ def sinh(x: Any) -> Any:
     """Hyperbolic sine of x.
 
     Example:
-        >>> sinh(1.0)
+        >>> print(sinh(1.0))
         1.1752011936438014
     """
     y = magnitude(x)
     sine, _ = _half(y)
-    return either_bits(where(y < SMALL, y, sine * 2.0), sign_of(x))
+    return either_bits(where(y < IDENTITY_BELOW, y, sine * 2.0), sign_of(x))
 
 
 @elementary
@@ -82,7 +82,7 @@ def cosh(x: Any) -> Any:
 def tanh(x: Any) -> Any:
     """Hyperbolic tangent of x: e²ˣ − 1 by e²ˣ + 1, each to more than 53 bits."""
     y = magnitude(x)
-    p = exponential(2.0 * where(y > ALMOST_ONE, ALMOST_ONE, y))
+    p = exponential(2.0 * where(y > TANH_ONE_FROM, TANH_ONE_FROM, y))
     inverse = power_of_two(-p.n)
     pairs = []
     for part in (-inverse, inverse):  # e²ˣ − 1 and e²ˣ + 1, over 2ⁿ
@@ -90,4 +90,4 @@ def tanh(x: Any) -> Any:
         s, lost = fast_sum(one, p.upper)
         pairs.append(fast_sum(s, lost + (p.rest + one_rest)))
     q, rest = quotient(*pairs[0], *pairs[1])
-    return either_bits(where(y < SMALL, y, q + rest), sign_of(x))
+    return either_bits(where(y < IDENTITY_BELOW, y, q + rest), sign_of(x))

@@ -14,13 +14,13 @@ from .pieces import fast_sum, halves, polynomial, power_of_two
 
 #: 2·(artanh s − s)/s³ in powers of s².
 LOG = (
-    0.666666666666667,
-    0.3999999999989976,
-    0.28571428625968287,
-    0.2222221112997697,
-    0.18182889654720366,
-    0.15331701496587977,
-    0.14616709658969645,
+    0.6666666666666736,
+    0.39999999999405483,
+    0.28571428744061894,
+    0.22222198426151224,
+    0.18183571057432849,
+    0.15313895728652202,
+    0.1479736350587642,
 )
 #: √½, cut: the mantissa is taken from √½ to √2.
 HALF_ROOT = 0x3FE6A09E00000000
@@ -78,7 +78,7 @@ def log(x: Any) -> Any:
     """Natural logarithm of x, subnormal numbers included; −∞ of zero, NaN of what is below (fdlibm's algorithm).
 
     Example:
-        >>> log(2.0)
+        >>> print(log(2.0))
         0.6931471805599453
     """
     p = reduced(x)

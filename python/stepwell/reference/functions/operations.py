@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..._checks import numbers
+from ...errors import ShapeError
 from ..marks import mark
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -39,6 +40,25 @@ def lifted(symbol: Any, name: str, value: Any) -> Any:
     return value if is_symbol(value) else symbol.number(float(numbers(name, value, finite=False)))
 
 
+def as_array(name: str, value: Any) -> Any:
+    """A list as an array, all else as it is."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{name}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+
+
+def shape_of(names: Sequence[str], given: Sequence[Any]) -> tuple[int, ...]:
+    """The shape that all have together."""
+    shapes = [each.shape if isinstance(each, np.ndarray) else () for each in given]
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ShapeError(f"{', '.join(names)}: expected shapes that broadcast, got {' and '.join(map(str, shapes))}") from None
+
+
 def one_by_one(given: Sequence[Any]) -> bool:
     """Whether there are arrays whose elements are symbols, or arrays beside a symbol."""
     kinds = [each.dtype == object for each in given if isinstance(each, np.ndarray)]
@@ -58,7 +78,8 @@ def elementary(f: F) -> F:
     def of_anything(*given: Any, **named: Any) -> Any:
         if named or len(given) != len(names):
             given = signature.bind(*given, **named).args
-        given = tuple(np.asarray(each) if isinstance(each, (list, tuple)) else each for each in given)
+        given = tuple(map(as_array, names, given))
+        shape = shape_of(names, given)
         if one_by_one(given):
             return np.frompyfunc(of_anything, len(given), 1)(*given)
         if (symbol := symbol_of(given)) is not None:
@@ -67,7 +88,6 @@ def elementary(f: F) -> F:
                 value if f.__name__ in UNMARKED else mark(NAMES.get(f.__name__, f.__name__), value, *given, function=of_anything)
             )
         arrays = [numbers(*pair, finite=False) for pair in zip(names, given, strict=True)]
-        shape = np.broadcast_shapes(*(each.shape for each in arrays))
         with np.errstate(all="ignore"):
             return f(*(np.atleast_1d(each) for each in arrays)).reshape(shape)[()]
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..._checks import numbers
-from .exponential import exp2_of_sum
+from .exponential import HIGHEST_POWER_OF_TWO, LOWEST_POWER_OF_TWO, exp2_of_sum
 from .logarithms import exponent_and_rest
 from .operations import (
     and_bits,
@@ -30,25 +30,21 @@ from .pieces import UPPER, halves, polynomial
 
 #: 3·(artanh s − s − s³/3)/s⁵ in powers of s².
 LOG_LONG = (
-    0.6,
-    0.4285714285714647,
-    0.33333333331620624,
-    0.2727272763713844,
-    0.23076882014021585,
-    0.20002618611460884,
-    0.17552406115636932,
-    0.17583160409256404,
-    0.009678281565327585,
+    0.6000000000000356,
+    0.42857142855077796,
+    0.3333333379099096,
+    0.272726756868231,
+    0.23080171936530056,
+    0.19884461675660128,
+    0.1980104338875592,
 )
 #: 2/(3·ln 2): a first part of 26 bits, the rest, and rounded as a whole.
 TWO_THIRDS_LOG2_E = (0.9617967009544373, -7.028461650952758e-09, 0.9617966939259756)
 INFINITY, NAN = float("inf"), float("nan")
 #: Whole and half exponents up to this size are products.
-MOST_PRODUCTS = 16
-#: Powers of 2 beyond these are 0 or infinite.
-LEAST_EXPONENT, MOST_EXPONENT = -1080.0, 1025.0
+LARGEST_PRODUCT = 16
 #: An exponent of this size makes 0 or infinity of all numbers but 1: log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹.
-MOST = 2.0**64
+LARGEST_EXPONENT = 2.0**64
 
 
 def log2_in_two(x: Any) -> tuple[Any, Any]:
@@ -83,11 +79,11 @@ def any_power(x: Any, y: Any) -> Any:
     """X to the power y, as C's pow."""
     a = magnitude(x)
     upper, lower = log2_in_two(a)
-    e = where(y < -MOST, -MOST, where(y > MOST, MOST, y))
+    e = where(y < -LARGEST_EXPONENT, -LARGEST_EXPONENT, where(y > LARGEST_EXPONENT, LARGEST_EXPONENT, y))
     e1, e2 = halves(e)
     p, p_rest = e1 * upper, e2 * upper + e * lower
-    below, above = p < LEAST_EXPONENT, p > MOST_EXPONENT
-    p = where(below, LEAST_EXPONENT, where(above, MOST_EXPONENT, p))
+    below, above = p < LOWEST_POWER_OF_TWO, p > HIGHEST_POWER_OF_TWO
+    p = where(below, LOWEST_POWER_OF_TWO, where(above, HIGHEST_POWER_OF_TWO, p))
     p_rest = where(below, 0.0, where(above, 0.0, p_rest))
     value = exp2_of_sum(p, p_rest, p < 0.0)
     half = 0.5 * y
@@ -121,8 +117,7 @@ def _known_power(exponent: float) -> Any:
             return where(equal(x, x), 1.0, 1.0)
         value: Any = _product(x, whole)
         if whole != abs(exponent):
-            half = root(x) + 0.0  # +0 also of −0, as in C
-            value = value * half if whole else half
+            value = (value * root(x) if whole else root(x)) + 0.0  # +0 also of −0, as in C
         return 1.0 / value if exponent < 0.0 else value
 
     return of
@@ -141,11 +136,11 @@ def power(x: Any, y: Any) -> Any:
         The power, at zeros, infinities and NaN as C's ``pow``, except that the square root of −∞ is NaN.
 
     Example:
-        >>> power(2.0, 0.5), power(-8.0, 3)
-        (1.4142135623730951, -512.0)
+        >>> print(power(2.0, 0.5), power(-8.0, 3))
+        1.4142135623730951 -512.0
     """
     if isinstance(y, (int, float, np.integer, np.floating)) and not isinstance(y, bool):
         exponent = float(numbers("y", y, finite=False))
-        if abs(exponent) <= MOST_PRODUCTS and (2.0 * exponent).is_integer():
+        if abs(exponent) <= LARGEST_PRODUCT and (2.0 * exponent).is_integer():
             return _known_power(exponent)(x)
     return any_power(x, y)

@@ -21,7 +21,7 @@ def sqrt(x: Any) -> Any:
     """Square root of x, correctly rounded; −0 of −0, NaN of what is below.
 
     Example:
-        >>> sqrt(2.0)
+        >>> print(sqrt(2.0))
         1.4142135623730951
     """
     return root(x)

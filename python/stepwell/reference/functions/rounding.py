@@ -9,7 +9,20 @@ import numpy as np
 from ..._checks import numbers, short
 from ...errors import DTypeError
 from . import operations
-from .operations import either_bits, elementary, equal, is_symbol, lifted, magnitude, one_by_one, sign_of, symbol_of, turn_bits
+from .operations import (
+    as_array,
+    either_bits,
+    elementary,
+    equal,
+    is_symbol,
+    lifted,
+    magnitude,
+    one_by_one,
+    shape_of,
+    sign_of,
+    symbol_of,
+    turn_bits,
+)
 from .operations import where as choose
 from .pieces import halves
 
@@ -84,7 +97,7 @@ def mod(x: Any, y: Any) -> Any:
     Exact, where that is a number of 53 bits, as long as |x/y| is below 2⁵²; NaN beyond.
 
     Example:
-        >>> mod(-7.0, 3.0)
+        >>> print(mod(-7.0, 3.0))
         2.0
     """
     a, b = magnitude(x), magnitude(y)
@@ -116,8 +129,11 @@ def where(condition: Any, x: Any, y: Any) -> Any:
 
     Raises:
         DTypeError: the condition is not made of truths, or x or y not of numbers.
+        ShapeError: their shapes do not broadcast.
     """
-    given = tuple(np.asarray(each) if isinstance(each, (list, tuple)) else each for each in (condition, x, y))
+    names = ("condition", "x", "y")
+    given = tuple(map(as_array, names, (condition, x, y)))
+    shape_of(names, given)
     if one_by_one(given):
         return np.frompyfunc(where, 3, 1)(*given)
     condition, x, y = given

@@ -11,33 +11,35 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from .operations import add_bits, and_bits, elementary, equal, magnitude, shift_up, sign_of, turn_bits, where
-from .pieces import MAGIC, fast_sum, polynomial, quotient
+from .pieces import MAGIC, fast_sum, halves, polynomial, quotient
 
 #: π/2: three parts of 29 bits, and what then remains to 53.
 HALF_PI = (1.570796325802803, 9.920935808982456e-10, -1.2177051780877821e-18, 2.9038559739793605e-28)
 TWO_OVER_PI = 0.6366197723675814
 #: (sin r − r)/r³ in powers of r².
 SIN = (
-    -0.16666666666666666,
-    0.008333333333331312,
-    -0.00019841269837089483,
-    2.7557316225330525e-06,
-    -2.5051151767982872e-08,
-    1.591930461867438e-10,
+    -0.1666666666666663,
+    0.008333333333321976,
+    -0.00019841269829525107,
+    2.755731360899387e-06,
+    -2.505074680230245e-08,
+    1.5896212232510631e-10,
 )
 #: (cos r − 1 + r²/2)/r⁴ in powers of r².
 COS = (
-    0.041666666666666664,
-    -0.0013888888888887061,
-    2.480158729846086e-05,
-    -2.755731715879275e-07,
-    2.08761279627016e-09,
-    -1.138155346125956e-11,
+    0.041666666666666595,
+    -0.0013888888888873461,
+    2.480158728911982e-05,
+    -2.75573142586856e-07,
+    2.0875711707973604e-09,
+    -1.1359097367080523e-11,
 )
 #: π/180 and 180/π.
 DEGREE, RADIAN = 0.017453292519943295, 57.29577951308232
+#: The number of which only the lowest bit is set.
+ODD = 2.0**-1074
 #: Beyond it an argument is further from its neighbours than 1/8 of a radian, and has no sine worth the name.
-LARGEST = 2.0**50
+LARGEST_ANGLE = 2.0**50
 
 
 class Reduced(NamedTuple):
@@ -46,12 +48,14 @@ class Reduced(NamedTuple):
     Attributes:
         turn: a number in whose low bits n stands.
         odd: whether n is odd.
+        z: r², rounded.
         sine, sine_rest: sin r is their sum, of which the first is r.
         cosine, cosine_rest: cos r is their sum, of which the first is 1 − r²/2, rounded.
     """
 
     turn: Any
     odd: Any
+    z: Any
     sine: Any
     sine_rest: Any
     cosine: Any
@@ -61,7 +65,7 @@ class Reduced(NamedTuple):
 def reduced(x: Any) -> Reduced:
     """Both functions of what remains of |x|; NaN where it is too large."""
     x = magnitude(x)
-    x = where(x <= LARGEST, x, float("nan"))
+    x = where(x <= LARGEST_ANGLE, x, float("nan"))
     turn = x * TWO_OVER_PI + MAGIC
     n = turn - MAGIC
     a = x - n * HALF_PI[0]
@@ -75,7 +79,7 @@ def reduced(x: Any) -> Reduced:
     cosine = 1.0 - half
     sine_rest = (z * r) * polynomial(z, SIN) + tail * cosine
     cosine_rest = ((1.0 - cosine) - half) + ((z * z) * polynomial(z, COS) - r * tail)
-    return Reduced(turn, equal(and_bits(turn, 1), 4.9406564584124654e-324), r, sine_rest, cosine, cosine_rest)
+    return Reduced(turn, equal(and_bits(turn, 1), ODD), z, r, sine_rest, cosine, cosine_rest)
 
 
 @elementary
@@ -83,7 +87,7 @@ def sin(x: Any) -> Any:
     """Sin x, x in radians; NaN beyond 2⁵⁰ (fdlibm's kernels; Cody and Waite's reduction).
 
     Example:
-        >>> sin(0.5)
+        >>> print(sin(0.5))
         0.479425538604203
     """
     p = reduced(x)
@@ -103,7 +107,9 @@ def cos(x: Any) -> Any:
 def tan(x: Any) -> Any:
     """Tan x, x in radians; NaN beyond 2⁵⁰ (see ``sin``). The quotient of both, each to more than 53 bits."""
     p = reduced(x)
-    (s, s_rest), (c, c_rest) = fast_sum(p.sine, p.sine_rest), fast_sum(p.cosine, p.cosine_rest)
+    r1, r2 = halves(p.sine)
+    z_rest = (r1 * r1 - p.z) + r2 * (p.sine + r1)  # what is lost of r² would be a quarter of a unit in the last place
+    (s, s_rest), (c, c_rest) = fast_sum(p.sine, p.sine_rest), fast_sum(p.cosine, p.cosine_rest - 0.5 * z_rest)
     pairs = zip((c, c_rest, s, s_rest), (s, s_rest, c, c_rest), strict=True)
     q, rest = quotient(*(where(p.odd, yes, no) for yes, no in pairs))
     return turn_bits(q + rest, sign_of(turn_bits(shift_up(p.turn, 63), x)))
