@@ -20,9 +20,10 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, explanation, scenes, stability
+    from . import advice, charts, explanation, exports, scenes, stability
     from .advice import advise
     from .explanation import Explanation, explain
+    from .exports import ExportedStep, export
     from .scenes import Scene
     from .stability import analyse, criteria, stability_limit
 
@@ -35,6 +36,7 @@ __all__ = [
     "DivergenceWarning",
     "EnergyControl",
     "Explanation",
+    "ExportedStep",
     "LinearSystem",
     "Method",
     "NBody",
@@ -59,6 +61,8 @@ __all__ = [
     "errors",
     "explain",
     "explanation",
+    "export",
+    "exports",
     "integrate",
     "isa",
     "isa_levels",
@@ -92,6 +96,9 @@ _LATER = {
     "charts": "charts",
     "explain": "explanation.explain",
     "explanation": "explanation",
+    "ExportedStep": "exports.ExportedStep",
+    "export": "exports.export",
+    "exports": "exports",
     "scenes": "scenes",
     "stability": "stability",
     "analyse": "stability.analyse",

@@ -19,11 +19,12 @@ ALL_BITS = 2**64 - 1
 
 
 class Formula(NamedTuple):
-    """A text, what it does last, and whether it is the truth of a comparison."""
+    """A text, what it does last, whether it is the truth of a comparison, and whether it is bits in a language that tells them."""
 
     text: str
     holds: int = ATOM
     is_truth: bool = False
+    is_bits: bool = False
 
     @property
     def is_negative(self) -> bool:
@@ -107,6 +108,28 @@ def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | N
             return of[0]
         case _:  # floor, and what is to come
             return Formula(f"{name}({', '.join(each.text for each in of)})")
+
+
+class Notation:
+    """How values are written: here for people, elsewhere as a language has it.
+
+    Attributes:
+        longest: characters of a line, its name not counted, beyond which it becomes several.
+    """
+
+    longest = 72
+
+    def number(self, bits: int) -> Formula:
+        """A constant."""
+        return number(bits)
+
+    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+        """An operation of these; ``bits`` are those of the operands that are constants."""
+        return formula(name, of, given, bits)
+
+    def named(self, name: str, value: Formula) -> Formula:
+        """A value that has a line of its own, where it is used."""
+        return Formula(name, is_truth=value.is_truth)
 
 
 def _sum(a: Formula, b: Formula, sign: str, other: str) -> Formula:
