@@ -19,7 +19,7 @@ ALL_BITS = 2**64 - 1
 
 
 class Formula(NamedTuple):
-    """A text, what it does last, whether it is the truth of a comparison, and whether it is bits in a language that tells them."""
+    """A text, what it does last, whether it is the truth of a comparison, whether it is bits where these are no numbers."""
 
     text: str
     holds: int = ATOM

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, prod
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -139,9 +139,7 @@ def _member(member: Any, batch: Shape) -> Shape:
     return tuple(_checks.count("member", each, 0, n - 1) for each, n in zip(given, batch, strict=True))
 
 
-def _under(
-    system: System, control: EnergyControl | Projection, blocks: list[Array | None], batch: Shape, dt: float
-) -> System:
+def _under(system: System, control: EnergyControl | Projection, blocks: list[Array | None], batch: Shape, dt: float) -> System:
     """The system under control; without a state it needs all numbers of the control."""
     v, y = blocks
     if v is not None and y is not None:
@@ -162,11 +160,10 @@ def _wide(block: Array, shape: Shape, batch: Shape) -> Array:
 
 def _example(system: System, blocks: list[Array | None], batch: Shape, index: Shape) -> tuple[list[float], list[float]]:
     """Velocities and coordinates with which the example begins."""
-    shapes = system.v_shape, system.y_shape
     out = []
-    for block, shape, others in zip(blocks, shapes, (lambda n: [0.0] * n, lambda n: [i + 1.0 for i in range(n)]), strict=True):
+    for block, shape, others in zip(blocks, (system.v_shape, system.y_shape), (0.0, 1.0), strict=True):
         if block is None:
-            out.append(others(prod(shape)))
+            out.append([others * (i + 1.0) for i in range(prod(shape))])
         else:
             own = _wide(block, shape, batch)[(slice(None),) * len(shape) + index]
             out.append([float(each) for each in own.reshape(-1)])

@@ -92,7 +92,7 @@ class C(Language):
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"{self.helper('sample')}({self.prefix}_{of.name}, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+        return f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
 
     def how(self, w: Written) -> list[str]:
         """How to compile and call it."""
@@ -158,7 +158,9 @@ class C(Language):
             "\n".join(
                 [
                     f"// The samples of {each.about}.",
-                    *self.listed(f"static const double {self.prefix}_{each.name}[{len(each.values)}] = {{", each.values, "};"),
+                    *self.listed(
+                        f"static const double {self.prefix}_{each.name}_samples[{len(each.values)}] = {{", each.values, "};"
+                    ),
                 ]
             )
             for each in w.tables

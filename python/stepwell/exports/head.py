@@ -25,7 +25,7 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
     evaluations = f"{method.evaluations} rate evaluation{'s' * (method.evaluations > 1)} per step"
     blocks = [("v", system.v_shape), ("y", system.y_shape)]
     layout = "; ".join(_layout(name if name == "y" else w.slot, shape) for name, shape in blocks)
-    lines = [
+    return [
         f"{w.language.prefix}: one step by {method.title}.",
         "",
         f"System:  {short(system, MAX_SYSTEM)}",
@@ -43,7 +43,6 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
         "",
         *indented(language.example(w, v, y, STEPS)),
     ]
-    return lines
 
 
 def _layout(name: str, shape: Shape) -> str:
@@ -56,7 +55,7 @@ def _layout(name: str, shape: Shape) -> str:
     if len(shape) == 1:
         return f"{name}[{size}]" if size else f"no {name}"
     letters = "ijkl"[: len(shape)]
-    place, *rest = letters
-    for letter, n in zip(rest, shape[1:], strict=True):
+    place = letters[0]
+    for letter, n in zip(letters[1:], shape[1:], strict=True):
         place = f"{n}*{place if place.isalpha() else f'({place})'} + {letter}"
     return f"{name}[{size}], number {', '.join(letters)} of the block of shape {shape} at {name}[{place}]"

@@ -1,7 +1,7 @@
 """Operations as a language writes them: what all have in common.
 
-A value is a number, a truth, or bits (a whole number of 64 bits). Numbers become bits, and bits numbers, by functions that stand in
-the file: numbers whose bits are those of a NaN would not come through everywhere unchanged.
+A value is a number, a truth, or bits (a whole number of 64 bits). Numbers become bits, and bits numbers, by functions that stand
+in the file: numbers whose bits are those of a NaN would not come through everywhere unchanged.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ class Assignment(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A number of a state, and what it is called in a function; the index is −1 if its block is one number."""
+    """A number of a state, and what it is called in a function; ``at`` is −1 if its block is one number."""
 
     block: str
-    index: int
+    at: int
     name: str
 
 
@@ -182,7 +182,7 @@ class Language(Notation, ABC):
             case "floor":
                 return Formula(f"{self.floor}({numbers[0].text})")
             case "divide":
-                return self.quotient(*numbers, bits[1])
+                return self.quotient(numbers[0], numbers[1], bits[1])
             case "sample":
                 return Formula(self.sample(given, numbers[0].text))
             case "multiply add" | "multiply subtract" | "subtract multiply":
@@ -211,9 +211,9 @@ class Language(Notation, ABC):
         return f"{truth.within(EITHER)} ? {a.within(EITHER)} : {b.within(EITHER)}"
 
     def _on_bits(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
-        if name in ("and", "or", "exclusive or") and any(each.is_truth for each in of):
-            if all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True)):
-                return self._of_truths(name, of, bits)
+        alike = all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True))
+        if name in ("and", "or", "exclusive or") and alike and any(each.is_truth for each in of):
+            return self._of_truths(name, of, bits)
         if name == "exclusive or":
             for x, turning in (of, of[::-1]):
                 if (last := LAST_BIT.fullmatch(turning.text)) and not x.is_truth:
@@ -282,7 +282,7 @@ class Language(Notation, ABC):
             return of[block] if index < 0 else f"{of[block]}[{index}]"
 
         groups = [
-            ("The state before.", [Assignment(p.name, "number", place(p.block, p.index, read)) for p in f.reads]),
+            ("The state before.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
             ("What depends on the time alone.", f.of_time),
             ("What depends on the state.", f.lines),
         ]
@@ -292,7 +292,7 @@ class Language(Notation, ABC):
                 out += ["", f"{self.comment} {title}"]
                 out += [self.declare(each, f" {self.comment} {each.note}" if each.note else "") for each in lines]
         out += ["", f"{self.comment} The state after."]
-        out += [f"{place(p.block, p.index, write)} = {p.name}{self.end}" for p in f.writes]
+        out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]
 
     @abstractmethod

@@ -11,31 +11,41 @@ from .. import _checks
 from .._checks import Shape
 from ..errors import ArgumentError, DTypeError
 
-#: Words that a name may not be, in any of the languages, and names that a file uses for its own things.
-RESERVED = frozenset(
-    """
-    abstract and alignas alignof arguments as asm assert async auto await become bool boolean box break byte case catch char class
-    const constexpr continue crate debugger def default del delete do double dyn elif else enum eval except export extends extern
-    f64 false False final finally float fn for from function global goto if impl import in inline instanceof int interface is lambda
-    let long loop macro main match mod move mut native new None nonlocal not null nullptr override package pass priv private
-    protected pub public raise ref register restrict return self Self short signed sizeof static static_assert struct super switch
-    synchronized template this thread_local throw throws trait transient true True try type typedef typeof union unsafe unsigned
-    unsized use usize using var virtual void volatile where while with yield
-    abs acos asin atan ceil cos errno exp f floor fma fmod i inf isnan log m math memcpy NAN nan pow printf s signal sin sqrt stdin
-    stdout stderr strlen tan time u64 NULL
-    """.split()
-)
+#: Words that a name may not be: the languages' own, names that C's headers give to something else, and those that a file uses.
+WORDS = """
+abstract and alignas alignof arguments as asm assert async auto await become bool boolean box break byte case catch char class
+const constexpr continue crate debugger def default del delete do double dyn elif else enum eval except export extends extern
+f64 false False final finally float fn for from function gen global goto if impl import in inline instanceof int interface is
+lambda let long loop macro main match mod move mut native new None nonlocal not null nullptr override package pass priv private
+protected pub public raise ref register restrict return self Self short signed sizeof static static_assert struct super switch
+synchronized template this thread_local throw throws trait transient true True try type typedef typeof union unsafe unsigned
+unsized use usize using var virtual void volatile where while with yield
+i386 linux unix DOMAIN HUGE HUGE_VAL INFINITY MAXFLOAT NAN NULL OVERFLOW PLOSS SING TLOSS UNDERFLOW X_TLOSS
+M_1_PI M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2
+abs acos asin atan ceil cos errno exp f floor fma fmod i inf isnan log m math memcpy nan pow printf s signal sin sqrt stdin
+stdout stderr strlen struct tan time u64
+"""
 
 #: Names of types as they are written in languages that begin them with a capital, which would hide what a file uses.
-HIDING = frozenset(
-    """
-    Array ArrayBuffer BigInt BigInt64Array BigUint64Array Box Boolean Clone Copy Debug Default Error Float64Array Function Infinity
-    Math NaN Number Object Option Range RangeError Result Self String Symbol TypeError ImportError ValueError Vec None True False
-    """.split()
-)
+TYPES = """
+Array ArrayBuffer BigInt BigInt64Array BigUint64Array Box Boolean Clone Copy Debug Default Error Float64Array Function Infinity
+Math NaN Number Object Option Range RangeError Result Self String Symbol TypeError ImportError ValueError Vec None True False
+"""
+
+RESERVED, HIDING = frozenset(WORDS.split()), frozenset(TYPES.split())
 
 #: Letters of names that other alphabets have.
-LETTERS = {"Φ": "phi", "Ψ": "psi", "Ω": "omega", "ω": "omega", "μ": "mu", "λ": "lambda", "δ": "delta", "ε": "epsilon", "α": "alpha"}
+LETTERS = {
+    "Φ": "phi",
+    "Ψ": "psi",
+    "Ω": "omega",
+    "ω": "omega",
+    "μ": "mu",
+    "λ": "lambda",
+    "δ": "delta",
+    "ε": "epsilon",
+    "α": "alpha",
+}
 LETTERS |= {"β": "beta", "γ": "gamma", "κ": "kappa", "ν": "nu", "π": "pi", "ρ": "rho", "σ": "sigma", "τ": "tau", "θ": "theta"}
 
 #: The longest prefix; compilers need not tell longer names apart.
@@ -97,7 +107,9 @@ def prefix(name: object) -> str:
             f"{_checks.short(name)}"
         )
     if name in RESERVED or name.lower() in RESERVED or camel(name) in HIDING:
-        raise ArgumentError(f"name: {name!r} has a meaning of its own in one of the languages; add a word, as in 'my_{name.lower()}'")
+        raise ArgumentError(
+            f"name: {name!r} has a meaning of its own in one of the languages; add a word, as in 'my_{name.lower()}'"
+        )
     return name
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 from ..explanation import formula as plain
@@ -38,11 +37,11 @@ def fused(a, b, c):
     except OverflowError:
         return math.copysign(math.inf, a * b + c)'''
 
-BITS_OF = '''def bits_of(x):
-    return struct.unpack("<Q", struct.pack("<d", x))[0]'''
+BITS_OF = """def bits_of(x):
+    return struct.unpack("<Q", struct.pack("<d", x))[0]"""
 
-NUMBER_OF = '''def number_of(b):
-    return struct.unpack("<d", struct.pack("<Q", b))[0]'''
+NUMBER_OF = """def number_of(b):
+    return struct.unpack("<d", struct.pack("<Q", b))[0]"""
 
 TURN_SIGN = '''def turn_sign(x, y):
     """x, its sign turned if the last bit of y is set."""
@@ -114,7 +113,9 @@ class Python(Language):
     def how(self, w: Written) -> list[str]:
         """How to call it."""
         p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
-        needs = "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs no other module."
+        needs = (
+            "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs only the standard library."
+        )
         lines = [
             needs,
             f"m = {p}(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",

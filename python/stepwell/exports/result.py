@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from .. import _checks
 from .._checks import Shape
@@ -54,6 +55,11 @@ class ExportedStep(Value):
         place = _checks.file("path", path, self.endings)
         place.write_text(self.source, encoding="utf-8", newline="\n")
         return place
+
+    def as_dict(self) -> dict[str, Any]:
+        """All of it as numbers and texts."""
+        held = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return held | {"system": repr(self.system), "method": self.method.name}
 
     def __str__(self) -> str:
         return self.source

@@ -168,7 +168,7 @@ class Written:
         return Function(
             [reads[i] for i in sorted(reads)],
             "time" in asked,
-            "time" in asked or language.me in text or any(f" {table.name}" in text for table in self.tables),
+            "time" in asked or language.me in text,
             [self._assignment(line) for line in before.lines],
             list(lines.values()),
             writes,
@@ -179,5 +179,3 @@ class Written:
         word = language.me + language.fields(line.name, f"made {line.name}") if language.before else language.names(line.name)
         note = line.note.replace("−", "-")
         return Assignment(word, language.kinds.get(word, "number"), language.text(line.formula), note)
-
-
