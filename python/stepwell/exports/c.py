@@ -98,7 +98,7 @@ class C(Language):
         """How to compile and call it."""
         p, blocks = self.prefix, "".join(f", {of}" for _, of, _ in w.blocks)
         lines = [
-            f"Compile with: cc -O2 -ffp-contract=off {p}.c -lm",
+            "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
             f"{p}_defaults(&m) sets the parameters; change any of them and call {p}_prepare(&m).",
             f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s) makes one step.",
         ]
@@ -113,6 +113,7 @@ class C(Language):
         p, blocks = self.prefix, [(name, each) for name, each in (("v", v), ("y", y)) if each]
         return [
             "#include <stdio.h>",
+            f'#include "{p}.c"',
             "",
             "int main(void) {",
             f"    {p} m;",

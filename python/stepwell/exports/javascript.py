@@ -100,7 +100,7 @@ class JavaScript(Language):
         p = camel(self.prefix)
         blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
         return [
-            f'import {{ {p} }} from "./{self.prefix}.js";',
+            f'import {{ {p} }} from "./{self.prefix}.mjs";',
             "",
             *(line for name, each in blocks for line in self.listed(f"const {name} = [", each, "];")),
             f"const m = new {p}();",

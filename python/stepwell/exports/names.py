@@ -146,13 +146,13 @@ def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tu
         match = found[members[0]]
         if match is None or match[1] != name:
             (i,) = members
-            out.append(Field(names(name), name, [numbers[i][1]]))
+            out.append(Field(names(name, f"parameter {name}"), name, [numbers[i][1]]))
             where[i] = out[-1].name, ()
             continue
         places = [tuple(map(int, found[i][2].split(","))) for i in members]  # type: ignore[index]
         shape = tuple(1 + max(axis) for axis in zip(*places, strict=True))
         values = dict.fromkeys(indices(shape), 0.0) | {place: numbers[i][1] for i, place in zip(members, places, strict=True)}
-        out.append(Field(names(name), name, list(values.values()), shape))
+        out.append(Field(names(name, f"parameter {name}"), name, list(values.values()), shape))
         where |= {i: (out[-1].name, place) for i, place in zip(members, places, strict=True)}
     return out, where
 

@@ -115,7 +115,7 @@ class Rust(Language):
         for each in w.tables:
             begin = f"static {each.name.upper()}_SAMPLES: [f64; {len(each.values)}] = ["
             tables.append("\n".join([f"/// The samples of {each.about}.", *self.listed(begin, each.values, "];")]))
-        allowed = "#[allow(clippy::all)]\n"
+        allowed = "#[allow(clippy::all, dead_code)]\n"
         default = f"impl Default for {p} {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}"
         parts = [*tables, self._structures(w), f"{allowed}impl {p} {{\n{inside}\n}}", default]
         functions = self.functions("\n".join(parts))
@@ -127,8 +127,8 @@ class Rust(Language):
         p = camel(self.prefix)
         lines = ["/// What a step is described by."]
         names = [each.name for each in w.parameters] + [each.name.removeprefix(self.me) for each in w.made]
-        if any(name != name.lower() for name in names):
-            lines.append("#[allow(non_snake_case)]")
+        capitals = any(name != name.lower() for name in names)
+        lines.append("#[allow(dead_code, non_snake_case)]" if capitals else "#[allow(dead_code)]")
         lines += ["#[derive(Clone, Debug)]", f"pub struct {p} {{"]
         for each in w.parameters:
             lines += [f"    /// {each.about}."] if each.about != each.name else []
@@ -136,7 +136,7 @@ class Rust(Language):
         if w.made:
             lines += ["", "    // Made of these by `prepare`."]
             lines += [f"    {each.name.removeprefix(self.me)}: {TYPES[each.kind]}," for each in w.made]
-        lines += ["}", "", "/// A state.", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
+        lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
         lines += [f"    pub {name}: [f64; {n}]," for name, _, n in w.blocks]
         lines += ["    /// What the control has added up.", "    pub tally: f64,"] * bool(w.evaluations)
         return "\n".join([*lines, "    /// k; the time is t0 + k*dt.", "    pub step: u64,", "}"])
