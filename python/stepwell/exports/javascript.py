@@ -136,7 +136,7 @@ class JavaScript(Language):
                 lines.append(f"this.{each.name} = {self.signed(each.values[0])};{about}")
         lines += [
             "for (const name of Object.keys(given)) {",
-            "  if (!(name in this)) throw new RangeError(`there is no parameter ${name}`);",
+            "  if (!Object.prototype.hasOwnProperty.call(this, name)) throw new RangeError(`there is no parameter ${name}`);",
             "}",
             "Object.assign(this, given);",
             "this.prepare();",

@@ -42,12 +42,14 @@ class Assignment(NamedTuple):
         kind: "number", "truth" or "bits".
         text: its formula.
         note: what it is in the method, where its name does not say so.
+        evaluation: of which evaluation of the rates it is known to be, counted from 1; 0 where that is not known.
     """
 
     name: str
     kind: str
     text: str
     note: str = ""
+    evaluation: int = 0
 
 
 class Place(NamedTuple):
@@ -290,7 +292,12 @@ class Language(Notation, ABC):
         for title, lines in groups:
             if lines:
                 out += ["", f"{self.comment} {title}"]
-                out += [self.declare(each, f" {self.comment} {each.note}" if each.note else "") for each in lines]
+            evaluation = 1
+            for each in lines:
+                if each.evaluation > evaluation:
+                    evaluation = each.evaluation
+                    out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
+                out.append(self.declare(each, f" {self.comment} {each.note}" if each.note else ""))
         out += ["", f"{self.comment} The state after."]
         out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]

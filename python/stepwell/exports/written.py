@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import prod
 from typing import NamedTuple
 
@@ -17,6 +18,10 @@ LOCALS = ("m", "s", "t", "self", "coordinates", "velocities")
 
 #: Names that fields may not have, because something else of the object has them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
+
+
+#: What is named after an evaluation of the rates: the state at which it is made, and the increments.
+EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
 
 class Table(NamedTuple):
@@ -120,14 +125,16 @@ class Written:
         language.names = Names(LOCALS)
         reads: dict[int, Place] = {}
         asked: set[str] = set()
-        n_v = self.n_v
-        slot = part.inputs[0].partition("[")[0] if n_v else ""
+
+        def place(names: list[str], i: int) -> Place:
+            """Where a number of the state is; what a control has added up comes last."""
+            block = names[i].partition("[")[0].rstrip("'")
+            at = -1 if block == TALLY else i if i < self.n_v else i - self.n_v
+            return Place(block, at, language.names(names[i]))
 
         def state(i: int) -> Leaf:
-            name = language.names(part.inputs[i])
-            block, index = (slot, i) if i < n_v else ("y", i - n_v) if i < n_v + self.n_y else (TALLY, -1)
-            reads[i] = Place(block, index, name)
-            return Leaf(Formula(name), tape.state(i), 4)
+            reads[i] = place(part.inputs, i)
+            return Leaf(Formula(reads[i].name), tape.state(i), 4)
 
         entries: list[Leaf] = []
 
@@ -157,20 +164,15 @@ class Written:
         leaves = made | {line: ("entry", i) for i, line in enumerate(of_time)}
         body = operations.body(part.roots, leaves, separate=True)
         after, _ = writer.section("member step", body, leaf, 4, "a", part.results)
-        lines = {language.names(line.name): self._assignment(line) for line in after.lines}
-        n_slot = len(part.results)
-        block = part.results[0].partition("'")[0] if n_v else "y"
-        writes = []
-        for i, name in enumerate(part.results):
-            place = (block, i) if i < n_v else ("y", i - n_v) if i < min(n_slot, n_v + self.n_y) else (TALLY, -1)
-            writes.append(Place(*place, language.names(name)))
-        text = " ".join(each.text for each in [*map(self._assignment, before.lines), *lines.values()])
+        of_time_lines, lines = ([self._assignment(line) for line in section.lines] for section in (before, after))
+        writes = [place(part.results, i) for i in range(len(part.results))]
+        text = " ".join(each.text for each in [*of_time_lines, *lines])
         return Function(
             [reads[i] for i in sorted(reads)],
             "time" in asked,
             "time" in asked or language.me in text,
-            [self._assignment(line) for line in before.lines],
-            list(lines.values()),
+            of_time_lines,
+            lines,
             writes,
         )
 
@@ -178,4 +180,6 @@ class Written:
         language = self.language
         word = language.me + language.fields(line.name, f"made {line.name}") if language.before else language.names(line.name)
         note = line.note.replace("−", "-")
-        return Assignment(word, language.kinds.get(word, "number"), language.text(line.formula), note)
+        found = EVALUATION.match(line.note or line.name)
+        evaluation = int(found[1]) if found else 0
+        return Assignment(word, language.kinds.get(word, "number"), language.text(line.formula), note, evaluation)
