@@ -16,6 +16,7 @@ import stepwell as sw
 from abroad import C_FLAGS, RUST_FLAGS, Journey, executed, missing, run, same
 from cases import SYSTEMS, number
 from stepwell import _core
+from stepwell.exports.functions import FUNCTIONS, argument
 from stepwell.exports.head import EXAMPLE, STEPS
 from stepwell.exports.names import camel, plain, prefix, snake
 from stepwell.reference import bits, log, trig
@@ -237,6 +238,42 @@ def masks() -> list[Journey]:
     return made
 
 
+def test_functions_are_called_by_name() -> None:
+    for language in LANGUAGES:
+        source = sw.export(Knot(1.1), "standard_euler", language, name="knot").source
+        for function in FUNCTIONS:
+            assert len(re.findall(rf"\b(?:knot_)?{function}\(", source)) == 2, (language, function)  # where it is and where it is called
+    plain = sw.export(sw.Oscillator(), "rk4", "c").source
+    assert "turn_sign" not in plain
+    assert not any(function in plain for function in FUNCTIONS)
+    assert "sine" not in sw.export(sw.Pendulum(), "rk4", "c", fused=True).source  # its products went into other sums
+
+
+def test_what_only_looks_like_a_function_is_none() -> None:
+    tape = _core.Tape()
+    x = 0.5 * tape.state(0)
+    y = x * trig.PER_HALF_TURN + trig.MAGIC
+    n = y - trig.MAGIC
+    rough = trig._half_turn(x - n * trig.PI[0], y)  # a sine whose argument is reduced by the first part of π alone
+    other = trig._half_turn((x - n * trig.PI[0]) - n * trig.PI[1], x * trig.PER_HALF_TURN)  # one whose sign is turned by another
+    for made, function in (
+        (trig.sin(x), "sine"),
+        (trig.cos(x), "cosine"),
+        (log.log(x), "logarithm"),
+        (rough, None),
+        (other, None),
+    ):
+        told, (root,) = tape.operations([made])
+        operations = [(name, tuple(of), given) for name, of, given in told]
+        for each in FUNCTIONS:
+            of = argument(each, operations, root)
+            if each == function:
+                assert of is not None
+                assert operations[of][0] == "multiply"
+            else:
+                assert of is None
+
+
 @languages
 def test_bits_of_numbers(language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     every = []
@@ -366,6 +403,9 @@ def mutants(source: str, begin: str, end: str) -> list[str]:
     stop = source.index(end, start)
     made = []
     for found in SIGN.finditer(source, start, stop):
+        line = source[source.rindex("\n", 0, found.start()) : found.start()]
+        if "//" in line or "#" in line:
+            continue  # in a comment
         other = {"+": "-", "-": "+", "*": "+", "/": "*"}[found[1]]
         made.append(source[: found.start(1)] + other + source[found.end(1) :])
     return made
@@ -386,7 +426,7 @@ def test_each_operation_counts(tmp_path: Path) -> None:
         BODIES,
     ):
         source = each.export("python", "step_0").source
-        made = mutants(source, "def step(self, s)", "# The state after")
+        made = mutants(source, "def sine(x)" if "def sine(x)" in source else "def step(self, s)", "# The state after the step")
         assert len(made) > 15
         assert_same([each], run("python", [each], tmp_path))
         unnoticed = []
@@ -401,8 +441,8 @@ def test_each_operation_counts(tmp_path: Path) -> None:
 def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path: Path) -> None:
     each = Journey(sw.Pendulum(1.3), "merson", 4.0, 5.5, steps=90)
     source = each.export(language, "step_0").source
-    begin = {"c": "void step_0_step", "javascript": "step(s) {", "python": "def step(self", "rust": "pub fn step("}[language]
-    made = mutants(source, begin, "The state after")[:: 60 if language in ("c", "rust") else 20]
+    begin = {"c": "double step_0_sine(", "javascript": "function sine(", "python": "def sine(", "rust": "fn sine("}[language]
+    made = mutants(source, begin, "The state after the step")[:: 20 if language in ("c", "rust") else 7]
     assert len(made) > 3
     for mutant in made:
         (found,) = run(language, [each], tmp_path, [mutant])

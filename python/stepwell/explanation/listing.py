@@ -18,7 +18,7 @@ import numpy as np
 from .. import _core
 from .._checks import Shape
 from ..engine import Plan
-from ..reference import adaptive
+from ..reference import adaptive, log, trig
 from ..reference.signal import Constant, Held, Sine
 from ..reference.traced import Tracer
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
@@ -199,6 +199,8 @@ def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[in
             return of[0].shift_down(given)
         case "sample":
             return tape.sample(given, of[0])
+        case "sine" | "cosine" | "logarithm":
+            return {"sine": trig.sin, "cosine": trig.cos, "logarithm": log.log}[name](of[0])
         case "copy":
             return of[0]
         case _:

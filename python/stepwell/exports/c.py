@@ -94,6 +94,10 @@ class C(Language):
         of = self.tables[table]
         return f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
 
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"// The {name} of x.", f"static double PREFIX_{name}(double x) {{", *indented(lines), "}"])
+
     def how(self, w: Written) -> list[str]:
         """How to compile and call it."""
         p, blocks = self.prefix, "".join(f", {of}" for _, of, _ in w.blocks)
@@ -191,7 +195,12 @@ class C(Language):
         lines = ["s->step = 0;"] + ["s->tally = 0.0;"] * bool(w.evaluations)
         lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
         if start:
-            lines += ["", *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"})]
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
         if not (start and start.needs_fields):
             lines.insert(0, "(void)m;")
         about = "// The state at step 0, of velocities and coordinates."
@@ -206,7 +215,7 @@ class C(Language):
     def _finish(self, w: Written) -> str:
         p, f = self.prefix, w.functions["finish"]
         lines = ["(void)m;"] * (not f.needs_fields)
-        lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"})
+        lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
         begin = f"void {p}_finish(const {p} *m, const {p}_state *s, double velocities[{w.n_v}]) {{"
         return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
 

@@ -81,6 +81,10 @@ class JavaScript(Language):
         of = self.tables[table]
         return f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
 
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"// The {name} of x.", f"function {name}(x) {{", *indented(lines, "  "), "}"])
+
     def how(self, w: Written) -> list[str]:
         """How to call it."""
         p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
@@ -160,7 +164,12 @@ class JavaScript(Language):
             carried = start and name == w.slot
             lines.append(f"s.{name} = new Float64Array({n});" if carried else f"s.{name} = Float64Array.from({of});")
         if start:
-            lines += ["", *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"})]
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
         lines += ["return s;"]
         about = "// The state at step 0, of velocities and coordinates."
         return [about, f"start({', '.join(of for _, of, _ in w.blocks)}) {{", *indented(lines, "  "), "}"]
@@ -172,7 +181,9 @@ class JavaScript(Language):
 
     def _finish(self, w: Written) -> list[str]:
         lines = [f"const velocities = new Float64Array({w.n_v});"]
-        lines += self.body(w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"})
+        lines += self.body(
+            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
+        )
         return ["// The velocities at a state.", "finish(s) {", *indented([*lines, "return velocities;"], "  "), "}"]
 
     def _work(self, w: Written) -> list[str]:

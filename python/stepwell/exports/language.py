@@ -12,9 +12,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
+from .. import _core
 from .._checks import Shape
 from ..explanation import formula as plain
 from ..explanation.formula import ALL_BITS, ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
+from ..explanation.listing import Leaf, Writer
+from .functions import FUNCTIONS, operations_of
 from .names import Names
 
 if TYPE_CHECKING:
@@ -190,6 +193,8 @@ class Language(Notation, ABC):
             case "multiply add" | "multiply subtract" | "subtract multiply":
                 made = plain.formula(name, numbers, given, bits)
                 return Formula(f"{self.fma}{made.text.removeprefix('fma')}")
+            case _ if name in FUNCTIONS:
+                return Formula(self.call(name, numbers[0].text))
             case _ if name in ARITHMETIC:
                 return plain.formula(name, numbers, given, bits)
             case _:
@@ -253,11 +258,28 @@ class Language(Notation, ABC):
     def functions(self, text: str) -> list[str]:
         """The functions that this text of a file needs, in their order; each may need those before it."""
         needed: list[str] = []
-        for name, function in reversed(self.helpers.items()):
+        for name in reversed([*self.helpers, *FUNCTIONS]):
             if re.search(rf"\b{self.helper(name)}\b", text):
+                function = self.helpers[name] if name in self.helpers else self._of_one_number(name)
                 needed.insert(0, function.replace("PREFIX", self.prefix))
                 text += needed[0]
         return needed
+
+    def _of_one_number(self, name: str) -> str:
+        """A function of one number, from its operations."""
+        operations, (root,) = operations_of(name)
+        self.names = Names(("x",))
+        body = [*operations, ("copy", [root], 0)], [len(operations)]
+        section, _ = Writer(_core.Tape(), {}, self).section(
+            "member step", body, lambda *_: Leaf(Formula("x"), None, 4), 4, "a", ["result"]
+        )
+        *lines, result = [(self.names(line.name), self.text(line.formula)) for line in section.lines]
+        inside = [self.declare(Assignment(word, self.kinds.get(word, "number"), text), "") for word, text in lines]
+        return self.function(name, [*inside, f"return {result[1]}{self.end}"])
+
+    @abstractmethod
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
 
     def remark(self, lines: Iterable[str]) -> list[str]:
         """Lines as a comment."""
@@ -277,14 +299,16 @@ class Language(Notation, ABC):
             lines += self.nested("", values[i * size : (i + 1) * size], shape[1:], ",", indent + "    ")
         return [*lines, f"{indent}]{end}"]
 
-    def body(self, f: Function, read: Mapping[str, str], write: Mapping[str, str]) -> list[str]:
-        """What is in a function, not indented; ``read`` and ``write`` say where each block of the state is."""
+    def body(
+        self, f: Function, read: Mapping[str, str], write: Mapping[str, str], after: str = "The state after the step."
+    ) -> list[str]:
+        """What is in a function, not indented: where each block is read and written, and what is said of what is written."""
 
         def place(block: str, index: int, of: Mapping[str, str]) -> str:
             return of[block] if index < 0 else f"{of[block]}[{index}]"
 
         groups = [
-            ("The state before.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
+            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
             ("What depends on the time alone.", f.of_time),
             ("What depends on the state.", f.lines),
         ]
@@ -298,7 +322,7 @@ class Language(Notation, ABC):
                     evaluation = each.evaluation
                     out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
                 out.append(self.declare(each, f" {self.comment} {each.note}" if each.note else ""))
-        out += ["", f"{self.comment} The state after."]
+        out += ["", f"{self.comment} {after}"]
         out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]
 

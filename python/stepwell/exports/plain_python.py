@@ -110,6 +110,10 @@ class Python(Language):
         of = self.tables[table]
         return f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
 
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"def {name}(x):", f'    """The {name} of x."""', *indented(lines)])
+
     def how(self, w: Written) -> list[str]:
         """How to call it."""
         p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
@@ -203,7 +207,12 @@ class Python(Language):
         given = [f"[0.0] * {n}" if start and name == w.slot else of for name, of, n in w.blocks]
         lines.append(f"s = {camel(self.prefix)}State({', '.join(given)})")
         if start:
-            lines += ["", *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"})]
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
         return [f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])]
 
     def _step(self, w: Written) -> list[str]:
@@ -212,7 +221,9 @@ class Python(Language):
 
     def _finish(self, w: Written) -> list[str]:
         lines = ['"""The velocities at a state."""', f"velocities = [0.0] * {w.n_v}"]
-        lines += self.body(w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"})
+        lines += self.body(
+            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
+        )
         return ["def finish(self, s):", *indented([*lines, "return velocities"])]
 
     def _work(self, w: Written) -> list[str]:

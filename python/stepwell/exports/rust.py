@@ -69,6 +69,11 @@ class Rust(Language):
         of = self.tables[table]
         return f"sample(&{of.name.upper()}_SAMPLES, self.{of.start}, self.{of.interval}, {t})"
 
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        begin = [f"/// The {name} of `x`.", "#[allow(clippy::all)]", f"fn {name}(x: f64) -> f64 {{"]
+        return "\n".join([*begin, *indented(lines), "}"])
+
     def how(self, w: Written) -> list[str]:
         """How to call it."""
         p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
@@ -166,7 +171,11 @@ class Rust(Language):
         state = f"{p}State {{ {', '.join(given)} }}"
         if start:
             write = {w.slot: f"s.{w.slot}"}
-            lines = [f"let mut s = {state};", *self.body(start, {"v": "velocities", "y": "coordinates"}, write), "s"]
+            lines = [
+                f"let mut s = {state};",
+                *self.body(start, {"v": "velocities", "y": "coordinates"}, write, "What stands in the place of v."),
+                "s",
+            ]
         else:
             lines = [state]
         about = "/// The state at step 0, of velocities and coordinates."
@@ -179,7 +188,9 @@ class Rust(Language):
 
     def _finish(self, w: Written) -> list[str]:
         lines = [f"let mut velocities = [0.0; {w.n_v}];"]
-        lines += self.body(w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"})
+        lines += self.body(
+            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
+        )
         begin = f"pub fn finish(&self, s: &{camel(self.prefix)}State) -> [f64; {w.n_v}] {{"
         return ["/// The velocities at a state.", begin, *indented([*lines, "velocities"]), "}"]
 

@@ -14,6 +14,7 @@ from ..errors import UnsupportedError
 from ..explanation.listing import Body, Named, indexed, parameters
 from ..reference.signal import Held
 from ..systems.base import aligned
+from .functions import named
 
 #: The most operations that are written out one by one; a longer text is of no use to compilers, nor to people.
 MAX_OPERATIONS = 20_000
@@ -146,6 +147,8 @@ class Traced:
         self.count = sum(bool(of) for _, of, _ in self.operations.all)
         if self.count > MAX_OPERATIONS:
             raise too_long(plan, str(self.count))
+        if not plan.fused:  # else their products went into the sums around them
+            named(self.operations.all)
         names, tables = parameters(plan)
 
         def own(values: Any, before: int = 0) -> Any:
