@@ -242,7 +242,10 @@ def test_functions_are_called_by_name() -> None:
     for language in LANGUAGES:
         source = sw.export(Knot(1.1), "standard_euler", language, name="knot").source
         for function in FUNCTIONS:
-            assert len(re.findall(rf"\b(?:knot_)?{function}\(", source)) == 2, (language, function)  # where it is and where it is called
+            assert len(re.findall(rf"\b(?:knot_)?{function}\(", source)) == 2, (
+                language,
+                function,
+            )  # where it is and where it is called
     plain = sw.export(sw.Oscillator(), "rk4", "c").source
     assert "turn_sign" not in plain
     assert not any(function in plain for function in FUNCTIONS)

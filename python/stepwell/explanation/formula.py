@@ -6,8 +6,8 @@ A formula is read as in Python: · − √ ≤ are its multiplication, subtracti
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
 #: How strongly a formula holds together, by what it does last.
 CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
@@ -115,9 +115,11 @@ class Notation:
 
     Attributes:
         longest: characters of a line, its name not counted, beyond which it becomes several.
+        called: functions of one number that may stand in the place of their operations, by name.
     """
 
     longest = 72
+    called: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
     def number(self, bits: int) -> Formula:
         """A constant."""

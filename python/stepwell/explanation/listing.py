@@ -18,7 +18,7 @@ import numpy as np
 from .. import _core
 from .._checks import Shape
 from ..engine import Plan
-from ..reference import adaptive, log, trig
+from ..reference import adaptive
 from ..reference.signal import Constant, Held, Sine
 from ..reference.traced import Tracer
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
@@ -199,8 +199,6 @@ def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[in
             return of[0].shift_down(given)
         case "sample":
             return tape.sample(given, of[0])
-        case "sine" | "cosine" | "logarithm":
-            return {"sine": trig.sin, "cosine": trig.cos, "logarithm": log.log}[name](of[0])
         case "copy":
             return of[0]
         case _:
@@ -300,7 +298,11 @@ class Writer:
 
         def made(name: str, of: list[int], given: int) -> _Value:
             parts = [values[place] for place in of]
-            symbol = again(self.tape, name, [each.symbol for each in parts], given, [each.bits for each in parts])
+            symbols = [each.symbol for each in parts]
+            if name in self.notation.called:
+                symbol = None if symbols[0] is None else self.notation.called[name](symbols[0])
+            else:
+                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts])
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last

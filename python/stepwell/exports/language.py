@@ -113,6 +113,7 @@ class Language(Notation, ABC):
     time: ClassVar[str]
     tables: list[Table]
     longest = 88
+    called = FUNCTIONS
 
     def __init__(self, prefix: str, fields: Names) -> None:
         self.prefix, self.fields = prefix, fields
