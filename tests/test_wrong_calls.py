@@ -266,6 +266,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False},
     ),
     "explain bodies": (sw.explain, {"system": sw.NBody(), "method": "rk4", "members": 2, "control": sw.EnergyControl(0.1)}),
+    "export": (
+        sw.export,
+        {"system": sw.Oscillator([1.0, 2.0]), "method": "rk4", "language": "c", "dt": 0.1, "t0": 0.0, "v": 0.0, "y": 1.0}
+        | {"member": 1, "start": None, "control": None, "fused": False, "name": "step"},
+    ),
+    "export Verlet": (sw.export, {"system": sw.Oscillator(), "method": "verlet", "language": "rust", "start": "first_order"}),
+    "export bodies": (
+        sw.export,
+        {"system": sw.NBody(), "method": "rk4", "language": "python", "v": 0.0, "y": BODIES["y"], "control": sw.Projection()},
+    ),
     "stability.operations": (stability.operations, {"method": "rk4", "system": sw.Oscillator()}),
     "stability.series": (stability.series, {"method": "rk4"}),
     "advise": (

@@ -20,11 +20,12 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, explanation, scenes, stability
+    from . import advice, charts, derivatives, dynamics, explanation, exports, scenes, stability
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
     from .explanation import Explanation, explain
+    from .exports import ExportedStep, export
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
 
@@ -38,6 +39,7 @@ __all__ = [
     "DivergenceWarning",
     "EnergyControl",
     "Explanation",
+    "ExportedStep",
     "LinearSystem",
     "Method",
     "NBody",
@@ -65,6 +67,8 @@ __all__ = [
     "errors",
     "explain",
     "explanation",
+    "export",
+    "exports",
     "integrate",
     "isa",
     "isa_levels",
@@ -107,6 +111,9 @@ _LATER = {
     "lyapunov": "dynamics.lyapunov",
     "explain": "explanation.explain",
     "explanation": "explanation",
+    "ExportedStep": "exports.ExportedStep",
+    "export": "exports.export",
+    "exports": "exports",
     "scenes": "scenes",
     "system": "equations.system",
     "stability": "stability",
