@@ -27,6 +27,7 @@ __all__ = [
     "program",
     "run",
     "systems",
+    "times",
 ]
 __version__: str
 
@@ -160,6 +161,9 @@ def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> None:
 
 def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
     """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""
+
+def times(plan: Plan, t: NDArray[np.float64]) -> None:
+    """Fill the times of the saved states. Of the plan it reads what ``run`` does."""
 
 def check(model: ModelSpec) -> None:
     """Raise if it cannot be stepped so."""

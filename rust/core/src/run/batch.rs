@@ -265,6 +265,19 @@ struct Job<'a, 'b> {
 /// Copies the rows of a group into those from the `at`-th on, as far as there are any.
 #[inline]
 fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f64], lanes: usize) {
+    let all = (slot.len() / lanes).min(rows.rows().saturating_sub(at));
+    if all == 0 {
+        return;
+    }
+    if let Some(whole) = rows.whole(at, all) {
+        if whole.len() == slot.len() {
+            whole.copy_from_slice(slot);
+        } else {
+            let rows = whole.chunks_exact_mut(whole.len() / all);
+            rows.zip(slot.chunks_exact(lanes)).for_each(|(row, slot)| row[from..from + count].copy_from_slice(&slot[..count]));
+        }
+        return;
+    }
     for (i, slot) in (at..rows.rows()).zip(slot.chunks_exact(lanes)) {
         match (rows.row(i), slot) {
             // A call that copies one number takes longer than the number.
@@ -390,12 +403,8 @@ impl Job<'_, '_> {
             self.group.tally_mut().copy_from_slice(old_tally);
             return false;
         }
-        for (rows, numbers, size) in [(&mut self.part.saved_v, v, p), (&mut self.part.saved_y, y, q)] {
-            match rows.whole(i * size, steps * size) {
-                Some(whole) if whole.len() == numbers.len() => whole.copy_from_slice(numbers),
-                _ => put(rows, i * size, from, count, numbers, lanes),
-            }
-        }
+        put(&mut self.part.saved_v, i * p, from, count, v, lanes);
+        put(&mut self.part.saved_y, i * q, from, count, y, lanes);
         true
     }
 
