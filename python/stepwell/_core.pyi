@@ -156,8 +156,11 @@ def catalogue() -> list[dict[str, Any]]: ...
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
-def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> None:
-    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``."""
+def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
+    """Whether some member has diverged, now or before.
+
+    Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
+    """
 
 def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
     """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""

@@ -102,7 +102,10 @@ class Arrays(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did."""
+    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did.
+
+    ``diverged`` is False if it is known that no member has such a step.
+    """
 
     v: Array
     y: Array
@@ -110,6 +113,7 @@ class Outcome(NamedTuple):
     first_bad: Whole
     recorded: dict[str, Array] | None = None
     work: Array | None = None
+    diverged: bool = True
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
@@ -288,6 +292,8 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     given = plan.system.parameters(plan.batch)
+    if not plan.record and not plan.fused:
+        return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
 
 
@@ -299,18 +305,23 @@ def _rust(
     empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
     saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
     carry = np.empty(v.shape) if carries else None
-    shapes = {name: plan.system.quantities[name] for name in plan.record}
-    recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch)) if shapes else None
+    recorded = None
+    if plan.record:
+        shapes = {name: plan.system.quantities[name] for name in plan.record}
+        recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
     work = None if plan.system.control is None else np.empty(plan.batch)
     tally = None if work is None else work.reshape(-1)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
-    _core.run(model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1)))
+    diverged = _core.run(
+        model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
+    )
     by_name: dict[str, Array] = {}
     if recorded is not None:
         for name, shape in shapes.items():
             mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
             by_name[name] = mine.reshape(kept, *shape, *plan.batch)
-    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, _per_step(plan, work))
+    work = None if work is None else _per_step(plan, work)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged)
 
 
 # ---- the transition-matrix form

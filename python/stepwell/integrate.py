@@ -184,7 +184,7 @@ def integrate(
             f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
             f"after {steps} steps of {dt:g}"
         )
-    system.check_time(max(abs(begin), abs(end)))
+    system.check_time(max(-begin, end))
     every = None if every is None else _checks.count("every", every, 1)
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
@@ -202,7 +202,7 @@ def integrate(
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     batch = _checks.batch_shape(batches if control is None else batches | {"control": control.batch})
     rows = prod(system.v_shape) + prod(system.y_shape)
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused)
+    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused)
     # What the core does not record is computed from the saved states, with some of them in between.
     recorded = 0
     for name in record:
@@ -228,13 +228,14 @@ def integrate(
     else:
         out = engine.advance(plan, v, y, before, carried=carry is not None)
     collides = isinstance(system, NBody)
-    if collides and (out.first_bad > start_step).any():
+    if collides and out.diverged and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
         t=_times(plan),
         v=out.v,
         y=out.y,
-        status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
+        # Status.OK is 0 and Status.DIVERGED 1
+        status=np.asarray(out.first_bad >= 0).view(np.int8) if out.diverged else np.zeros(batch, np.int8),
         first_bad_step=out.first_bad,
         carry=None if how.carry is None else out.slot,
         system=system,
@@ -251,7 +252,8 @@ def integrate(
     )
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
-    _warn(run, before)
+    if out.diverged:
+        _warn(run, before)
     _warn_of_nonsense(run)
     return run
 

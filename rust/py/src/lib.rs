@@ -98,9 +98,10 @@ struct ArraysOf<'py> {
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept. Whether somebody diverged, now or
+/// before.
 #[pyfunction]
-fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<()> {
+fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
     let plan_of_core = Plan {
@@ -123,7 +124,8 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
         carry: filled(&mut arrays.carry)?,
         first_bad: arrays.first_bad.as_slice_mut()?,
     };
-    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))
+    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))?;
+    Ok(!arrays.first_bad.as_slice()?.iter().all(|step| *step < 0))
 }
 
 /// The numbers of an array; none if there is no array.
