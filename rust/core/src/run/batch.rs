@@ -60,12 +60,9 @@ pub struct Arrays<'a> {
     pub first_bad: &'a mut [i64],
 }
 
-/// Steps, counted from the first, at which a run keeps its state.
-pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
-    let step = every.unwrap_or(steps).max(1);
-    let from = if every.is_some() { 0 } else { steps };
-    let last = (every.is_some() && steps % step != 0).then_some(steps);
-    (from..=steps).step_by(step as usize).chain(last)
+/// The step, counted from the first, after which a run keeps its `i`-th state.
+pub fn save(steps: i64, every: Option<i64>, i: usize) -> i64 {
+    every.map_or(steps, |every| every.max(1).saturating_mul(i as i64).min(steps))
 }
 
 /// How many states a run keeps.
@@ -311,9 +308,9 @@ impl Job<'_, '_> {
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
         let trail = if keeps_all { self.group.trail(&plan.model.spec, self.part.first + self.from, self.count) } else { 0 };
-        let mut saves = saves(plan.steps, plan.every).enumerate();
-        while let Some((i, save)) = saves.next() {
-            let until = plan.first + save;
+        let mut i = 0;
+        while i < kept(plan.steps, plan.every) {
+            let until = plan.first + save(plan.steps, plan.every, i);
             while k < until {
                 let n = (until - k).min(self.looked + looks.piece - k);
                 self.group.advance(k, n);
@@ -326,10 +323,10 @@ impl Job<'_, '_> {
             let steps = trail as i64;
             if trail == 0 || steps > room || k % steps != 0 || !self.save_trail(i, k, trail) {
                 self.save(i, k);
+                i += 1;
                 continue;
             }
-            k += steps;
-            saves.nth(trail - 2); // a trail has several steps
+            (i, k) = (i + trail, k + steps);
             if !self.look_if_due(k, &mut looks, go_on) {
                 return false;
             }
