@@ -6,6 +6,7 @@ import gc
 import time
 import weakref
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -151,6 +152,18 @@ def test_memory_that_somebody_uses_is_not_lent() -> None:
         many(dt=0.3)
     for view, copy in kept:
         np.testing.assert_array_equal(np.asarray(view), copy)
+
+
+def test_threads_are_lent_memory_of_their_own() -> None:
+    """Four threads take and give back memory at once; each finds its own states in what it was lent."""
+    expected = {dt: many(dt=dt).y.copy() for dt in (0.01, 0.02, 0.03, 0.04)}
+
+    def right(dt: float) -> bool:
+        runs = [many(dt=dt) for _ in range(3)]
+        return all(np.array_equal(run.y, expected[dt]) for run in runs)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(right, [*expected] * 8))
 
 
 def test_no_more_memory_is_kept_than_promised() -> None:
