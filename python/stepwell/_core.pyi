@@ -28,6 +28,7 @@ __all__ = [
     "program",
     "run",
     "systems",
+    "times",
 ]
 __version__: str
 
@@ -178,11 +179,17 @@ def catalogue() -> list[dict[str, Any]]: ...
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
-def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> None:
-    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``."""
+def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
+    """Whether some member has diverged, now or before.
+
+    Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
+    """
 
 def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
     """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""
+
+def times(plan: Plan, t: NDArray[np.float64]) -> None:
+    """Fill the times of the saved states. Of the plan it reads what ``run`` does."""
 
 def check(model: ModelSpec) -> None:
     """Raise if it cannot be stepped so."""

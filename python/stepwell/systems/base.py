@@ -94,7 +94,8 @@ class System(Value, ABC):
 
     def parameters(self, batch: Shape) -> Given:
         """This system and what controls it, as the core takes them."""
-        return flat(self.given(batch) | ({} if self.control is None else self.control.given()), batch)
+        given = self.given(batch)
+        return flat(given if self.control is None else given | self.control.given(), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """What a number among those that describe the system is called: the name of an argument, and where in it."""
@@ -218,9 +219,12 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
     """A description as the core takes it: what is not there is left out, a list is its length and its parts."""
     entries: Given = []
     for name, value in given.items():
+        if value is None:
+            continue
+        if type(value) is np.ndarray:  # as most are: each case below takes its time
+            entries.append((name, rows(value, batch)))
+            continue
         match value:
-            case None:
-                pass
             case str() | int():
                 entries.append((name, value))
             case list():

@@ -60,12 +60,9 @@ pub struct Arrays<'a> {
     pub first_bad: &'a mut [i64],
 }
 
-/// Steps, counted from the first, at which a run keeps its state.
-pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
-    let step = every.unwrap_or(steps).max(1);
-    let from = if every.is_some() { 0 } else { steps };
-    let last = (every.is_some() && steps % step != 0).then_some(steps);
-    (from..=steps).step_by(step as usize).chain(last)
+/// The step, counted from the first, after which a run keeps its `i`-th state.
+pub fn save(steps: i64, every: Option<i64>, i: usize) -> i64 {
+    every.map_or(steps, |every| every.max(1).saturating_mul(i as i64).min(steps))
 }
 
 /// How many states a run keeps.
@@ -179,6 +176,8 @@ struct Good {
     tally: Vec<f64>,
     carried: Vec<f64>,
     recorded: Vec<f64>,
+    /// The state before a trail.
+    before: Vec<f64>,
 }
 
 /// One thread's groups, and where it stands.
@@ -239,6 +238,13 @@ impl<'a> Worker<'a> {
     }
 }
 
+/// How many steps are made between two looks, now and at most, and when the last one was.
+struct Looks {
+    piece: i64,
+    longest: i64,
+    began: Instant,
+}
+
 /// One group's run.
 struct Job<'a, 'b> {
     plan: &'a Plan<'a>,
@@ -256,6 +262,19 @@ struct Job<'a, 'b> {
 /// Copies the rows of a group into those from the `at`-th on, as far as there are any.
 #[inline]
 fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f64], lanes: usize) {
+    let all = (slot.len() / lanes).min(rows.rows().saturating_sub(at));
+    if all == 0 {
+        return;
+    }
+    if let Some(whole) = rows.whole(at, all) {
+        if whole.len() == slot.len() {
+            whole.copy_from_slice(slot);
+        } else {
+            let rows = whole.chunks_exact_mut(whole.len() / all);
+            rows.zip(slot.chunks_exact(lanes)).for_each(|(row, slot)| row[from..from + count].copy_from_slice(&slot[..count]));
+        }
+        return;
+    }
     for (i, slot) in (at..rows.rows()).zip(slot.chunks_exact(lanes)) {
         match (rows.row(i), slot) {
             // A call that copies one number takes longer than the number.
@@ -284,37 +303,33 @@ impl Job<'_, '_> {
 
         let mut k = plan.first;
         let longest = (PATIENCE / numbers).clamp(1, LOOK);
-        let mut piece = if numbers > LARGE { 1 } else { (FIRST / numbers).clamp(1, LOOK) };
-        let mut began = Instant::now();
+        let first = if numbers > LARGE { 1 } else { (FIRST / numbers).clamp(1, LOOK) };
+        let mut looks = Looks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
-        let keeps_all = plan.every == Some(1) && !self.carries && self.group.recorded() == 0;
-        let trail = if keeps_all { self.group.trail() as i64 } else { 0 };
-        let mut saves = saves(plan.steps, plan.every).enumerate();
-        while let Some((i, save)) = saves.next() {
-            let until = plan.first + save;
-            let room = (self.looked + piece).min(plan.first + plan.steps) - k;
-            if i > 0 && trail > 0 && trail <= room && k % trail == 0 {
-                self.save_trail(i, k);
-                k += trail;
-                saves.nth(trail as usize - 2); // a trail has several steps
-                continue;
-            }
+        let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
+        let trail = if keeps_all { self.group.trail(&plan.model.spec, self.part.first + self.from, self.count) } else { 0 };
+        let mut i = 0;
+        while i < kept(plan.steps, plan.every) {
+            let until = plan.first + save(plan.steps, plan.every, i);
             while k < until {
-                let n = (until - k).min(self.looked + piece - k);
+                let n = (until - k).min(self.looked + looks.piece - k);
                 self.group.advance(k, n);
                 k += n;
-                if k - self.looked >= piece {
-                    let done = k - self.looked;
-                    self.look(k);
-                    let now = Instant::now();
-                    piece = if now - began > POLL { (piece / 2).max(1) } else { longest.min(4 * piece) };
-                    began = now;
-                    if !go_on((done * self.count as i64) as u64) {
-                        return false;
-                    }
+                if !self.look_if_due(k, &mut looks, go_on) {
+                    return false;
                 }
             }
-            self.save(i, k);
+            let room = (self.looked + looks.piece).min(plan.first + plan.steps) - k;
+            let steps = trail as i64;
+            if trail == 0 || steps > room || k % steps != 0 || !self.save_trail(i, k, trail) {
+                self.save(i, k);
+                i += 1;
+                continue;
+            }
+            (i, k) = (i + trail, k + steps);
+            if !self.look_if_due(k, &mut looks, go_on) {
+                return false;
+            }
         }
         let left = k - self.looked;
         if left > 0 && self.is_suspect() {
@@ -326,6 +341,19 @@ impl Job<'_, '_> {
         put(&mut self.part.carry, 0, self.from, self.count, self.group.slots().0, lanes);
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         true
+    }
+
+    /// Looks at step `k` at who diverged, if it is time; whether to go on.
+    fn look_if_due(&mut self, k: i64, looks: &mut Looks, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
+        let done = k - self.looked;
+        if done < looks.piece {
+            return true;
+        }
+        self.look(k);
+        let now = Instant::now();
+        looks.piece = if now - looks.began > POLL { (looks.piece / 2).max(1) } else { looks.longest.min(4 * looks.piece) };
+        looks.began = now;
+        go_on((done * self.count as i64) as u64)
     }
 
     fn save(&mut self, i: usize, k: i64) {
@@ -349,29 +377,32 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Makes the steps of a trail from step `k`, and keeps the states after them, the first of which is the `i`-th.
-    fn save_trail(&mut self, i: usize, k: i64) {
+    /// Keeps the state at step `k`, which is the `i`-th to be kept, and those that follow, and makes the steps. Where a velocity that is made
+    /// of what is carried is not finite, nothing is done, and the answer is no: who and when is found step by step.
+    fn save_trail(&mut self, i: usize, k: i64, steps: usize) -> bool {
         let lanes = self.group.lanes();
         let (p, q) = (self.plan.v.len(), self.plan.y.len());
-        let steps = self.group.trail();
         let (from, count) = (self.from, self.count);
-        let states = self.group.advance_on_trail(k);
-        let numbers = states.len() / steps;
-        let whole = (self.part.saved_v.whole(i * p, steps * p), self.part.saved_y.whole(i * q, steps * q));
-        if let (1, 1, (Some(v), Some(y))) = (lanes, self.part.count, whole) {
-            for (rows, first, size) in [(v, 0, p), (y, p, q)] {
-                // Number after number: a call that copies one or two takes longer than they do.
-                for i in 0..size {
-                    let of_states = states[first + i..].iter().step_by(numbers);
-                    rows[i..].iter_mut().step_by(size).zip(of_states).for_each(|(to, from)| *to = *from);
-                }
-            }
-            return;
+        if self.carries {
+            let ((v, y), tally) = (self.group.slots(), self.group.tally());
+            self.good.before.clear();
+            [v, y, tally].iter().for_each(|slot| self.good.before.extend_from_slice(slot));
         }
-        for (s, state) in states.chunks_exact(numbers).enumerate() {
-            put(&mut self.part.saved_v, (i + s) * p, from, count, &state[..p * lanes], lanes);
-            put(&mut self.part.saved_y, (i + s) * q, from, count, &state[p * lanes..(p + q) * lanes], lanes);
+        let (v, y) = self.group.advance_on_trail(k).split_at(steps * p * lanes);
+        let first_bad = &self.part.first_bad[from..from + count];
+        let is_new = |row: &[f64]| row.iter().zip(first_bad).any(|(x, first_bad)| *first_bad < 0 && !x.is_finite());
+        if self.carries && !all_below(v, f64::INFINITY) && v.chunks_exact(lanes).any(is_new) {
+            let (v, y) = self.group.slots_mut();
+            let (old_v, others) = self.good.before.split_at(v.len());
+            let (old_y, old_tally) = others.split_at(y.len());
+            v.copy_from_slice(old_v);
+            y.copy_from_slice(old_y);
+            self.group.tally_mut().copy_from_slice(old_tally);
+            return false;
         }
+        put(&mut self.part.saved_v, i * p, from, count, v, lanes);
+        put(&mut self.part.saved_y, i * q, from, count, y, lanes);
+        true
     }
 
     /// From now on the v slot holds velocities, until `unfinish`.
@@ -400,9 +431,8 @@ impl Job<'_, '_> {
     /// Whether a member that was finite so far has a number in its slots that is not below this size.
     fn any_new(&self, size: f64) -> bool {
         let (v, y) = self.group.slots();
-        // All of a chunk are looked at, which is vector code; who it is is asked only if there is one.
-        let all_below = |slot: &[f64]| slot.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)));
-        !(all_below(v) && all_below(y)) && (0..self.count).any(|l| self.is_new(l, size))
+        // Who it is is asked only if there is one.
+        !(all_below(v, size) && all_below(y, size)) && (0..self.count).any(|l| self.is_new(l, size))
     }
 
     fn is_new(&self, l: usize, size: f64) -> bool {
@@ -467,6 +497,11 @@ impl Job<'_, '_> {
 /// Whether a number is smaller than a size; a NaN is not.
 fn is_below(x: f64, size: f64) -> bool {
     x.abs() < size
+}
+
+/// Whether all numbers are. All of a chunk are looked at, which is vector code.
+fn all_below(numbers: &[f64], size: f64) -> bool {
+    numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)))
 }
 
 fn keep(to: &mut Vec<f64>, numbers: &[f64]) {

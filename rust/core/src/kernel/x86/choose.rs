@@ -34,6 +34,15 @@ pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     fits.then_some(Shape { level, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })
 }
 
+/// The shape for several steps at once of this body over rows of so many lanes; none as above. As many vectors are interleaved as hide the
+/// latency: such code is too long for the machine to see what comes after a vector's last step.
+pub fn choose_trail(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
+    let long = choose_long(body, level, lanes)?;
+    let vectors = lanes / long.width;
+    let together = (1..=wanted(body, level).min(vectors)).rev().find(|n| vectors.is_multiple_of(*n))?;
+    Some(Shape { block_vectors: together, interleaved: together, blocks: vectors / together, ..long })
+}
+
 fn quickest(body: &Body, level: Level, members: usize) -> Shape {
     let width = match (level, members) {
         (_, 0..=1) => 1,
