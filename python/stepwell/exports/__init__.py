@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array, Shape
-from ..control import EnergyControl, Projection, a_control
+from ..control import AnyControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..integrate import fits_together
 from ..methods import Method
@@ -47,7 +47,7 @@ def export(
     y: Any = None,
     member: int | tuple[int, ...] | None = None,
     start: str | None = None,
-    control: EnergyControl | Projection | None = None,
+    control: AnyControl | None = None,
     fused: bool = False,
     name: str | None = None,
 ) -> ExportedStep:
@@ -139,7 +139,7 @@ def _member(member: Any, batch: Shape) -> Shape:
     return tuple(_checks.count("member", each, 0, n - 1) for each, n in zip(given, batch, strict=True))
 
 
-def _under(system: System, control: EnergyControl | Projection, blocks: list[Array | None], batch: Shape, dt: float) -> System:
+def _under(system: System, control: AnyControl, blocks: list[Array | None], batch: Shape, dt: float) -> System:
     """The system under control; without a state it needs all numbers of the control."""
     v, y = blocks
     if v is not None and y is not None:
