@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import own_systems as own
 import pytest
 import stepwell as sw
 
@@ -96,6 +97,18 @@ SYSTEMS: dict[str, Make] = {
     "linear, no velocities": lambda r, b: sw.LinearSystem(_gentle(r, 3), np.ones((3, 1)), x=_held(r, b), velocities=0),
     "linear, velocities only": lambda r, b: sw.LinearSystem(_gentle(r, 4, b), velocities=4),
     "linear, masses": _masses,
+    "own: Duffing": lambda r, b: own.duffing(beta=r.uniform(0.1, 1.0, b), omega=_omega(r, b)).sized(),
+    "own: Lorenz": lambda r, b: own.lorenz(rho=r.uniform(0.5, 1.5, b)).sized(),
+    "own: pendulum": lambda r, b: own.pendulum(omega=_omega(r, b)).sized(),
+    "own: springs in space": lambda r, b: own.springs(k=r.uniform(0.5, 1.0, b)).sized(None, np.zeros((5, 3))),
+    "own: masses that attract": lambda r, b: own.attracted(masses=r.uniform(0.1, 1.0, (3, b))).sized(None, np.zeros((3, 2))),
+    "own: top": lambda r, b: own.top(inertia=r.uniform(1.0, 3.0, (3, b))).sized(np.zeros(3), np.zeros(4)),
+    "own: sinusoid": lambda r, b: own.pushed(k=_omega(r, b), x=_sine(r, b)).sized(),
+    "own: samples": lambda r, b: own.pushed(x=_held(r, b)).sized(),
+    "own: a function of the time": lambda r, b: own.pushed(k=_omega(r, b), x=own.turning).sized(),
+    "own: a choice": lambda r, b: own.bouncing(gravity=r.uniform(0.5, 1.0, b)).sized(),
+    "own: a matrix": lambda r, b: own.network(weights=r.normal(size=(3, 3, b))).sized(),
+    "own: as SciPy has it": lambda r, b: own.scipys().sized(),
     "linear, seventeen states": lambda r, b: sw.LinearSystem(0.5 * _gentle(r, 17), r.normal(size=17), x=_sine(r, b)),
 }
 

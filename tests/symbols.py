@@ -133,6 +133,18 @@ class Symbol:
     def __invert__(self) -> Any:
         return self._write("not", self)
 
+    def floor(self) -> Any:
+        """The largest whole number not above it."""
+        return self._write("floor", self)
+
+    def equals(self, other: Any) -> Any:
+        """Whether it is another number."""
+        return self._write("equal", self, other)
+
+    def number(self, x: float) -> Any:
+        """A number that is known beforehand."""
+        return self.tape.number(x)
+
     def choose(self, yes: Any, no: Any) -> Any:
         """One of two numbers, by this truth."""
         return self._write("select", self, yes, no)
@@ -182,6 +194,11 @@ def _on_bits(f: Callable[..., Any]) -> Callable[..., Any]:
     return of_numbers
 
 
+def _either(a: Any, b: Any) -> Any:
+    """Of truths whether one is, of numbers the bits of both."""
+    return a | b if a.dtype == bool else _on_bits(operator.or_)(a, b)
+
+
 DONE: dict[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -192,7 +209,9 @@ DONE: dict[str, Callable[..., Any]] = {
     "less": operator.lt,
     "at_most": operator.le,
     "both": operator.and_,
-    "either": operator.or_,
+    "either": _either,
+    "floor": np.floor,
+    "equal": operator.eq,
     "not": operator.invert,
     "select": np.where,
     "and_bits": _on_bits(operator.and_),

@@ -17,7 +17,6 @@ MEMBERS = 21
 
 
 def start(system: sw.System, rng: np.random.Generator, members: int = MEMBERS) -> dict[str, Any]:
-    system = system.sized(np.zeros(2), np.zeros(2)) if not isinstance(system, sw.NBody) else system
     return {"v": 0.3 * rng.normal(size=(*system.v_shape, members)), "y": rng.normal(size=(*system.y_shape, members))}
 
 

@@ -180,6 +180,8 @@ def _member(system: sw.System, i: int, b: int) -> sw.System:
                 return value[..., i]
             case list() | tuple():
                 return type(value)(map(one, value))
+            case dict():
+                return {name: one(each) for name, each in value.items()}
             case sw.System() | sw.Sinusoid() | sw.Sampled():
                 alone = copy.copy(value)
                 vars(alone).update({name: one(each) for name, each in vars(value).items()})

@@ -297,6 +297,48 @@ def test_explain_says_what_is_wrong(capsys, words, said):
     assert said in err
 
 
+# ---- export
+
+
+def test_export_says_what_export_says(capsys, tmp_path):
+    step = sw.export(sw.Pendulum(), "rk4", "rust", dt=0.02, fused=True, name="swing")
+    words = ["export", "Pendulum", "--method", "rk4", "--language", "rust", "--dt", "0.02", "--fused", "--name", "swing"]
+    assert told(capsys, *words) == (0, step.source, "")
+    code, out, err = told(capsys, *words, "--json")
+    assert (code, json.loads(out), err) == (0, json.loads(json.dumps(step.as_dict())), "")
+    path = tmp_path / "swing.rs"
+    assert told(capsys, *words, "-o", str(path)) == (0, f"written: {path}\n", "")
+    assert path.read_text(encoding="utf-8") == step.source
+
+
+def test_export_takes_a_scene_with_its_start_and_its_control(capsys):
+    scene = sw.scenes.energy_control()
+    state = {"v": scene.v, "y": scene.y, "dt": scene.dt}
+    step = sw.export(scene.system, "rk4", "c", control=scene.control, **state)
+    assert scene.control is not None
+    assert told(capsys, "export", "energy_control", "--method", "rk4", "--language", "c") == (0, step.source, "")
+    verlet = sw.export(sw.Oscillator(), "verlet", "python", start="first_order")
+    words = ["Oscillator", "--method", "verlet", "--language", "python", "--start", "first_order"]
+    assert told(capsys, "export", *words) == (0, verlet.source, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["Chain"], "system: Chain needs arguments"),
+        (["Pendulum", "--language", "fortran"], "language: there is no 'fortran'"),
+        (["Pendulum", "--language", "javascript", "--fused"], "fused: JavaScript has no fused multiply-add"),
+        (["Pendulum", "-o", "step.rs"], "-o: expected a file ending in .c or .h, got 'step.rs'"),
+        (["Pendulum", "--name", "while"], "name: 'while' has a meaning of its own"),
+        (["Pendulum", "--dt", "-1"], "dt: expected numbers above zero in units of time, got -1"),
+    ],
+)
+def test_export_says_what_is_wrong(capsys, words, said):
+    code, out, err = told(capsys, "export", "--method", "rk4", "--language", "c", *words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
 # ---- stability
 
 

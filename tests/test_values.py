@@ -113,6 +113,13 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.explain(FREE, "merson", attempt=True),
         lambda: sw.explain(sw.Chain(1000), "rk4"),
     ],
+    "ExportedStep": [
+        lambda: sw.export(FREE, "rk4", "c"),
+        lambda: sw.export(FREE, "rk4", "rust"),
+        lambda: sw.export(FREE, "verlet", "c"),
+        lambda: sw.export(FREE, "rk4", "c", name="another"),
+        lambda: sw.export(FREE, "rk4", "c", fused=True),
+    ],
     "Method": [lambda: sw.method("rk4"), lambda: sw.method("verlet")],
     "Scene": [lambda: sw.Scene(sw.Oscillator(), v=0.0, y=1.0, until=9.0), lambda: sw.scenes.kepler(), lambda: sw.scenes.clover()],
     "Status": [lambda: sw.Status.OK, lambda: sw.Status.UNDERFLOW],

@@ -1,8 +1,9 @@
 """Simple integration algorithms at the machine's speed.
 
 ``integrate`` steps one trajectory or a hundred thousand; ``World`` is the real-time loop. ``methods`` and ``method`` describe the
-methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``scenes`` and
-``charts`` show the cost and error of each method and where it becomes unstable; ``advise`` recommends one.
+methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``jacobian``,
+``equilibria`` and ``lyapunov`` describe a system near its states. ``scenes`` and ``charts`` show the cost and error of each method
+and where it becomes unstable; ``advise`` recommends one.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .control import EnergyControl, Projection
+from .control import Control, EnergyControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
@@ -19,21 +20,26 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, explanation, scenes, stability
+    from . import advice, charts, derivatives, dynamics, explanation, exports, scenes, stability
     from .advice import advise
+    from .dynamics import equilibria, jacobian, lyapunov
+    from .equations import system
     from .explanation import Explanation, explain
+    from .exports import ExportedStep, export
     from .scenes import Scene
-    from .stability import analyse, criteria, stability_limit
+    from .stability import analyse, criteria, stability_along, stability_limit
 
 __version__: str = _core.__version__
 
 __all__ = [
     "AccuracyWarning",
     "Chain",
+    "Control",
     "ControlWarning",
     "DivergenceWarning",
     "EnergyControl",
     "Explanation",
+    "ExportedStep",
     "LinearSystem",
     "Method",
     "NBody",
@@ -55,17 +61,26 @@ __all__ = [
     "analyse",
     "charts",
     "criteria",
+    "derivatives",
+    "dynamics",
+    "equilibria",
     "errors",
     "explain",
     "explanation",
+    "export",
+    "exports",
     "integrate",
     "isa",
     "isa_levels",
+    "jacobian",
+    "lyapunov",
     "method",
     "methods",
     "scenes",
     "stability",
+    "stability_along",
     "stability_limit",
+    "system",
 ]
 
 
@@ -89,12 +104,22 @@ _LATER = {
     "advise": "advice.advise",
     "Explanation": "explanation.Explanation",
     "charts": "charts",
+    "derivatives": "derivatives",
+    "dynamics": "dynamics",
+    "equilibria": "dynamics.equilibria",
+    "jacobian": "dynamics.jacobian",
+    "lyapunov": "dynamics.lyapunov",
     "explain": "explanation.explain",
     "explanation": "explanation",
+    "ExportedStep": "exports.ExportedStep",
+    "export": "exports.export",
+    "exports": "exports",
     "scenes": "scenes",
+    "system": "equations.system",
     "stability": "stability",
     "analyse": "stability.analyse",
     "criteria": "stability.criteria",
+    "stability_along": "stability.stability_along",
     "stability_limit": "stability.stability_limit",
 }
 

@@ -25,6 +25,11 @@ Shape = tuple[int, ...]
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
 
+_FLOAT64 = np.dtype(np.float64)
+
+#: The truths of up to so many numbers are looked at as bytes, which is quicker than to ask NumPy and costs a copy.
+_FEW_TRUTHS = 1 << 16
+
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
 MOST_AXES = 24
 
@@ -52,6 +57,14 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     """Return ``value`` as float64 if it is real, and by the options finite and positive."""
     if type(value) is float and isfinite(value) and (not positive or value > 0.0):
         return np.array(value)  # the most frequent case: nothing more to check
+    if (
+        type(value) is np.ndarray
+        and value.dtype is _FLOAT64
+        and value.flags.aligned
+        and (not finite or all_true(np.isfinite(value)))
+        and (not positive or all_true(value > 0.0))
+    ):
+        return value  # likewise; the checks below say what is wrong with any other
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, RecursionError) as error:
@@ -74,6 +87,11 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
+
+
+def all_true(truths: Any) -> bool:
+    """Whether all of an array of truths, or the one, are so."""
+    return b"\0" not in truths.tobytes() if truths.size <= _FEW_TRUTHS else bool(truths.all())
 
 
 def _masked(value: Any) -> int:
@@ -114,6 +132,8 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
 
 def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     """Return ``value`` as a whole number in ``least … most``."""
+    if type(value) is int and least <= value <= most:
+        return value
     try:
         n = operator.index(value)
     except TypeError:
@@ -141,6 +161,8 @@ def callback(argument: str, value: Any) -> Any:
 
 def flag(argument: str, value: Any) -> bool:
     """Return ``value`` if it is True or False."""
+    if value is False or value is True:
+        return value
     if not isinstance(value, (bool, np.bool_)):
         raise DTypeError(f"{argument}: expected True or False, got {short(value)} ({type(value).__name__})")
     return bool(value)
@@ -175,10 +197,14 @@ def batch_shape(shapes: dict[str, Shape]) -> Shape:
     different = set(shapes.values()) - {()}
     if not different:
         return ()
+    if len(different) == 1:
+        (shape,) = different
+        if len(shape) <= MOST_AXES and 0 not in shape:
+            return shape
     if longest := ", ".join(name for name, shape in shapes.items() if len(shape) > MOST_AXES):
         raise ShapeError(f"{longest}: expected at most {MOST_AXES} batch axes, got {max(map(len, different))}")
     try:
-        shape = different.pop() if len(different) == 1 else np.broadcast_shapes(*different)
+        shape = np.broadcast_shapes(*different)
     except ValueError:
         given = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
         raise ShapeError(f"these batch shapes do not broadcast to one: {given}") from None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .engine import AdaptiveArrays, Arrays, Pacing, Plan
 
 __all__ = [
+    "Equations",
     "ModelSpec",
     "Symbol",
     "Tape",
@@ -27,8 +28,17 @@ __all__ = [
     "program",
     "run",
     "systems",
+    "times",
 ]
 __version__: str
+
+@final
+class Equations:
+    """The rates of a user's own system, as operations; given to a ``ModelSpec`` under any name. See ``Tape.equations``."""
+
+    @property
+    def reads_v(self) -> bool:
+        """Whether a rate of v depends on v."""
 
 @final
 class ModelSpec:
@@ -115,6 +125,8 @@ class Symbol:
     def add_bits(self, bits: int) -> Symbol: ...
     def shift_up(self, places: int) -> Symbol: ...
     def shift_down(self, places: int) -> Symbol: ...
+    def number(self, x: float) -> Symbol:
+        """A number on the tape of this symbol."""
 
 #: A symbol, or a number that becomes one.
 _Value = Symbol | float
@@ -140,6 +152,18 @@ class Tape:
     def operations(self, of: list[Symbol]) -> tuple[list[tuple[str, list[int], int]], list[int]]:
         """What these values are made of, in order: names, operands, what else is given; and the places of the values."""
 
+    def equations(
+        self,
+        dv: list[Symbol],
+        dy: list[Symbol] | None = None,
+        quantities: list[tuple[str, Symbol]] = ...,
+        kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
+    ) -> Equations:
+        """These values as the rates of a system; without ``dy``, ẏ is v.
+
+        ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
+        """
+
     def fused(self, of: list[Symbol]) -> tuple[Tape, list[Symbol]]:
         """A tape with fused multiply-adds in what these values need, and the values on it."""
 
@@ -155,11 +179,17 @@ def catalogue() -> list[dict[str, Any]]: ...
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
-def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> None:
-    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``."""
+def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
+    """Whether some member has diverged, now or before.
+
+    Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
+    """
 
 def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
     """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""
+
+def times(plan: Plan, t: NDArray[np.float64]) -> None:
+    """Fill the times of the saved states. Of the plan it reads what ``run`` does."""
 
 def check(model: ModelSpec) -> None:
     """Raise if it cannot be stepped so."""

@@ -92,17 +92,74 @@ class EnergyControl(Value):
         return alone
 
 
+class Control(Value):
+    """Keeps an invariant I of a system near a target, by a push −gain·(I − target)·∇I/|∇I|² on both rates in every stage.
+
+    The error of the invariant then decays as exp(−gain·t) (Baumgarte 1972). ∇I is derived from the operations of the invariant.
+    Where it is zero, nothing is pushed.
+
+    Args:
+        invariant: its name; see ``Definition.invariant``.
+        gain: in 1 per unit of time, zero or more; broadcasts over the batch.
+        form: ``"limited"`` takes in a step what backward Euler takes, gain/(1 + h·gain), which never overshoots; ``"printed"``
+            takes gain itself, and overshoots where h·gain is above 1.
+        target: the value to keep; that of the start if None. Broadcasts.
+
+    Raises:
+        ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> sw.integrate(pendulum(), "standard_euler", v=0.0, y=1.0, dt=0.01, steps=1000, control=sw.Control("energy", 1.0))
+    """
+
+    def __init__(self, invariant: str, gain: Any, form: str = "limited", *, target: Any = None) -> None:
+        if not isinstance(invariant, str):
+            raise DTypeError(f"invariant: expected a name, got {type(invariant).__name__}")
+        self.invariant = invariant
+        self.gain = _checks.not_negative("gain", gain)
+        self.form = _checks.known("form", form, FORMS)
+        self.target = None if target is None else _checks.numbers("target", target)
+
+    @property
+    def batch(self) -> Shape:
+        """The shape to which its numbers broadcast."""
+        return _checks.batch_shape({"gain": self.gain.shape} | ({} if self.target is None else {"target": self.target.shape}))
+
+    def __repr__(self) -> str:
+        return f"Control({self.invariant!r}, gain={self.gain}, form={self.form!r})"
+
+    def aimed(self, kinetic: Array, value: Array, dt: float) -> Control:
+        """The same control with its target in numbers."""
+        aimed = copy.copy(self)
+        if aimed.target is None:
+            aimed.target = np.asarray(value)
+        strength = float(np.max(dt * self.gain))
+        if self.form == "printed" and strength >= 1.0:
+            warnings.warn(
+                f"gain: h·gain = {strength:.3g}, expected below 1: the printed form overshoots and may overflow; use a smaller "
+                f'gain or step, or form="limited"',
+                ControlWarning,
+                stacklevel=5,
+            )
+        return aimed
+
+    def given(self) -> dict[str, Any]:
+        """What describes it, beside what describes the system."""
+        return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
+
+
 WAYS = ("scaling", "nacozy")
 
 
 class Projection(Value):
-    """Projects the state back to the target energy after every step.
+    """Projects the state back to the target energy, or to that of another invariant, after every step.
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
-    that suffices to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971).
+    that suffices to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971). The name of an
+    invariant of a system of your own does the same for that invariant.
 
     Args:
-        way: ``"scaling"`` or ``"nacozy"``.
+        way: ``"scaling"``, ``"nacozy"``, or the name of an invariant.
         target: the energy to keep; that of the start if None. Broadcasts over the batch.
 
     Raises:
@@ -110,7 +167,10 @@ class Projection(Value):
     """
 
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
-        self.way = _checks.known("way", way, WAYS)
+        own = isinstance(way, str) and way.isidentifier()
+        self.way = way if own else _checks.known("way", way, WAYS)
+        #: What is kept, of an own system.
+        self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else _checks.numbers("target", target)
 
     @property
@@ -130,11 +190,16 @@ class Projection(Value):
 
     def around(self, s: Any, h: float) -> reference.Projected:
         """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
-        return reference.Projected(s, h, self.way, np.asarray(self.target))
+        return reference.Projected(s, h, self._known_way, np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
         """Its parameters for the core, in addition to those of the system."""
-        return {"control": "projection", "control.way": self.way, "control.target": np.asarray(self.target)}
+        return {"control": "projection", "control.way": self._known_way, "control.target": np.asarray(self.target)}
+
+    @property
+    def _known_way(self) -> str:
+        """How the core projects: onto an invariant along its gradient."""
+        return self.way if self.way in WAYS else "nacozy"
 
     def member(self, one: Callable[[Array], Array]) -> Projection:
         """The same for a single member."""
@@ -143,8 +208,11 @@ class Projection(Value):
         return alone
 
 
-def a_control(value: Any) -> EnergyControl | Projection | None:
+AnyControl = EnergyControl | Projection | Control
+
+
+def a_control(value: Any) -> Any:
     """Return the argument ``control`` if it is one, or None."""
-    if value is not None and not isinstance(value, (EnergyControl, Projection)):
-        raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(value).__name__}")
+    if value is not None and not isinstance(value, (EnergyControl, Projection, Control)):
+        raise DTypeError(f"control: expected an EnergyControl, a Control or a Projection, got {type(value).__name__}")
     return value

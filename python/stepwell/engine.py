@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _core
+from . import _core, _memory
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
@@ -84,9 +84,9 @@ class Arrays(NamedTuple):
         carried: whether the v slot holds what the method carries, and no velocities.
         saved_v: the kept velocities (of the matrix form: v slots), shape (kept, *block, *batch).
         saved_y: the kept coordinates.
-        recorded: what is recorded, shape (kept, numbers, *batch).
-        tally: for each member what a control or projection added up; empty without one.
-        carry: the last v slots; empty if the method carries nothing but v.
+        recorded: what is recorded, shape (kept, numbers, *batch); None if nothing is.
+        tally: for each member what a control or projection added up; None without one.
+        carry: the last v slots; None if the method carries nothing but v.
         first_bad: for each member the first step that was not finite, −1 for none; read and written.
     """
 
@@ -95,14 +95,17 @@ class Arrays(NamedTuple):
     carried: bool
     saved_v: Array
     saved_y: Array
-    recorded: Array
-    tally: Array
-    carry: Array
+    recorded: Array | None
+    tally: Array | None
+    carry: Array | None
     first_bad: Whole
 
 
 class Outcome(NamedTuple):
-    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did."""
+    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did.
+
+    ``diverged`` is False if it is known that no member has such a step.
+    """
 
     v: Array
     y: Array
@@ -110,6 +113,7 @@ class Outcome(NamedTuple):
     first_bad: Whole
     recorded: dict[str, Array] | None = None
     work: Array | None = None
+    diverged: bool = True
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
@@ -117,7 +121,11 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
     ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
     """
-    before = np.full(plan.batch, -1, dtype=np.int64) if before is None else before.copy()
+    if before is None:
+        before = np.empty(plan.batch, np.int64)
+        before.fill(-1)
+    else:
+        before = before.copy()
     if plan.form == "matrix":
         return _matrix(plan, v, y, before, carried)
     if plan.form == "power":
@@ -284,6 +292,8 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     given = plan.system.parameters(plan.batch)
+    if not plan.record and not plan.fused:
+        return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
 
 
@@ -292,19 +302,26 @@ def _rust(
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
     kept = plan.kept
-    saved_v, saved_y = (np.empty((kept, *a.shape)) for a in (v, y))
-    carry = np.empty(v.shape if carries else 0)
-    shapes = {name: plan.system.quantities[name] for name in plan.record}
-    recorded = np.empty((kept, sum(prod(shape) for shape in shapes.values()), *plan.batch))
+    empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
+    saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
+    carry = np.empty(v.shape) if carries else None
+    recorded = None
+    if plan.record:
+        shapes = {name: plan.system.quantities[name] for name in plan.record}
+        recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
     work = None if plan.system.control is None else np.empty(plan.batch)
-    tally = np.empty(0) if work is None else work.reshape(-1)
+    tally = None if work is None else work.reshape(-1)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
-    _core.run(model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1)))
+    diverged = _core.run(
+        model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
+    )
     by_name: dict[str, Array] = {}
-    for name, shape in shapes.items():
-        mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
-        by_name[name] = mine.reshape(kept, *shape, *plan.batch)
-    return Outcome(saved_v, saved_y, carry if carries else saved_v[-1], before, by_name, _per_step(plan, work))
+    if recorded is not None:
+        for name, shape in shapes.items():
+            mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
+            by_name[name] = mine.reshape(kept, *shape, *plan.batch)
+    work = None if work is None else _per_step(plan, work)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged)
 
 
 # ---- the transition-matrix form

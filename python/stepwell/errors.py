@@ -30,6 +30,13 @@ class NotFiniteError(ArgumentError):
     """An input holds NaN or an infinity."""
 
 
+class TraceError(ArgumentError):
+    """A function of a user's own equations does what cannot be traced; the message names its line and what to write instead."""
+
+    #: Whether it may be that the state had another shape than the function is for.
+    of_shape = False
+
+
 class TooLargeError(ArgumentError, MemoryError):
     """The results of a call would not fit in memory."""
 

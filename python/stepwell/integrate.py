@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from . import _checks, engine
+from . import _checks, _core, _memory, engine
 from ._checks import Array
-from .control import EnergyControl, Projection, a_control
+from .control import AnyControl, a_control
 from .errors import (
     AccuracyWarning,
     ArgumentError,
@@ -52,7 +52,7 @@ def integrate(
     system: System,
     method: str | Method,
     *,
-    v: Any,
+    v: Any = None,
     y: Any,
     dt: float | None = None,
     steps: int | None = None,
@@ -68,7 +68,7 @@ def integrate(
     carried_by: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
-    control: EnergyControl | Projection | None = None,
+    control: AnyControl | None = None,
     form: str = "direct",
     fused: bool = False,
     threads: int | None = None,
@@ -84,7 +84,7 @@ def integrate(
     Args:
         system: what to step.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block at the start, shape (*block, *batch), or one number for all.
+        v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
         dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
             to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
@@ -138,6 +138,7 @@ def integrate(
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)
+    v = velocities(system, v)
     fits_together(system, how)
     fused = _checks.flag("fused", fused)
     if tolerance is not None or at is not None:
@@ -178,13 +179,13 @@ def integrate(
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
-    begin, end = (t0 + k * dt for k in (start_step, start_step + steps))
+    begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
     if not begin < end < np.inf:
         raise ArgumentError(
             f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
             f"after {steps} steps of {dt:g}"
         )
-    system.check_time(max(abs(begin), abs(end)))
+    system.check_time(max(-begin, end))
     every = None if every is None else _checks.count("every", every, 1)
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
@@ -202,9 +203,11 @@ def integrate(
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     batch = _checks.batch_shape(batches if control is None else batches | {"control": control.batch})
     rows = prod(system.v_shape) + prod(system.y_shape)
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused)
+    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused)
     # What the core does not record is computed from the saved states, with some of them in between.
-    recorded = sum(prod(system.quantities[name]) if name in system.quantities else 3 * rows for name in record)
+    recorded = 0
+    for name in record:
+        recorded += prod(system.quantities[name]) if name in system.quantities else 3 * rows
     _checks.fits(
         "the saved states",
         plan.kept * (rows + recorded) + NUMBERS_PER_STATE * (rows + 1),
@@ -218,18 +221,22 @@ def integrate(
         fits_together(system, how)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
-    with _bar(f"{how.title}, {steps} steps") if _checks.flag("progress", progress) else nullcontext(None) as told:
-        if record or control is not None or told is not None:
-            beside = tuple(name for name in record if name in system.quantities)
-            plan = plan._replace(system=system, progress=told, record=beside)
+    if record or control is not None:
+        plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
+    if _checks.flag("progress", progress):
+        with _bar(f"{how.title}, {steps} steps") as told:
+            out = engine.advance(plan._replace(progress=told), v, y, before, carried=carry is not None)
+    else:
         out = engine.advance(plan, v, y, before, carried=carry is not None)
-    if isinstance(system, NBody) and (out.first_bad > start_step).any():
+    collides = isinstance(system, NBody)
+    if collides and out.diverged and (out.first_bad > start_step).any():
         v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
     run = Run(
         t=_times(plan),
         v=out.v,
         y=out.y,
-        status=np.asarray(out.first_bad >= 0).view(np.int8),  # Status.OK is 0 and Status.DIVERGED 1
+        # Status.OK is 0 and Status.DIVERGED 1
+        status=np.asarray(out.first_bad >= 0).view(np.int8) if out.diverged else np.zeros(batch, np.int8),
         first_bad_step=out.first_bad,
         carry=None if how.carry is None else out.slot,
         system=system,
@@ -240,17 +247,27 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         fused=fused,
-        collision=partial(_collision, plan._replace(progress=None), v, y, carry is not None)
-        if isinstance(system, NBody)
-        else None,
+        collision=partial(_collision, plan, v, y, carry is not None) if collides else None,
         recorded=out.recorded,
         work=out.work,
     )
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
-    _warn(run, before)
+    if out.diverged:
+        _warn(run, before)
     _warn_of_nonsense(run)
     return run
+
+
+def velocities(system: System, v: Any) -> Any:
+    """What is given as v; a system without velocities needs none."""
+    if v is None and system.v_shape == (0,):
+        return 0.0
+    if v is None:
+        raise ArgumentError(
+            f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none"
+        )
+    return v
 
 
 def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:
@@ -266,14 +283,11 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
 
 
 def _times(plan: engine.Plan) -> Array:
-    """t0 + k·dt of every saved state; in place, for there may be millions of them."""
+    """t0 + k·dt of every saved state; there may be millions of them."""
     if plan.every is None:
         return np.array([plan.t0 + float(plan.first + plan.steps) * plan.dt])
-    t = np.arange(0.0, plan.steps + plan.every, plan.every)[: plan.kept]
-    t[-1] = plan.steps
-    t += plan.first
-    t *= plan.dt
-    t += plan.t0
+    t = _memory.empty((plan.kept,))
+    _core.times(plan, t)
     return t
 
 
@@ -421,7 +435,7 @@ def _warn_of_stops(run: Run) -> None:
 def _warn_of_nonsense(run: Run) -> None:
     """Warn of what is finite and yet means nothing, as far as it is seen without more work."""
     told = [run.system.doubt(run.y)]
-    if isinstance(run.system, NBody) and run.system.keeps_energy and "energy" in run.recorded and len(run.t) > 1:
+    if "energy" in run.recorded and isinstance(run.system, NBody) and run.system.keeps_energy and len(run.t) > 1:
         with np.errstate(all="ignore"):
             first, last = run.recorded["energy"][[0, -1]]
             moved = np.maximum(run.system.kinetic(run.v[0]), run.system.kinetic(run.v[-1]))
@@ -480,7 +494,7 @@ def fits_together(system: System, method: Method) -> None:
     if system.velocity_term is not None:
         raise UnsupportedError(
             f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
-            f"use false_euler, or leave {system.velocity_term} out"
+            f"use false_euler{'' if system.velocity_term == 'forces that do' else f', or leave {system.velocity_term} out'}"
         )
 
 

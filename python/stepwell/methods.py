@@ -142,4 +142,6 @@ def method(name: str | Method) -> Method:
     """
     if isinstance(name, Method):
         return name
+    if type(name) is str and (known := _catalogue().get(name)) is not None:
+        return known
     return _catalogue()[_checks.known("method", name, _catalogue())]

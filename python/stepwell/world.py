@@ -9,9 +9,9 @@ import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
-from .control import EnergyControl, Projection, a_control
+from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
-from .integrate import fits_together, goes_on_alike
+from .integrate import fits_together, goes_on_alike, velocities
 from .methods import Method
 from .methods import method as find_method
 from .systems import Sampled, Sinusoid, System
@@ -64,13 +64,13 @@ class World:
         system: System,
         method: str | Method,
         *,
-        v: Array,
+        v: Array | None = None,
         y: Array,
         dt: float,
         t0: float = 0.0,
         start_step: int = 0,
         start: str | None = None,
-        control: EnergyControl | Projection | None = None,
+        control: AnyControl | None = None,
         carry: Array | None = None,
         carried_by: str | None = None,
         dt_before: float | None = None,
@@ -83,6 +83,7 @@ class World:
         goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
         batch = _checks.shape_of("y", y)[len(system.y_shape) :]
+        v = np.empty((0, *batch)) if velocities(system, v) is not v else v
         v = _checks.in_place("v", v, (*system.v_shape, *batch))
         y = _checks.in_place("y", y, (*system.y_shape, *batch))
         if np.shares_memory(v, y):
@@ -197,6 +198,8 @@ def _frozen(what: Any) -> Any:
     elif isinstance(what, (list, tuple)):
         for each in what:
             _frozen(each)
+    elif isinstance(what, dict):
+        _frozen(list(what.values()))
     elif isinstance(what, (System, Sampled, Sinusoid)):
         _frozen(list(vars(what).values()))
     return what

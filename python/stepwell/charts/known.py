@@ -50,7 +50,7 @@ def dense(exact: Exact, until: float) -> Exact:
     nodes = FIRST_NODES
     while True:
         found = _interpolant(exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
-        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True))
+        apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True) if b.size)
         if apart <= MAX_INTERPOLATION_ERROR or nodes >= MAX_NODES:
             return found
         nodes *= 2

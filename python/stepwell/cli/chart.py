@@ -21,7 +21,9 @@ from . import show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene; see stepwell scenes")
+    parser.add_argument(
+        "scenes", nargs="+", metavar="SCENE", help="a scene (see stepwell scenes), or a Python file that makes one"
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .. import _checks, systems
-from ..control import EnergyControl, Projection
+from ..control import AnyControl
 from ..errors import ArgumentError, StepwellError, UnknownNameError
 from ..explanation import explain
 from ..scenes import scene, scenes
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(args: argparse.Namespace) -> None:
     """Look up, explain, write, tell."""
-    system, control = _system(args.system)
+    system, control = system_and_control(args.system)
     if args.output is not None:
         _checks.file("-o", args.output, (".json", ".html", ".txt"))
     explained = explain(
@@ -56,7 +56,7 @@ def command(args: argparse.Namespace) -> None:
     written.close()
 
 
-def _system(name: str) -> tuple[System, EnergyControl | Projection | None]:
+def system_and_control(name: str) -> tuple[System, AnyControl | None]:
     """A scene's system and control, or a system of that class as it is by default."""
     kind = getattr(systems, name, None)
     if isinstance(kind, type) and issubclass(kind, System) and kind is not System:

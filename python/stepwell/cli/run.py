@@ -15,7 +15,7 @@ from ..charts import RunPicture, run_picture
 from ..charts.runs_animation import ENDINGS as ANIMATIONS
 from ..charts.runs_animation import need as need_for_animation
 from ..charts.style import new_figure
-from ..control import WAYS, EnergyControl, Projection
+from ..control import WAYS, AnyControl, EnergyControl, Projection
 from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning
 from ..scenes import scene
 from . import show
@@ -28,7 +28,7 @@ NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scene", metavar="SCENE", help="a scene; see stepwell scenes")
+    parser.add_argument("scene", metavar="SCENE", help="a scene (see stepwell scenes), or a Python file that makes one")
     parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
     parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
     parser.add_argument("--steps", type=int, metavar="N", help="how many steps (default: up to the scene's horizon)")
@@ -102,7 +102,7 @@ def _ready(path: Path | None, seconds: float, fps: float) -> None:
         need_for_animation(path, seconds, fps)
 
 
-def _control(given: str) -> EnergyControl | Projection | None:
+def _control(given: str) -> AnyControl | None:
     """The control that ``GAIN[:FORM]``, the way of a projection or ``off`` says."""
     if given == "off":
         return None

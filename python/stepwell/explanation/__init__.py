@@ -9,7 +9,7 @@ from math import prod
 from typing import Any
 
 from .. import _checks, _core, engine
-from ..control import EnergyControl, Projection, a_control
+from ..control import AnyControl, a_control
 from ..errors import ArgumentError, UnsupportedError
 from ..integrate import fits_together
 from ..methods import Method
@@ -28,7 +28,7 @@ def explain(
     method: str | Method,
     *,
     members: int | None = None,
-    control: EnergyControl | Projection | None = None,
+    control: AnyControl | None = None,
     fused: bool = False,
     attempt: bool = False,
 ) -> Explanation:

@@ -6,8 +6,8 @@ A formula is read as in Python: · − √ ≤ are its multiplication, subtracti
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
 #: How strongly a formula holds together, by what it does last.
 CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
@@ -19,11 +19,12 @@ ALL_BITS = 2**64 - 1
 
 
 class Formula(NamedTuple):
-    """A text, what it does last, and whether it is the truth of a comparison."""
+    """A text, what it does last, whether it is the truth of a comparison, whether it is bits where these are no numbers."""
 
     text: str
     holds: int = ATOM
     is_truth: bool = False
+    is_bits: bool = False
 
     @property
     def is_negative(self) -> bool:
@@ -107,6 +108,30 @@ def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | N
             return of[0]
         case _:  # floor, and what is to come
             return Formula(f"{name}({', '.join(each.text for each in of)})")
+
+
+class Notation:
+    """How values are written: here for people, elsewhere as a language has it.
+
+    Attributes:
+        longest: characters of a line, its name not counted, beyond which it becomes several.
+        called: functions of one number that may stand in the place of their operations, by name.
+    """
+
+    longest = 72
+    called: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
+
+    def number(self, bits: int) -> Formula:
+        """A constant."""
+        return number(bits)
+
+    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+        """An operation of these; ``bits`` are those of the operands that are constants."""
+        return formula(name, of, given, bits)
+
+    def named(self, name: str, value: Formula) -> Formula:
+        """A value that has a line of its own, where it is used."""
+        return Formula(name, is_truth=value.is_truth)
 
 
 def _sum(a: Formula, b: Formula, sign: str, other: str) -> Formula:

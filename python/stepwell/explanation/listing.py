@@ -21,10 +21,8 @@ from ..engine import Plan
 from ..reference import adaptive
 from ..reference.signal import Constant, Held, Sine
 from ..reference.traced import Tracer
-from .formula import ATOM, PRODUCT, SUM, Formula, formula, number
+from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
 
-#: Characters of a line, its name not counted, beyond which it becomes several.
-MAX_LINE = 72
 #: Characters of an increment of its own line; shorter ones stand where they are used.
 SHORT = 12
 
@@ -199,6 +197,8 @@ def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[in
             return of[0].shift_up(given)
         case "shift down":
             return of[0].shift_down(given)
+        case "sample":
+            return tape.sample(given, of[0])
         case "copy":
             return of[0]
         case _:
@@ -256,8 +256,9 @@ class _Value(NamedTuple):
 class Writer:
     """Writes sections, one after the other, and knows what values are called."""
 
-    def __init__(self, tape: Any, names: dict[int, str]) -> None:
+    def __init__(self, tape: Any, names: dict[int, str], notation: Notation | None = None) -> None:
         self.tape, self.names = tape, names
+        self.notation = Notation() if notation is None else notation
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
 
@@ -293,18 +294,22 @@ class Writer:
             name, note = name_of(place, value)
             self._used.add(name)
             lines.append(Line(name, value.text.text, dict(value.operations), note))
-            values[place] = _Value(Formula(name, is_truth=value.text.is_truth), value.symbol, value.rank)
+            values[place] = _Value(self.notation.named(name, value.text), value.symbol, value.rank)
 
         def made(name: str, of: list[int], given: int) -> _Value:
             parts = [values[place] for place in of]
-            symbol = again(self.tape, name, [each.symbol for each in parts], given, [each.bits for each in parts])
+            symbols = [each.symbol for each in parts]
+            if name in self.notation.called:
+                symbol = None if symbols[0] is None else self.notation.called[name](symbols[0])
+            else:
+                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts])
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
                 parts.sort(key=lambda each: -each.rank)
             elif name == "add" and (parts[0].text.holds != ATOM or parts[0].rank < 4):  # but v + (…), as methods are written
                 parts.sort(key=lambda each: each.text.holds != SUM)
-            text = formula(name, [each.text for each in parts], given, [each.bits for each in parts])
+            text = self.notation.formula(name, [each.text for each in parts], given, [each.bits for each in parts])
             count = sum((Counter(each.operations) for each in parts), Counter[str]())
             if name in KINDS:
                 count[KINDS[name]] += 1
@@ -312,14 +317,14 @@ class Writer:
 
         for place, (name, of, given) in enumerate(operations):
             if name == "constant":
-                values.append(_Value(number(given), _leaf(self.tape, name, given), 0, given))
+                values.append(_Value(self.notation.number(given), _leaf(self.tape, name, given), 0, given))
                 continue
             if not of:
                 text, symbol, rank_of_leaf = leaf(name, given)
                 values.append(_Value(text, symbol, rank_of_leaf))
                 continue
             value = made(name, of, given)
-            while len(value.text.text) > MAX_LINE:
+            while len(value.text.text) > self.notation.longest:
                 waiting = [each for each in of if values[each].waits]
                 if not waiting:
                     break

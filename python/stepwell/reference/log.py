@@ -6,6 +6,7 @@ Stability analysis has logarithms of numbers that the core never sees, as it has
 import numpy as np
 
 from . import bits
+from .marks import differentiable
 from .types import Array
 
 LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
@@ -24,6 +25,7 @@ MANTISSA = 0x000FFFFFFFFFFFFF
 TWO_52 = 0x4330000000000000  # its low bits hold a whole number
 
 
+@differentiable("log", general=False)
 def log(x: Array) -> Array:
     """Ln x of a normal number above zero: x = 2ᵏ·(1 + f), then fdlibm's polynomial in f/(2 + f)."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative

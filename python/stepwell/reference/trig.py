@@ -7,6 +7,7 @@ imaginary part is infinitesimal, and ones that count what is done to them.
 import numpy as np
 
 from . import bits
+from .marks import differentiable
 from .types import Array
 
 PER_HALF_TURN = 0.3183098861837907  # 1/π
@@ -24,6 +25,7 @@ S = (
 )
 
 
+@differentiable("sin", general=False)
 def sin(x: Array) -> Array:
     """Sin x."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
@@ -33,6 +35,7 @@ def sin(x: Array) -> Array:
     return _half_turn((x - n * PI[0]) - n * PI[1], y)
 
 
+@differentiable("cos", general=False)
 def cos(x: Array) -> Array:
     """Cos x, which is the sine a quarter of a turn further."""
     y = (x * PER_HALF_TURN + 0.5) + MAGIC

@@ -7,16 +7,20 @@ scene. So ``stepwell.scenes.clover()`` is made by ``builtin/clover.py``, and not
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
+import re
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, wraps
+from pathlib import Path
 from typing import Any
 
 from .. import _checks
 from .._checks import Array
 from .._value import same
-from ..errors import DTypeError
+from ..errors import ArgumentError, DTypeError, StepwellError
 from . import builtin, table
 from .base import Scene
 
@@ -29,17 +33,55 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def scene(name: str | Scene) -> Scene:
-    """The scene of that name, as it is made without arguments.
+    """The scene of that name, as it is made without arguments, or that of a file of one's own.
+
+    Args:
+        name: a name of ``scenes``; or a Python file that makes a ``Scene``, ``my_scene.py``, with the name of the variable behind
+            it if it makes several, ``my_scene.py:fast``. The file is run.
 
     Raises:
         DTypeError: if it is neither a scene nor a name.
         UnknownNameError: if there is none; the message names the nearest.
+        ArgumentError: if the file makes none, or several.
     """
     if isinstance(name, Scene):
         return name
     if not isinstance(name, str):
         raise DTypeError(f"scene: expected a Scene or its name, got {type(name).__name__}")
+    if (found := FILE.fullmatch(name)) is not None:
+        return _from_file(*found.groups())
     return _makers()[_checks.known("scene", name, _makers())]()
+
+
+#: A file of one's own, and a variable of it.
+FILE = re.compile(r"(.+\.py)(?::(\w+))?")
+
+
+def _from_file(path: str, variable: str | None) -> Scene:
+    """The scene that a file makes."""
+    name = re.sub(r"\W", "_", Path(path).stem)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(name, module)  # so that its systems can be pickled
+    try:
+        spec.loader.exec_module(module)
+    except FileNotFoundError:
+        raise ArgumentError(f"scene: there is no file {_checks.short(path)}") from None
+    except StepwellError:
+        raise
+    except Exception as error:
+        raise ArgumentError(f"scene: the file {path} cannot be run: {type(error).__name__}: {error}") from error
+    made = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
+    if variable is not None:
+        return made[_checks.known("scene", variable, made)]
+    if len(made) != 1:
+        if not made:
+            raise ArgumentError(f"scene: {path} makes no Scene; write scene = sw.Scene(system, v=…, y=…, until=…)")
+        raise ArgumentError(f"scene: expected one Scene in {path}, got {', '.join(made)}; name one: {path}:{next(iter(made))}")
+    ((key, only),) = made.items()
+    return replace(only, name=name if key == "scene" else key, title="") if only.name == "unnamed" else only
 
 
 @cache

@@ -13,12 +13,13 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._value import Value
-from ..control import EnergyControl, Projection
+from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
-from ..integrate import integrate
+from ..integrate import integrate, velocities
 from ..methods import Method
 from ..result import Run
 from ..systems import System
+from ..systems.base import a_system
 
 #: How many times of the horizon give the exact solution's scale.
 SCALE_SAMPLES = 1001
@@ -32,7 +33,7 @@ class Scene(Value):
 
     Attributes:
         system: the system to step, of one member.
-        v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it.
+        v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it; a first-order system has none.
         y: coordinate block at t = 0, likewise of its ``y_shape``.
         horizon: time over which errors are measured, in units of time, above zero; that of ``until`` if None.
         dt: the usual step, in units of time; the document's where it gives one, a thousandth of the horizon if None.
@@ -60,13 +61,13 @@ class Scene(Value):
     """
 
     system: System
-    v: Array
-    y: Array
+    v: Array = None  # type: ignore[assignment]  # never after __post_init__
+    y: Array = None  # type: ignore[assignment]
     horizon: float = None  # type: ignore[assignment]  # never after __post_init__
     dt: float = None  # type: ignore[assignment]
     exact: Callable[[Array], tuple[Array, Array]] | None = None
     until: float = math.inf
-    control: EnergyControl | Projection | None = None
+    control: AnyControl | None = None
     period: float | None = None
     name: str = "unnamed"
     title: str = ""
@@ -76,10 +77,11 @@ class Scene(Value):
 
     def __post_init__(self) -> None:
         """Check the arguments and fill in the defaults."""
-        if not isinstance(self.system, System):
-            raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(self.system).__name__}")
-        given = [_checks.numbers(name, block) for name, block in (("v", self.v), ("y", self.y))]
-        system = self.system.sized(*given)
+        if self.y is None:
+            raise ArgumentError("y: expected the coordinates at t = 0, got None")
+        y = _checks.numbers("y", self.y)
+        system = a_system(self.system).sized(None if self.v is None else _checks.numbers("v", self.v), y)
+        given = [_checks.numbers("v", velocities(system, self.v)), y]
         if system.batch:
             raise ArgumentError(f"system: expected a system of one member, got parameters of shape {system.batch}")
         found: dict[str, Any] = {"system": system}
@@ -100,8 +102,7 @@ class Scene(Value):
         found |= {"dt": _checks.number("dt", dt, positive=True, unit="units of time"), "until": until}
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
-        if self.control is not None and not isinstance(self.control, (EnergyControl, Projection)):
-            raise DTypeError(f"control: expected an EnergyControl or a Projection, got {type(self.control).__name__}")
+        a_control(self.control)
         for name, value in (found | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 

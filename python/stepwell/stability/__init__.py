@@ -1,10 +1,11 @@
 """Stability in the z-plane (§4): the eigenvalues of the transition matrix of a step.
 
 ``maps`` finds the matrices, ``eigen`` their eigenvalues and modes, ``analysis`` puts them into the document's words, ``limit``
-finds the step at which a mode begins to grow, ``expansion`` makes series in Φ, ``counted`` counts operations, ``criterion``
-answers the document's four criteria for every method.
+finds the step at which a mode begins to grow, ``along`` does so at every saved state of a run, ``expansion`` makes series in Φ,
+``counted`` counts operations, ``criterion`` answers the document's four criteria for every method.
 """
 
+from .along import StabilityAlong, stability_along
 from .analysis import KINDS, Analysis, analyse
 from .counted import Operations, operations
 from .criterion import Criteria, Criterion, criteria
@@ -19,11 +20,13 @@ __all__ = [
     "Mode",
     "Operations",
     "Series",
+    "StabilityAlong",
     "StabilityLimit",
     "StabilityLimits",
     "analyse",
     "criteria",
     "operations",
     "series",
+    "stability_along",
     "stability_limit",
 ]

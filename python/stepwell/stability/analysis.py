@@ -187,7 +187,9 @@ class Analysis(Value):
         return f"{head}dt = {self.dt:g}, r₁ = {self.radius:.9g}, {angle}, {self.kind}>"
 
 
-def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0) -> Analysis:
+def analyse(
+    system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None
+) -> Analysis:
     """Find the transition matrix of a step and its eigenvalues, and classify them (§4).
 
     P of a linear system is found by stepping unit vectors. For a nonlinear system it is the Jacobian of a step at a state, exact
@@ -201,6 +203,8 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
             ``Run``, whose saved states then are the first axis of the members.
         t: the time of the linearisation; a run has its own.
+        v: in place of ``at``, the velocities of the state.
+        y: in place of ``at``, its coordinates.
 
     Returns:
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
@@ -210,6 +214,7 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
         UnsupportedError: if the method cannot step the system.
     """
     how = find_method(method)
+    at = given_state(at, v, y)
     system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     if isinstance(at, Run):
@@ -249,13 +254,33 @@ def analyse(system: System, method: str | Method, *, dt: Any = None, at: Any = N
     return Analysis(system, how, step, P, Q, maps.rates(system, t, v, y), maps.finish(system, how, step, P.shape[2:], t, v, y))
 
 
+def given_state(at: Any, v: Any, y: Any) -> Any:
+    """What is meant by ``at``, or by ``v`` and ``y`` in its place."""
+    if v is None and y is None:
+        return at
+    if y is None:
+        raise ArgumentError("v, y: expected both or neither, got v alone")
+    if at is not None:
+        raise ArgumentError("at, v, y: expected a state as at=(v, y) or as v= and y=, got both")
+    return v, y
+
+
 def state(argument: str, system: System, at: Any, or_what: str = "of blocks") -> tuple[Array, Array]:
     """A state from what users give."""
     if not isinstance(at, (tuple, list)) or len(at) != 2:
         raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {_given(at)}")
-    v = _checks.block(f"{argument}[0], v", at[0], system.v_shape, system.axes)
+    v = _checks.block(f"{argument}[0], v", velocities(system, at[0]), system.v_shape, system.axes)
     y = _checks.block(f"{argument}[1], y", at[1], system.y_shape, system.axes)
     return v, y
+
+
+def velocities(system: System, v: Any) -> Any:
+    """What is given as v; a system that has no velocities needs none."""
+    if v is not None:
+        return v
+    if system.v_shape != (0,):
+        raise ArgumentError(f"v: expected the velocities of the state, since {system!r} has some, got None")
+    return 0.0
 
 
 def _given(at: Any) -> str:

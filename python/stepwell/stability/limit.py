@@ -28,7 +28,7 @@ from ..methods import method as find_method
 from ..systems import LinearSystem, System
 from ..systems.base import a_system
 from . import eigen, exact, maps
-from .analysis import state
+from .analysis import given_state, state
 from .eigen import EPS, Complex, Truths
 from .numbers import Polynomial
 from .parts import parts, rates
@@ -183,7 +183,7 @@ def _limits(dt: Array, modes: Any, grows: Any) -> StabilityLimits:
     return found
 
 
-def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0) -> Any:
+def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None) -> Any:
     """Find the largest step below which a method is stable for every mode of a system.
 
     Stable means that every eigenvalue of the transition matrix stays in or on the unit circle for
@@ -205,6 +205,8 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         method: its name, or what ``stepwell.method`` returns.
         at: a state (v, y) at which a nonlinear system is linearised.
         t: the time of that state.
+        v: in place of ``at``, the velocities of the state.
+        y: in place of ``at``, its coordinates.
 
     Returns:
         A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). Its
@@ -219,6 +221,7 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         2.785293563405282
     """
     how = find_method(method)
+    at = given_state(at, v, y)
     system = a_system(system).sized(*(at if isinstance(at, (tuple, list)) else ()))
     fits_together(system, how)
     t = _checks.number("t", t)

@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array, Shape
+from ..derivatives import traced
 from ..methods import Method
 from ..reference.types import Blocks
 from ..systems import System
@@ -58,10 +59,13 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
     """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
 
-    A projection of the system onto its energy is part of the step.
+    By the complex step where the system's reference accepts complex numbers, else from the tape of the step. A projection of the
+    system onto its energy is part of the step.
     """
     members = together(system, dt, v, y)
-    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y) if method.carry else v
+    slot = _started(system, method, dt, members, t, v, y) if method.carry else v
+    if not system.complex_step:
+        return traced.matrix(system, "step", method, members, slot, y, t, dt)[0]
     s: Any = _scaled(system, dt, (sum(size(system)), *members))
     h: Any = float(dt) if dt.ndim == 0 else dt
     project: Callable[[Any, Any], Blocks] = getattr(s, "project", lambda v, y: (v, y))
@@ -80,6 +84,8 @@ def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | Non
         members = system.batch
         return rows(system, *both(*unit(system, members)))
     members = together(system, np.asarray(1.0), v, y)
+    if not system.complex_step:
+        return traced.matrix(system, "rates", None, members, v, y, t)[0]
     return _derivative(system, members, v, y, both)
 
 
@@ -97,9 +103,22 @@ def finish(
         free = system.without_inputs()
         slot, y = unit(free, members)
         return rows(free, method.steps.finish(_scaled(free, dt, (n, *members)), 0, 0.0, slot, y), y)
-    slot = method.steps.start(_scaled(system, dt, members), 0, t, v, y)
+    slot = _started(system, method, dt, members, t, v, y)
+    if not system.complex_step:
+        return traced.matrix(system, "finish", method, members, slot, y, t, dt)[0]
     s = _scaled(system, dt, (n, *members))
     return _derivative(system, members, slot, y, lambda slot, y: (method.steps.finish(s, 0, t, slot, y), y))
+
+
+def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
+    """What a method carries in the place of v, where each member may have a step of its own."""
+
+    def spread(block: Array, shape: Shape) -> Array:
+        own = block.shape[len(shape) :]
+        return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
+
+    v, y = spread(v, system.v_shape), spread(y, system.y_shape)
+    return method.steps.start(_scaled(system, dt, members), 0, t, v, y)
 
 
 def unit(system: System, members: Shape) -> tuple[Array, Array]:
@@ -145,4 +164,4 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
     unit_v, unit_y = unit(system, members)
     with np.errstate(all="ignore"):
         found = rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
-    return np.asarray(found.imag / COMPLEX_STEP)
+        return np.asarray(found.imag / COMPLEX_STEP)

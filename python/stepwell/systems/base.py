@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from math import inf, prod
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -40,6 +41,8 @@ class System(Value, ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
+        complex_step: whether the reference is right on numbers with an infinitesimal imaginary part, which is the quickest way to
+            its derivatives; those of others come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
@@ -49,6 +52,7 @@ class System(Value, ABC):
     reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
     linear: ClassVar[bool] = False
+    complex_step: ClassVar[bool] = False
     second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
@@ -90,7 +94,8 @@ class System(Value, ABC):
 
     def parameters(self, batch: Shape) -> Given:
         """The parameters of this system and of its control, in the form that the core takes."""
-        return flat(self.given(batch) | ({} if self.control is None else self.control.given()), batch)
+        given = self.given(batch)
+        return flat(given if self.control is None else given | self.control.given(), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
@@ -136,27 +141,29 @@ class System(Value, ABC):
         """The same system for states of these shapes; this matters only for a system whose size is not fixed yet."""
         return self
 
-    def controlled(self, control: EnergyControl | Projection, v: Array, y: Array, dt: float) -> Self:
+    def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Self:
         """The same system under control, the target that of the state if the control has none.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        self._controllable()
+        self._controllable(control)
         with np.errstate(all="ignore"):
             _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
         return self._held_by(control.aimed(kinetic, energy, dt))
 
-    def under(self, control: EnergyControl | Projection, batch: Shape) -> Self:
+    def under(self, control: Any, batch: Shape) -> Self:
         """The same system under control, in what a step does and not in numbers, for unknown states of that batch shape.
 
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        self._controllable()
+        self._controllable(control)
         return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
-    def _controllable(self) -> None:
+    def _controllable(self, control: Any) -> None:
+        if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):
+            raise UnsupportedError(f"control: {control!r} is for an invariant of an own system, and {self!r} has none")
         if not hasattr(self.reference, "energies"):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 
@@ -193,6 +200,11 @@ class System(Value, ABC):
 def a_system(value: Any) -> System:
     """Return the argument ``system`` if it is one."""
     if not isinstance(value, System):
+        if type(value).__name__ == "Definition":
+            return a_system(value())
+        if isinstance(value, FunctionType):
+            name = value.__name__
+            raise DTypeError(f"system: expected a system, got the function {name}; wrap it with sw.system({name}), or @sw.system")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 
@@ -207,9 +219,12 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
     """A description as the core takes it: what is not there is left out, a list is its length and its parts."""
     entries: Given = []
     for name, value in given.items():
+        if value is None:
+            continue
+        if type(value) is np.ndarray:  # as most are: each case below takes its time
+            entries.append((name, rows(value, batch)))
+            continue
         match value:
-            case None:
-                pass
             case str() | int():
                 entries.append((name, value))
             case list():

@@ -28,6 +28,7 @@ class Chain(System):
 
     kernel = "chain"
     reference = Reference
+    complex_step = True
     axes = "masses"
     linear = True
 

@@ -43,6 +43,7 @@ class LinearSystem(System):
 
     kernel = "linear"
     reference = Reference
+    complex_step = True
     axes = "states"
     linear = True
 

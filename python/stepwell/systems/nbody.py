@@ -39,6 +39,7 @@ class NBody(System):
 
     kernel = "nbody"
     reference = reference.NBody
+    complex_step = True
     axes = "bodies, dim"
 
     def __init__(

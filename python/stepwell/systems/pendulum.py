@@ -31,6 +31,7 @@ class Pendulum(System):
 
     kernel = "pendulum"
     reference = Reference
+    complex_step = True
 
     def __init__(self, omega: Any = 1.0, damping: Any = None, *, a: Any = None) -> None:
         self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")

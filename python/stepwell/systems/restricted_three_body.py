@@ -31,6 +31,7 @@ class RestrictedThreeBody(System):
 
     kernel = "restricted_three_body"
     reference = Reference
+    complex_step = True
     axes = "x and y"
     v_shape = y_shape = (2,)
     velocity_term = "the Coriolis force"

@@ -1,6 +1,8 @@
 //! The description of a system: words, whole numbers, rows of parameters and tables of samples, each by its name.
 
-use crate::{error::Error, number::Number};
+use std::sync::Arc;
+
+use crate::{error::Error, number::Number, systems::equations::Equations};
 
 /// The numbers of one parameter or input, for every member.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +58,8 @@ pub struct Given {
     pub rows: Vec<(String, Vec<bool>)>,
     /// Sampled inputs, and whether all members have all samples in common.
     pub tables: Vec<(String, bool)>,
+    /// The rates of a user's own system, whose parameters and inputs these are.
+    pub equations: Option<Arc<Equations>>,
 }
 
 fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {

@@ -39,7 +39,7 @@ pub trait System<N: Number> {
     }
 
     /// The gradient of the energy at the state whose velocities and energies these are.
-    fn gradient(&self, _v: &Block<N>, _energies: &Energies<N>) -> Option<Gradient<N>> {
+    fn gradient(&self, _v: &Block<N>, _y: &Block<N>, _energies: &Energies<N>) -> Option<Gradient<N>> {
         None
     }
 
@@ -99,7 +99,7 @@ pub struct Kind {
     /// The term that depends on the velocity, if there is one: methods that need an acceleration refuse it.
     pub velocity_term: fn(&Given) -> Option<&'static str>,
     /// Quantities that can be recorded, and how many numbers each has. The `energy` is among them if it can be controlled.
-    pub quantities: fn(&Given) -> Vec<(&'static str, usize)>,
+    pub quantities: fn(&Given) -> Vec<(String, usize)>,
     /// Approximate number of operations of both rates: with many, a step is not a single tape.
     pub operations: fn(&Given) -> usize,
     /// The rates of one large member, where they are written by hand.

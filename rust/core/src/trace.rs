@@ -64,6 +64,8 @@ pub struct Tapes {
     pub start: Option<Stage>,
     /// Turns what the method carries into velocities.
     pub finish: Option<Stage>,
+    /// A step that tells the velocities before it behind the next state, for a run that keeps all of them; none if the state has them.
+    pub shown: Option<Stage>,
     /// The recorded numbers, behind v and y.
     pub record: Option<Stage>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
@@ -390,14 +392,13 @@ impl Scene {
     pub fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
         let fused = |tape: Tape, next: &[Id]| if self.fused { fuse(&tape, next) } else { tape };
-        let mut start = None;
-        let mut finish = None;
+        let (mut start, mut finish) = (None, None);
         if let How::Method { name, choice } = &self.how {
             let method = method(name)?;
-            for (stage, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
+            for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
                     let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
-                    *stage = Some(cut(&self.given, &(fused(tape, &next), next)));
+                    *slot = Some((fused(tape, &next), next));
                 }
             }
         }
@@ -406,8 +407,16 @@ impl Scene {
             quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
-        let step = cut(&self.given, &(fused(steps.tape, &steps.next), steps.next));
-        Ok(Tapes { step, start, finish, record: quantities, written })
+        let step = (fused(steps.tape, &steps.next), steps.next);
+        let shown = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
+            let (mut both, mut next) = step.clone();
+            let place = both.take_over(tape);
+            next.extend(velocities[..steps.shape.v].iter().map(|id| place[*id as usize]));
+            (both, next)
+        });
+        let [start, finish, shown] = [start, finish, shown].map(|made| made.map(|made| cut(&self.given, &made)));
+        let step = cut(&self.given, &step);
+        Ok(Tapes { step, start, finish, shown, record: quantities, written })
     }
 }
 

@@ -11,7 +11,7 @@ use stepwell_core::{
     isa::{Level, UnknownLevel},
     run::{
         Machine, Model,
-        batch::{Arrays, Plan, run, saves},
+        batch::{Arrays, Plan, kept, run, save},
         stage::{Clock, PreparedStage, Stage},
         world::World,
     },
@@ -186,7 +186,7 @@ fn kernels_are_chosen_by_name() {
 
 #[test]
 fn kept_steps() {
-    let kept = |steps, every| saves(steps, every).collect::<Vec<_>>();
+    let kept = |steps, every| (0..kept(steps, every)).map(|i| save(steps, every, i)).collect::<Vec<_>>();
     assert_eq!(kept(10, None), [10]);
     assert_eq!(kept(10, Some(1)).len(), 11);
     assert_eq!(kept(10, Some(3)), [0, 3, 6, 9, 10]);

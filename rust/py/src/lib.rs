@@ -4,7 +4,10 @@ mod model;
 mod tape;
 mod world;
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn};
+use numpy::{
+    PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn,
+    ndarray::Dimension,
+};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
@@ -89,15 +92,16 @@ struct ArraysOf<'py> {
     carried: bool,
     saved_v: PyReadwriteArrayDyn<'py, f64>,
     saved_y: PyReadwriteArrayDyn<'py, f64>,
-    recorded: PyReadwriteArrayDyn<'py, f64>,
-    tally: PyReadwriteArray1<'py, f64>,
-    carry: PyReadwriteArrayDyn<'py, f64>,
+    recorded: Option<PyReadwriteArrayDyn<'py, f64>>,
+    tally: Option<PyReadwriteArray1<'py, f64>>,
+    carry: Option<PyReadwriteArrayDyn<'py, f64>>,
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept. Whether somebody diverged, now or
+/// before.
 #[pyfunction]
-fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<()> {
+fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
     let plan_of_core = Plan {
@@ -115,12 +119,36 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
     let to_fill = Arrays {
         saved_v: arrays.saved_v.as_slice_mut()?,
         saved_y: arrays.saved_y.as_slice_mut()?,
-        recorded: arrays.recorded.as_slice_mut()?,
-        tally: arrays.tally.as_slice_mut()?,
-        carry: arrays.carry.as_slice_mut()?,
+        recorded: filled(&mut arrays.recorded)?,
+        tally: filled(&mut arrays.tally)?,
+        carry: filled(&mut arrays.carry)?,
         first_bad: arrays.first_bad.as_slice_mut()?,
     };
-    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))
+    interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))?;
+    Ok(!arrays.first_bad.as_slice()?.iter().all(|step| *step < 0))
+}
+
+/// The numbers of an array; none if there is no array.
+fn filled<'a, D: Dimension>(array: &'a mut Option<PyReadwriteArray<'_, f64, D>>) -> PyResult<&'a mut [f64]> {
+    array.as_mut().map_or(Ok(&mut []), |array| Ok(array.as_slice_mut()?))
+}
+
+/// The times of the states that a run keeps.
+#[pyfunction]
+fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
+    let clock = Clock { t0: plan.t0, h: plan.dt };
+    let numbers = t.as_slice_mut()?;
+    // Whole numbers up to 2⁵³ are exact, so that they can be counted as what they are multiplied as, several at once.
+    let every = plan.every.unwrap_or(plan.steps) as f64;
+    let ahead: [f64; 16] = std::array::from_fn(|i| i as f64 * every);
+    for (i, chunk) in numbers.chunks_mut(ahead.len()).enumerate() {
+        let k = plan.first as f64 + (i * ahead.len()) as f64 * every;
+        chunk.iter_mut().zip(&ahead).for_each(|(t, ahead)| *t = clock.t0 + (k + ahead) * clock.h);
+    }
+    if let Some(last) = numbers.last_mut() {
+        *last = clock.at(plan.first + plan.steps);
+    }
+    Ok(())
 }
 
 /// When the state is asked for, and how long to try: see `Pacing` in `engine.py`.
@@ -343,11 +371,13 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
+    m.add_function(wrap_pyfunction!(times, m)?)?;
     m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_class::<ModelSpec>()?;
+    m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;
     m.add_class::<world::World>()?;

@@ -1,5 +1,7 @@
 //! What to step: names, parameters and tables that stay Python's.
 
+use std::sync::Arc;
+
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::{
     prelude::*,
@@ -9,6 +11,7 @@ use stepwell_core::{
     error::Error,
     run::Model,
     spec::{Given, Row, Spec, Table},
+    systems::equations,
     trace::{How, Scene},
 };
 
@@ -31,12 +34,26 @@ pub fn core_error(error: Error) -> PyErr {
     error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
 }
 
-/// What is given under a name: a word, a whole number, rows of a parameter, or samples with their start and interval.
+/// The rates of a user's own system.
+#[pyclass(module = "stepwell._core", frozen)]
+pub struct Equations(pub Arc<equations::Equations>);
+
+#[pymethods]
+impl Equations {
+    /// Whether a rate of v depends on v.
+    #[getter]
+    fn reads_v(&self) -> bool {
+        self.0.reads_v()
+    }
+}
+
+/// What is given under a name: a word, a whole number, rows of a parameter, samples with their start and interval, or rates.
 enum Value {
     Word(String),
     Whole(usize),
     Samples((f64, f64, Py<PyArray2<f64>>)),
     Rows(Py<PyArray2<f64>>),
+    Equations(Arc<equations::Equations>),
 }
 
 // By the type that it has: a derived one would try each, and an exception for what it is not takes longer than all else in a short call.
@@ -50,6 +67,8 @@ impl<'py> FromPyObject<'_, 'py> for Value {
             given.extract().map(Value::Word)
         } else if given.is_instance_of::<PyTuple>() {
             given.extract().map(Value::Samples)
+        } else if let Ok(rates) = given.cast::<Equations>() {
+            Ok(Value::Equations(Arc::clone(&rates.get().0)))
         } else {
             given.extract().map(Value::Whole)
         }
@@ -114,6 +133,7 @@ impl ModelSpec {
                     names.rows.push((name, vec![members == 1; count]));
                     rows.push(array);
                 }
+                Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).readonly().as_array().ncols() == 1;
                     names.tables.push((name, common));

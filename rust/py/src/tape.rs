@@ -9,13 +9,14 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
+    systems::equations::{self, Invariant},
     tape::{self, Id, Op, fuse::fuse, print},
     trace,
 };
 
 use crate::{
     kinds_of,
-    model::{ModelSpec, core_error},
+    model::{Equations, ModelSpec, core_error},
 };
 
 type Shared = Arc<Mutex<tape::Tape>>;
@@ -47,6 +48,9 @@ pub struct Symbol {
     #[pyo3(get)]
     id: Id,
 }
+
+/// An invariant: its value, its derivatives by v and by y, and the square of their length.
+type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Symbol>>, PyRef<'py, Symbol>);
 
 /// A symbol, or a number that becomes one.
 enum Value<'py> {
@@ -182,6 +186,10 @@ impl Symbol {
     fn add_bits(&self, bits: u64) -> Symbol {
         self.with_bits(bits, Op::AddBits)
     }
+    /// A number on the tape of this symbol.
+    fn number(&self, x: f64) -> Symbol {
+        self.on(|_| Op::Const(x.to_bits()))
+    }
     /// Bits moved up.
     fn shift_up(&self, places: u32) -> Symbol {
         self.on(|id| Op::ShiftUp(id, places & 63))
@@ -276,6 +284,33 @@ impl Tape {
             operations.push(operation(*op, |operand| place[operand as usize]));
         }
         Ok((operations, roots.into_iter().map(|root| place[root as usize]).collect()))
+    }
+
+    /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the invariant that
+    /// a projection keeps its value, its derivatives by v and by y, and the square of their length.
+    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None))]
+    fn equations(
+        &self,
+        dv: Vec<PyRef<'_, Symbol>>,
+        dy: Option<Vec<PyRef<'_, Symbol>>>,
+        quantities: Vec<(String, PyRef<'_, Symbol>)>,
+        kept: Option<Kept<'_>>,
+    ) -> PyResult<Equations> {
+        let tape = lock(&self.0);
+        let known = |symbol: &PyRef<'_, Symbol>| -> PyResult<Id> {
+            let fits = Arc::ptr_eq(&self.0, &symbol.tape) && (symbol.id as usize) < tape.ops().len();
+            if fits { Ok(symbol.id) } else { Err(PyIndexError::new_err("a symbol of another tape")) }
+        };
+        let all = |symbols: &[PyRef<'_, Symbol>]| symbols.iter().map(known).collect::<PyResult<Vec<Id>>>();
+        let dv = all(&dv)?;
+        let dy = dy.map(|dy| all(&dy)).transpose()?;
+        let quantities =
+            quantities.into_iter().map(|(name, symbol)| Ok((name, known(&symbol)?))).collect::<PyResult<Vec<_>>>()?;
+        let kept = kept.map(|(value, along_v, along_y, square)| -> PyResult<Invariant> {
+            Ok(Invariant { value: known(&value)?, along_v: all(&along_v)?, along_y: all(&along_y)?, square: known(&square)? })
+        });
+        let made = equations::Equations::new(tape.ops().to_vec(), dv, dy, quantities, kept.transpose()?);
+        Ok(Equations(Arc::new(made.without_the_rest())))
     }
 
     /// A tape with fused multiply-adds in what these values need, and the values on it.

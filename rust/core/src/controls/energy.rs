@@ -63,8 +63,8 @@ impl<N: Number> System<N> for Controlled<N> {
         self.system.energies(v, y)
     }
 
-    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
-        self.system.gradient(v, energies)
+    fn gradient(&self, v: &Block<N>, y: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        self.system.gradient(v, y, energies)
     }
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {

@@ -30,7 +30,9 @@ pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
         "projection" => "control.way",
         _ => return Err(given.unknown("control")),
     };
-    if !(kind.quantities)(given).iter().any(|(quantity, _)| *quantity == "energy") {
+    let has_energy = (kind.quantities)(given).iter().any(|(quantity, _)| quantity == "energy");
+    let has_gradient = given.equations.as_ref().is_some_and(|equations| equations.has_gradient());
+    if !has_energy && !has_gradient {
         return Err(given.unknown("control"));
     }
     match (name, given.word(name)) {

@@ -43,7 +43,7 @@ impl<N: Number> Projected<N> {
         let energies = self.system.energies(v, y)?;
         let off = energies.whole - self.target;
         if self.nacozy {
-            let along = self.system.gradient(v, &energies)?;
+            let along = self.system.gradient(v, y, &energies)?;
             let step = nacozy(off, self.h, along.square);
             self.work.set(self.work.get() - off);
             return Some((v.zip_map(&along.v, |v, along| v - step * along), y.zip_map(&along.y, |y, along| y - step * along)));
@@ -71,8 +71,8 @@ impl<N: Number> System<N> for Projected<N> {
         self.system.energies(v, y)
     }
 
-    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
-        self.system.gradient(v, energies)
+    fn gradient(&self, v: &Block<N>, y: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        self.system.gradient(v, y, energies)
     }
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {

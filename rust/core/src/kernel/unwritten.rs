@@ -29,6 +29,11 @@ pub fn choose_long(_: &Body, _: Level, _: usize) -> Option<Shape> {
     None
 }
 
+/// The shape for several steps of rows of so many numbers.
+pub fn choose_trail(_: &Body, _: Level, _: usize) -> Option<Shape> {
+    None
+}
+
 /// Writes a kernel, which cannot be.
 pub fn write(_: &Body, _: Shape) -> Option<Interpreter> {
     None

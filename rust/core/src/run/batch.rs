@@ -60,12 +60,9 @@ pub struct Arrays<'a> {
     pub first_bad: &'a mut [i64],
 }
 
-/// Steps, counted from the first, at which a run keeps its state.
-pub fn saves(steps: i64, every: Option<i64>) -> impl Iterator<Item = i64> {
-    let step = every.unwrap_or(steps).max(1);
-    let from = if every.is_some() { 0 } else { steps };
-    let last = (every.is_some() && steps % step != 0).then_some(steps);
-    (from..=steps).step_by(step as usize).chain(last)
+/// The step, counted from the first, after which a run saves its `i`-th state.
+pub fn save(steps: i64, every: Option<i64>, i: usize) -> i64 {
+    every.map_or(steps, |every| every.max(1).saturating_mul(i as i64).min(steps))
 }
 
 /// How many states a run keeps.
@@ -180,6 +177,8 @@ struct Good {
     tally: Vec<f64>,
     carried: Vec<f64>,
     recorded: Vec<f64>,
+    /// The state before a trail.
+    before: Vec<f64>,
 }
 
 /// One thread's groups, and where it stands.
@@ -228,7 +227,7 @@ impl<'a> Worker<'a> {
             let mut good = std::mem::take(&mut self.good);
             let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
-            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, looked: plan.first };
+            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, checked: plan.first };
             let ran = job.run(go_on);
             self.good = good;
             if !ran {
@@ -238,6 +237,13 @@ impl<'a> Worker<'a> {
         }
         Ok(())
     }
+}
+
+/// How many steps are made between two checks, now and at most, and when the last one was.
+struct Checks {
+    piece: i64,
+    longest: i64,
+    began: Instant,
 }
 
 /// One group's run.
@@ -251,12 +257,25 @@ struct Job<'a, 'b> {
     count: usize,
     good: &'a mut Good,
     /// The step of the state that is remembered there.
-    looked: i64,
+    checked: i64,
 }
 
 /// Copies the rows of a group into those from the `at`-th on, as far as there are any.
 #[inline]
 fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f64], lanes: usize) {
+    let all = (slot.len() / lanes).min(rows.rows().saturating_sub(at));
+    if all == 0 {
+        return;
+    }
+    if let Some(whole) = rows.whole(at, all) {
+        if whole.len() == slot.len() {
+            whole.copy_from_slice(slot);
+        } else {
+            let rows = whole.chunks_exact_mut(whole.len() / all);
+            rows.zip(slot.chunks_exact(lanes)).for_each(|(row, slot)| row[from..from + count].copy_from_slice(&slot[..count]));
+        }
+        return;
+    }
     for (i, slot) in (at..rows.rows()).zip(slot.chunks_exact(lanes)) {
         match (rows.row(i), slot) {
             // A call that copies one number takes longer than the number.
@@ -285,43 +304,39 @@ impl Job<'_, '_> {
 
         let mut k = plan.first;
         let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
-        let mut piece = if numbers > LARGE_MEMBER_NUMBERS {
+        let first = if numbers > LARGE_MEMBER_NUMBERS {
             1
         } else {
             (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL)
         };
-        let mut began = Instant::now();
+        let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
-        let keeps_all = plan.every == Some(1) && !self.carries && self.group.recorded() == 0;
-        let trail = if keeps_all { self.group.trail() as i64 } else { 0 };
-        let mut saves = saves(plan.steps, plan.every).enumerate();
-        while let Some((i, save)) = saves.next() {
-            let until = plan.first + save;
-            let room = (self.looked + piece).min(plan.first + plan.steps) - k;
-            if i > 0 && trail > 0 && trail <= room && k % trail == 0 {
-                self.save_trail(i, k);
-                k += trail;
-                saves.nth(trail as usize - 2); // a trail has several steps
-                continue;
-            }
+        let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
+        let trail = if keeps_all { self.group.trail(&plan.model.spec, self.part.first + self.from, self.count) } else { 0 };
+        let mut i = 0;
+        while i < kept(plan.steps, plan.every) {
+            let until = plan.first + save(plan.steps, plan.every, i);
             while k < until {
-                let n = (until - k).min(self.looked + piece - k);
+                let n = (until - k).min(self.checked + checks.piece - k);
                 self.group.advance(k, n);
                 k += n;
-                if k - self.looked >= piece {
-                    let done = k - self.looked;
-                    self.look(k);
-                    let now = Instant::now();
-                    piece = if now - began > POLL { (piece / 2).max(1) } else { longest.min(4 * piece) };
-                    began = now;
-                    if !go_on((done * self.count as i64) as u64) {
-                        return false;
-                    }
+                if !self.check_if_due(k, &mut checks, go_on) {
+                    return false;
                 }
             }
-            self.save(i, k);
+            let room = (self.checked + checks.piece).min(plan.first + plan.steps) - k;
+            let steps = trail as i64;
+            if trail == 0 || steps > room || k % steps != 0 || !self.save_trail(i, k, trail) {
+                self.save(i, k);
+                i += 1;
+                continue;
+            }
+            (i, k) = (i + trail, k + steps);
+            if !self.check_if_due(k, &mut checks, go_on) {
+                return false;
+            }
         }
-        let left = k - self.looked;
+        let left = k - self.checked;
         if left > 0 && self.is_suspect() {
             self.retrace(k);
         }
@@ -331,6 +346,19 @@ impl Job<'_, '_> {
         put(&mut self.part.carry, 0, self.from, self.count, self.group.slots().0, lanes);
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         true
+    }
+
+    /// Checks at step `k` which members diverged, if a check is due; false if the run is to end.
+    fn check_if_due(&mut self, k: i64, checks: &mut Checks, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
+        let done = k - self.checked;
+        if done < checks.piece {
+            return true;
+        }
+        self.check(k);
+        let now = Instant::now();
+        checks.piece = if now - checks.began > POLL { (checks.piece / 2).max(1) } else { checks.longest.min(4 * checks.piece) };
+        checks.began = now;
+        go_on((done * self.count as i64) as u64)
     }
 
     fn save(&mut self, i: usize, k: i64) {
@@ -354,29 +382,33 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Makes the steps of a trail from step `k`, and keeps the states after them, the first of which is the `i`-th.
-    fn save_trail(&mut self, i: usize, k: i64) {
+    /// Makes the steps of a trail from step `k`, and saves the states before each; the first is the `i`-th saved state. If a velocity that
+    /// is computed from the carry is not finite, the old state is restored and nothing is saved, and false is returned: then the steps are
+    /// made one by one, to find which member diverged and at which step.
+    fn save_trail(&mut self, i: usize, k: i64, steps: usize) -> bool {
         let lanes = self.group.lanes();
         let (p, q) = (self.plan.v.len(), self.plan.y.len());
-        let steps = self.group.trail();
         let (from, count) = (self.from, self.count);
-        let states = self.group.advance_on_trail(k);
-        let numbers = states.len() / steps;
-        let whole = (self.part.saved_v.whole(i * p, steps * p), self.part.saved_y.whole(i * q, steps * q));
-        if let (1, 1, (Some(v), Some(y))) = (lanes, self.part.count, whole) {
-            for (rows, first, size) in [(v, 0, p), (y, p, q)] {
-                // Number after number: a call that copies one or two takes longer than they do.
-                for i in 0..size {
-                    let of_states = states[first + i..].iter().step_by(numbers);
-                    rows[i..].iter_mut().step_by(size).zip(of_states).for_each(|(to, from)| *to = *from);
-                }
-            }
-            return;
+        if self.carries {
+            let ((v, y), tally) = (self.group.slots(), self.group.tally());
+            self.good.before.clear();
+            [v, y, tally].iter().for_each(|slot| self.good.before.extend_from_slice(slot));
         }
-        for (s, state) in states.chunks_exact(numbers).enumerate() {
-            put(&mut self.part.saved_v, (i + s) * p, from, count, &state[..p * lanes], lanes);
-            put(&mut self.part.saved_y, (i + s) * q, from, count, &state[p * lanes..(p + q) * lanes], lanes);
+        let (v, y) = self.group.advance_on_trail(k).split_at(steps * p * lanes);
+        let first_bad = &self.part.first_bad[from..from + count];
+        let is_new = |row: &[f64]| row.iter().zip(first_bad).any(|(x, first_bad)| *first_bad < 0 && !x.is_finite());
+        if self.carries && !all_below(v, f64::INFINITY) && v.chunks_exact(lanes).any(is_new) {
+            let (v, y) = self.group.slots_mut();
+            let (old_v, others) = self.good.before.split_at(v.len());
+            let (old_y, old_tally) = others.split_at(y.len());
+            v.copy_from_slice(old_v);
+            y.copy_from_slice(old_y);
+            self.group.tally_mut().copy_from_slice(old_tally);
+            return false;
         }
+        put(&mut self.part.saved_v, i * p, from, count, v, lanes);
+        put(&mut self.part.saved_y, i * q, from, count, y, lanes);
+        true
     }
 
     /// From now on the v slot holds velocities, until `unfinish`.
@@ -399,15 +431,14 @@ impl Job<'_, '_> {
         for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
             keep(good, now);
         }
-        self.looked = k;
+        self.checked = k;
     }
 
     /// Whether a member that was finite so far has a number in its slots that is not below this size.
     fn any_new(&self, size: f64) -> bool {
         let (v, y) = self.group.slots();
-        // All numbers of a chunk are compared, which is vector code; only if one is not below is its member searched.
-        let all_below = |slot: &[f64]| slot.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)));
-        !(all_below(v) && all_below(y)) && (0..self.count).any(|l| self.is_new(l, size))
+        // Members are searched one by one only if some number is not below.
+        !(all_below(v, size) && all_below(y, size)) && (0..self.count).any(|l| self.is_new(l, size))
     }
 
     fn is_new(&self, l: usize, size: f64) -> bool {
@@ -424,7 +455,7 @@ impl Job<'_, '_> {
         self.any_new(most)
     }
 
-    fn look(&mut self, k: i64) {
+    fn check(&mut self, k: i64) {
         if self.is_suspect() {
             self.retrace(k);
         } else {
@@ -434,7 +465,7 @@ impl Job<'_, '_> {
 
     /// Finds which members diverged since the last check and at which step, and checks step `k`, in whose state the group is.
     fn retrace(&mut self, k: i64) {
-        let steps = k - self.looked;
+        let steps = k - self.checked;
         if steps == 1 {
             self.note(k);
             self.finish(k);
@@ -450,12 +481,12 @@ impl Job<'_, '_> {
         y.copy_from_slice(&self.good.y);
         self.group.tally_mut().copy_from_slice(&self.good.tally);
         let piece = (steps as u64).div_ceil(RETRACE_INTERVALS as u64) as i64;
-        let mut at = self.looked;
+        let mut at = self.checked;
         while at < k {
             let n = piece.min(k - at);
             self.group.advance(at, n);
             at += n;
-            self.look(at);
+            self.check(at);
         }
     }
 
@@ -472,6 +503,11 @@ impl Job<'_, '_> {
 /// Whether a number is smaller than a size; a NaN is not.
 fn is_below(x: f64, size: f64) -> bool {
     x.abs() < size
+}
+
+/// Whether all numbers are smaller. All numbers of a chunk are compared, which is vector code.
+fn all_below(numbers: &[f64], size: f64) -> bool {
+    numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)))
 }
 
 fn keep(to: &mut Vec<f64>, numbers: &[f64]) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, Kit, PreparedStage, Stage},
+    stage::{Clock, Kit, Numbers, PreparedStage, Stage},
     workers::Stop,
 };
 use crate::{
@@ -44,12 +44,14 @@ pub trait Group: Send + Sync {
     /// `n` steps from step `k`.
     fn advance(&mut self, k: i64, n: i64);
 
-    /// How many steps one call of [`Group::advance_on_trail`] makes; 0 if that is not faster than step by step.
-    fn trail(&self) -> usize {
+    /// How many steps of these members, which were prepared before, one call of [`Group::advance_on_trail`] makes; 0 if that is not faster
+    /// than step by step.
+    fn trail(&mut self, _spec: &Spec, _first: usize, _count: usize) -> usize {
         0
     }
 
-    /// So many steps from step `k`, a multiple of them: the states after each, one after the other, v slots and y together.
+    /// Makes that many steps from step `k`, a multiple of their number. Returns the velocities before each step, then the coordinates
+    /// before each step.
     fn advance_on_trail(&mut self, _k: i64) -> &[f64] {
         &[]
     }
@@ -100,6 +102,8 @@ pub struct Lanes {
     level: Level,
     clock: Clock,
     step: PreparedStage,
+    /// A step that also returns the velocities, for a run that saves all of them.
+    shown: Option<PreparedStage>,
     start: Option<SideStage>,
     finish: Option<SideStage>,
     record: Option<SideStage>,
@@ -126,6 +130,7 @@ impl Lanes {
             start: side(&tapes.start),
             finish: side(&tapes.finish),
             record: side(&tapes.record),
+            shown: None,
             step,
             tapes,
             shape: traced.shape,
@@ -187,12 +192,24 @@ impl Group for Lanes {
         self.step.advance(&self.tapes.step, &self.clock, k, n as usize, &mut self.state);
     }
 
-    fn trail(&self) -> usize {
-        self.step.trail(&self.tapes.step, self.level)
+    fn trail(&mut self, spec: &Spec, first: usize, count: usize) -> usize {
+        let numbers = Numbers { state: self.state.len() / self.lanes(), v: self.shape.v, y: self.shape.y };
+        let (level, lanes, clock) = (self.level, self.lanes(), &self.clock);
+        let Some(stage) = &self.tapes.shown else { return self.step.trail(&self.tapes.step, level, numbers) };
+        let make = || PreparedStage::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
+        let shown = self.shown.get_or_insert_with(make);
+        let steps = shown.trail(stage, level, numbers);
+        if steps > 0 {
+            shown.prepare(stage, spec, first, count);
+        }
+        steps
     }
 
     fn advance_on_trail(&mut self, k: i64) -> &[f64] {
-        self.step.advance_on_trail(&self.tapes.step, &self.clock, k, &mut self.state)
+        match (&mut self.shown, &self.tapes.shown) {
+            (Some(shown), Some(stage)) => shown.advance_on_trail(stage, &self.clock, k, &mut self.state),
+            _ => self.step.advance_on_trail(&self.tapes.step, &self.clock, k, &mut self.state),
+        }
     }
 
     fn finish(&mut self, k: i64) {

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::aligned::Aligned;
 use crate::{
     isa::Level,
-    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner},
+    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner, writer},
     spec::Spec,
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
@@ -35,11 +35,11 @@ pub struct Kit {
     step: Runner,
     /// Once for each time that comes alone.
     moment: Runner,
-    /// Several steps, with the states between; none where it does not pay.
+    /// Several steps at once; none where that does not pay.
     trail: OnceLock<Option<Trail>>,
 }
 
-/// Several steps at once that keep the state after each, for a run that keeps them all.
+/// Several steps in one call that also return the states between, for a run that saves them all: see [`Body::trail`].
 struct Trail {
     runner: Runner,
     steps: usize,
@@ -47,19 +47,34 @@ struct Trail {
 
 /// The most operations of a trail, so that its code stays in the instruction cache.
 const TRAIL_OPERATIONS: usize = 2000;
+/// The most numbers that a trail returns: they must stay in the cache until they are copied to the saved states.
+const TRAIL_NUMBERS: usize = 1 << 14;
 /// The fewest and the most steps of a trail. They divide the number of steps of a table.
 const TRAIL_STEPS: [usize; 2] = [4, 64];
-/// The most lanes of a trail. The states of larger batches are already saved as fast as memory allows.
-const TRAIL_LANES: usize = 16;
 
 impl Trail {
-    fn new(split: &Split, level: Level, lanes: usize) -> Option<Trail> {
+    fn new(split: &Split, level: Level, lanes: usize, numbers: Numbers) -> Option<Trail> {
         let [least, most] = TRAIL_STEPS;
-        let steps = (TRAIL_OPERATIONS / split.body.work().max(1)).clamp(1, most);
+        let shape = writer::choose_trail(&split.body, level, lanes);
+        let vectors = shape.map_or(1, |shape| shape.layout().block_vectors);
+        let shown = numbers.v + numbers.y;
+        let by_code = TRAIL_OPERATIONS / ((split.body.work() + shown) * vectors).max(1);
+        let steps = by_code.min(TRAIL_NUMBERS / (shown * lanes).max(1)).clamp(1, most);
         let steps = 1 << steps.ilog2();
-        let pays = steps >= least && lanes <= TRAIL_LANES;
-        pays.then(|| Trail { runner: Runner::long(&split.body.trail(steps), level, lanes), steps })
+        let body = || split.body.trail(steps, numbers.state, [numbers.v, numbers.y]);
+        (steps >= least).then(|| Trail { runner: Runner::shaped(&body(), level, lanes, shape), steps })
     }
+}
+
+/// How many numbers a member's state has, and how many of them are v and y.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers {
+    /// All of them.
+    pub state: usize,
+    /// Of the v slot, which come first.
+    pub v: usize,
+    /// Of y, which come next.
+    pub y: usize,
 }
 
 impl Kit {
@@ -315,18 +330,19 @@ impl PreparedStage {
     }
 
     /// How many steps a trail has; none if there is no trail.
-    pub fn trail(&self, stage: &Stage, level: Level) -> usize {
-        let make = || Trail::new(&stage.split, level, self.lanes());
+    pub fn trail(&self, stage: &Stage, level: Level, numbers: Numbers) -> usize {
+        let make = || Trail::new(&stage.split, level, self.lanes(), numbers);
         self.kit.trail.get_or_init(make).as_ref().map_or(0, |trail| trail.steps)
     }
 
-    /// The steps of a trail from step `k`, a multiple of them: the states after each, one after the other.
+    /// Makes the steps of a trail from step `k`, a multiple of their number. Returns the velocities before each step, then the
+    /// coordinates before each step.
     pub fn advance_on_trail(&mut self, stage: &Stage, clock: &Clock, k: i64, state: &mut [f64]) -> &[f64] {
         let kit = Arc::clone(&self.kit);
         let Some(Some(trail)) = kit.trail.get() else { return &[] };
         let numbers = state.len();
         if self.trail.is_empty() {
-            self.trail = Aligned::new(numbers * (trail.steps + 1));
+            self.trail = Aligned::new(trail.runner.body().next.len() * self.lanes());
         }
         let (entries, mut table) = (stage.split.entries.len(), Vec::new());
         let mut from = (0, 0);

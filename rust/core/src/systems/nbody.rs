@@ -48,10 +48,11 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     Ok(Shape { v: n * dim, y: n * dim })
 }
 
-fn quantities(given: &Given) -> Vec<(&'static str, usize)> {
+fn quantities(given: &Given) -> Vec<(String, usize)> {
     let dim = given.whole("dim");
     let spin = if dim == 2 { 1 } else { 3 };
-    vec![("energy", 1), ("momentum", dim), ("angular_momentum", spin), ("closest", 1)]
+    let sizes = [("energy", 1), ("momentum", dim), ("angular_momentum", spin), ("closest", 1)];
+    sizes.map(|(name, numbers)| (name.to_owned(), numbers)).to_vec()
 }
 
 pub(crate) fn law(given: &Given) -> Option<Law> {
@@ -166,7 +167,7 @@ impl<N: Number> System<N> for Bodies<N> {
     }
 
     /// m·v in the velocities and −m·a in the coordinates.
-    fn gradient(&self, v: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+    fn gradient(&self, v: &Block<N>, _y: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
         let of =
             |block: &Block<N>| Block::from_iterator(block.len(), (0..block.len()).map(|r| self.masses[r / self.dim] * block[r]));
         let (v, y) = (of(v), -of(&energies.dv.map(|dv| dv / self.h)));

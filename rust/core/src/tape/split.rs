@@ -123,41 +123,47 @@ impl Body {
         }
     }
 
-    /// The body of so many steps, one after the other, which keeps the state after each: behind its numbers follow those after the first
-    /// step, after the second and so on.
+    /// The body of so many steps, one after the other, which shows the states between: behind the numbers of the last state stand the
+    /// velocities before each step, and behind these the coordinates, so many numbers as `sizes` says. Where the body makes more than the
+    /// next state, which has `state` numbers, those are the velocities before a step, and what stands in their place is carried.
     #[must_use]
-    pub fn trail(&self, steps: usize) -> Body {
+    pub fn trail(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
         let mut trail = Body::default();
         let mut leaves: QuickMap<Op, Id> = QuickMap::default();
-        let mut state: Vec<Option<Id>> = vec![None; self.next.len()];
-        let mut kept = Vec::with_capacity(steps * self.next.len());
+        let mut leaf = |trail: &mut Body, op: Op| {
+            *leaves.entry(op).or_insert_with(|| {
+                trail.ops.push(op);
+                trail.ops.len() as Id - 1
+            })
+        };
+        let mut now: Vec<Id> = (0..state as u32).map(|s| leaf(&mut trail, Op::State(s))).collect();
+        let mut shown = sizes.map(|size| Vec::with_capacity(steps * size));
         let mut place = vec![0; self.ops.len()];
         for step in 0..steps {
             let before = (step * self.per_step) as u32;
             for (id, op) in self.ops.iter().enumerate() {
-                let leaf = match *op {
+                let op = match *op {
                     Op::PerStep(i) => Op::PerStep(before + i),
                     Op::Held(i) => Op::Held(before + i),
                     other => other,
                 };
-                place[id] = match leaf {
-                    Op::State(s) if state[s as usize].is_some() => state[s as usize].unwrap_or_default(),
-                    leaf if leaf.is_leaf() => *leaves.entry(leaf).or_insert_with(|| {
-                        trail.ops.push(leaf);
-                        trail.ops.len() as Id - 1
-                    }),
+                place[id] = match op {
+                    Op::State(s) => now[s as usize],
+                    Op::Copy(of) => place[of as usize],
+                    op if op.is_leaf() => leaf(&mut trail, op),
                     op => {
                         trail.ops.push(op.with(|operand| place[operand as usize]));
                         trail.ops.len() as Id - 1
                     }
                 };
             }
-            for (value, id) in state.iter_mut().zip(&self.next) {
-                *value = Some(place[*id as usize]);
-                kept.push(place[*id as usize]);
-            }
+            let made: Vec<Id> = self.next.iter().map(|id| place[*id as usize]).collect();
+            let (next, velocities) = made.split_at(state);
+            shown[0].extend_from_slice(if velocities.is_empty() { &now[..sizes[0]] } else { velocities });
+            shown[1].extend_from_slice(&now[sizes[0]..][..sizes[1]]);
+            now.copy_from_slice(next);
         }
-        trail.next = state.into_iter().flatten().chain(kept).collect();
+        trail.next = now.into_iter().chain(shown.into_iter().flatten()).collect();
         trail.finished()
     }
 
@@ -432,6 +438,16 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> 
 }
 
 impl Tape {
+    /// Takes over what another tape holds; gives the place of each of its values. What was decided there, such as which products were
+    /// fused, stays.
+    pub fn take_over(&mut self, other: &Tape) -> Vec<Id> {
+        let mut place: Vec<Id> = Vec::with_capacity(other.ops().len());
+        for op in other.ops() {
+            place.push(self.keep(op.with(|operand| place[operand as usize])));
+        }
+        place
+    }
+
     /// As `push`, but it does not count as written.
     fn keep_or_fold(&mut self, op: Op) -> Id {
         match self.fold(op) {

@@ -237,43 +237,63 @@ fn rounding_is_to_nearest_whatever_the_caller_does() {
     assert_eq!(after & OTHER_ROUNDING, OTHER_ROUNDING);
 }
 
-/// The body of several steps that keeps the states between has the bits of these steps, interpreted and written.
+/// The body of several steps that shows the states between has the bits of these steps, interpreted and written: of states that stand
+/// between steps, and of such as are made of them, as velocities are of what is carried.
 #[test]
 fn a_trail_has_the_states_of_its_steps() {
-    let mut seen = 0;
-    for seed in 0..400u64 {
+    let (mut seen, mut seen_carried) = (0, 0);
+    for seed in 0..800u64 {
         let random = &mut Random(seed.wrapping_mul(0xA076_1D64_78BD_642F) ^ 7);
-        let (operations, states) = (3 + random.below(40), 1 + random.below(5));
-        let body = random::body(random, operations, states);
-        let (lanes, steps, numbers) = (random.one_of(&[1, 4, 8]), 1 + random.below(9), body.next.len());
-        let trail = body.trail(steps);
+        let (operations, made) = (3 + random.below(40), 1 + random.below(5));
+        let body = random::body(random, operations, made);
+        // The last of what is made are velocities that are shown in the place of the first of the state.
+        let carried = random.below(2) * (made / 2);
+        let state = made - carried;
+        let v = if carried > 0 { carried } else { random.below(state + 1) };
+        let y = random.below(state - v + 1);
+        let is_whole = |op: &Op| !matches!(op, Op::State(s) if *s as usize >= state);
+        if !body.ops.iter().all(is_whole) {
+            continue; // it reads as a number of the state what would be made in a step
+        }
+        let (lanes, steps) = (random.one_of(&[1, 4, 8]), 1 + random.below(9));
+        let trail = body.trail(steps, state, [v, y]);
         let inputs = Inputs::new(random, &body, lanes, steps);
         // One after the other.
         let oracle = Interpreter::new(&body, lanes, Level::Baseline);
-        let mut want = Vec::new();
+        let (mut want_v, mut want_y) = (Vec::new(), Vec::new());
         let mut now = inputs.clone();
         for step in 0..steps {
             now.steps = 1;
             now.per_step = inputs.per_step[step * body.per_step..].to_vec();
-            now.state = now.run(&oracle, &mut Vec::new());
-            want.extend_from_slice(&now.state);
+            let after = now.run(&oracle, &mut Vec::new());
+            let (next, velocities) = after.split_at(state * lanes);
+            want_v.extend_from_slice(if carried > 0 { velocities } else { &now.state[..v * lanes] });
+            want_y.extend_from_slice(&now.state[v * lanes..(v + y) * lanes]);
+            now.state[..state * lanes].copy_from_slice(next);
         }
         // At once.
         let mut all = Inputs { steps: 1, ..inputs };
-        all.state.resize((steps + 1) * numbers * lanes, 0.0);
+        all.state.truncate(state * lanes);
+        all.state.resize(trail.next.len() * lanes, 0.0);
         let width = if lanes == 1 { 1 } else { 4 };
-        let shape = Shape { level: Level::Avx2, width, block_vectors: 1, interleaved: 1, blocks: lanes / width, resident: false };
+        let block_vectors = random.one_of(&[1, lanes / width]);
+        let blocks = lanes / width / block_vectors;
+        let shape = Shape { level: Level::Avx2, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
         let written = Level::Avx2.here().then(|| write(&trail, shape).expect("a kernel"));
         let interpreter = Interpreter::new(&trail, lanes, Level::Baseline);
         for kernel in
             [Some(&interpreter as &dyn Kernel), written.as_ref().map(|kernel| kernel as &dyn Kernel)].into_iter().flatten()
         {
             let got = all.run(kernel, &mut Vec::new());
-            let (last, kept) = got.split_at(numbers * lanes);
-            assert!(kept.iter().zip(&want).all(|(got, want)| same(*got, *want)), "seed {seed}, {steps} steps, {lanes} lanes");
-            assert!(last.iter().zip(&now.state).all(|(got, want)| same(*got, *want)), "seed {seed}: the last state");
-            seen += kept.len();
+            let (last, shown) = got.split_at(state * lanes);
+            assert_eq!(shown.len(), want_v.len() + want_y.len(), "seed {seed}");
+            let want = want_v.iter().chain(&want_y);
+            assert!(shown.iter().zip(want).all(|(got, want)| same(*got, *want)), "seed {seed}, {steps} steps, {lanes} lanes");
+            let want = &now.state[..state * lanes];
+            assert!(last.iter().zip(want).all(|(got, want)| same(*got, *want)), "seed {seed}: the last state");
+            seen += shown.len();
+            seen_carried += carried;
         }
     }
-    assert!(seen > 10_000, "{seen}");
+    assert!(seen > 10_000 && seen_carried > 100, "{seen}, {seen_carried}");
 }

@@ -34,6 +34,15 @@ pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     fits.then_some(Shape { level, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })
 }
 
+/// The shape for several steps of this body in one call, over rows of a given number of lanes; None as above. As many vectors are
+/// interleaved as hide the latency: such code is too long for the CPU to begin another vector before one has made its last step.
+pub fn choose_trail(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
+    let long = choose_long(body, level, lanes)?;
+    let vectors = lanes / long.width;
+    let together = (1..=interleaving(body, level).min(vectors)).rev().find(|n| vectors.is_multiple_of(*n))?;
+    Some(Shape { block_vectors: together, interleaved: together, blocks: vectors / together, ..long })
+}
+
 fn fastest(body: &Body, level: Level, members: usize) -> Shape {
     let width = match (level, members) {
         (_, 0..=1) => 1,

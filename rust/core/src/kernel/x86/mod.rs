@@ -9,7 +9,7 @@ mod loops;
 mod plan;
 mod write;
 
-pub use choose::{choose, choose_long};
+pub use choose::{choose, choose_long, choose_trail};
 
 use super::{
     Kernel, Layout, Tile,

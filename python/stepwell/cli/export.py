@@ -1,0 +1,64 @@
+"""Write a step as source code of C, JavaScript, Python or Rust, to be taken along into an engine."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .. import _checks
+from ..exports import LANGUAGES, export
+from ..scenes import scene, scenes
+from . import show
+from .explain import system_and_control
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "system",
+        metavar="SYSTEM",
+        help="a scene, see stepwell scenes, with its start and its control; or a system by its class, such as Pendulum",
+    )
+    parser.add_argument("--method", required=True, metavar="METHOD", help="a method; see stepwell methods")
+    parser.add_argument("--language", required=True, metavar="LANGUAGE", help=f"{', '.join(LANGUAGES)}")
+    parser.add_argument(
+        "--dt", type=float, metavar="H", help="the step that the file begins with (default: the scene's, or 0.01)"
+    )
+    parser.add_argument("--start", metavar="START", help="how a method with a choice starts")
+    parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    parser.add_argument("--name", metavar="NAME", help="what functions and types are called, or begin with")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it there instead of printing it")
+    show.json_option(parser)
+
+
+def command(args: argparse.Namespace) -> None:
+    """Look up, export, write, tell."""
+    system, control = system_and_control(args.system)
+    language = LANGUAGES[_checks.known("language", args.language, tuple(LANGUAGES))]
+    if args.output is not None:
+        _checks.file("-o", args.output, language.endings)
+    state: dict[str, Any] = {}
+    if args.system in [each.name for each in scenes()]:
+        found = scene(args.system)
+        state = {"v": found.v, "y": found.y, "dt": found.dt}
+    if args.dt is not None:
+        state["dt"] = args.dt
+    step = export(
+        system,
+        args.method,
+        args.language,
+        start=args.start,
+        control=control,
+        fused=args.fused,
+        name=args.name,
+        **state,
+    )
+    written = show.Written()
+    if args.output is not None:
+        written.write(args.output, step.save)
+    if args.json:
+        show.print_json(step.as_dict())
+    else:
+        print("\n".join(written.notes()) if written.files else step.source.removesuffix("\n"))
+    written.close()

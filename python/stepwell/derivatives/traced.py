@@ -1,0 +1,172 @@
+"""A system's rates, and a step of it by a method, traced with their derivatives."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from .._core import Symbol, Tape
+from ..errors import ShapeError
+from ..methods import Method
+from ..reference.marks import Marks, recording
+from ..reference.traced import Tracer
+from ..systems import System
+from .evaluate import Evaluation
+from .modes import directional, jacobian
+
+#: How many systems' derivatives are kept: a search for a limit asks for the same ones over and over.
+MAX_KEPT = 8
+
+#: Up to so many lines of a tape times numbers of a state each element of a matrix has lines of its own, of which none are for
+#: what is zero for sure. Longer ones are differentiated along one change, and NumPy does it for all changes at once.
+MAX_WHOLE = 20_000
+
+
+class Traced:
+    """Values that depend on a system's state, on a tape of their own.
+
+    Attributes:
+        system: whose state it is.
+        tape: where everything stands.
+        marks: the functions on it.
+        state: the symbols of a member's numbers, v first.
+        roots: the values.
+        length: how many numbers a state has.
+    """
+
+    def __init__(self, system: System, what: str, method: Method | None = None) -> None:
+        self.system = system
+        self.tape = Tape()
+        self.marks: Marks = {}
+        self.length = prod(system.v_shape) + prod(system.y_shape)
+        self.state = [self.tape.state(i) for i in range(self.length)]
+        tracer = Tracer(system, self.tape)
+        with recording(self.marks):
+            self.roots = _roots(tracer, what, method)[: self.length]
+        if len(self.roots) != self.length:
+            raise ShapeError(f"system: expected {self.length} rates, one for each number of a state, got {len(self.roots)}")
+        self.numbers = dict(enumerate(tracer.numbers))
+        self.tables = tracer.tables
+
+    def evaluation(self, roots: Sequence[Symbol]) -> Evaluation:
+        """Values on the tape, to be computed."""
+        return Evaluation(self.tape, roots, self.numbers, self.tables)
+
+    def rows(self, v: Array, y: Array) -> list[Array]:
+        """The numbers of a state, one after the other, each of the shape of the batch."""
+        blocks = ((v, self.system.v_shape), (y, self.system.y_shape))
+        return [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
+
+    def jacobian(self) -> Evaluation:
+        """The values' derivatives with respect to the state, row after row, and behind them the values."""
+        rows = jacobian(self.tape, self.roots, self.state, self.marks)
+        return self.evaluation([each for row in rows for each in row] + self.roots)
+
+    def tangent(self) -> Evaluation:
+        """The values, and their derivatives along a change of the state whose numbers come behind the state's own.
+
+        Behind those is room for what a control adds up, so the changes are the states from ``room`` on.
+        """
+        changes = [self.tape.state(self.room + i) for i in range(self.length)]
+        pairs = zip(self.state, changes, strict=True)
+        return self.evaluation(self.roots + directional(self.tape, self.roots, pairs, self.marks))
+
+    @property
+    def room(self) -> int:
+        """The number of the state at which the changes begin."""
+        return self.length + 1
+
+
+def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
+    """The symbols of the rates at step 1, of a step's next slots, or of what finishes a slot."""
+    found: list[Symbol]
+    if method is None:
+        s, (v, y, _) = tracer.scaled(1.0), tracer.state()
+        t = tracer.tape.time()
+        found = tracer.flat(*_wide(tracer.system, s.dv(t, v, y), s.dy(t, v, y)))
+    elif what == "step":
+        found = tracer.step(method)
+    else:
+        found = tracer.slot(method, what, 0)
+    return found
+
+
+def _wide(system: System, dv: Any, dy: Any) -> tuple[Any, Any]:
+    """Rates over whole blocks."""
+    return tuple(np.broadcast_to(each, shape) for each, shape in ((dv, system.v_shape), (dy, system.y_shape)))  # type: ignore[return-value]
+
+
+class _Kept(NamedTuple):
+    """A derivative and what it is of; ``whole`` if it has a line for each element of the matrix, else it is along one change."""
+
+    system: System
+    what: str
+    method: Method | None
+    evaluation: Evaluation
+    whole: bool
+
+
+#: The last derivatives that were asked for.
+_last: deque[_Kept] = deque(maxlen=MAX_KEPT)
+
+
+def _kept(system: System, what: str, method: Method | None) -> _Kept:
+    """The derivative, traced anew unless this very system was asked for shortly before.
+
+    An equal one is not enough: a user's function may have been traced anew in between, with other numbers around it.
+    """
+    for each in tuple(_last):
+        if each.system is system and each.what == what and each.method is method:
+            return each
+    traced = Traced(system, what, method)
+    whole = len(traced.tape) * traced.length <= MAX_WHOLE
+    kept = _Kept(system, what, method, traced.jacobian() if whole else traced.tangent(), whole)
+    _last.append(kept)
+    return kept
+
+
+def matrix(
+    system: System, what: str, method: Method | None, members: Shape, v: Array, y: Array, t: Any = 0.0, h: Any = 1.0
+) -> tuple[Array, Array]:
+    """The derivative of what a system does at a state, and what it does there.
+
+    Args:
+        system: the system.
+        what: "rates", the "step" of a method from slot to slot, or its "finish" from slots to states.
+        method: of a step.
+        members: the shape to which states, parameters, times and steps broadcast.
+        v: the velocities, or what stands in their place, shape (*block, *batch).
+        y: the coordinates.
+        t: the time, a number or of the shape of the members.
+        h: the step, likewise.
+
+    Returns:
+        Arrays of shapes (n, n, *members) and (n, *members).
+    """
+    kept = _kept(system, what, method)
+    n = prod(system.v_shape) + prod(system.y_shape)
+    blocks = ((v, system.v_shape), (y, system.y_shape))
+    rows = [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
+    nothing = np.zeros(())  # what a control has added up has no part in it
+    if kept.whole:
+        values = np.empty((n * n + n, *members))
+        for k, value in enumerate(kept.evaluation([*rows, nothing], t, h)):
+            values[k] = value
+        return values[: n * n].reshape(n, n, *members), values[n * n :]
+    changes = np.eye(n).reshape(n, n, *(1,) * len(members))  # of each number, in every direction at once
+    derivative, values = np.empty((n, n, *members)), np.empty((n, *members))
+    for k, value in enumerate(kept.evaluation([*rows, nothing, *changes], t, h)):
+        (values if k < n else derivative)[k % n] = value
+    return derivative, values
+
+
+def together(system: System, v: Array, y: Array, **more: Any) -> Shape:
+    """The shape to which states, parameters and whatever else broadcast."""
+    batches = {"v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    return _checks.batch_shape({"system": system.batch} | batches | {name: np.shape(each) for name, each in more.items()})

@@ -1,0 +1,138 @@
+"""``jacobian``: the derivative of a system's rates at a state."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array, Shape
+from .._value import Value
+from ..derivatives import traced
+from ..stability import eigen, maps
+from ..stability.analysis import velocities
+from ..stability.eigen import Complex
+from ..systems import System
+from ..systems.base import a_system
+
+#: A state of more numbers than this has its Jacobian by the complex step if the system allows it: the tape of its derivatives
+#: would be long.
+MAX_TRACED_NUMBERS = 64
+
+
+class Jacobian(Value):
+    """The derivative of the rates (v̇, ẏ) with respect to the state (v, y), for n numbers of a state and a batch of members.
+
+    Attributes:
+        system: whose rates.
+        v: the velocities of the state, shape (*block, *batch).
+        y: its coordinates, likewise.
+        t: its time.
+        matrix: shape (n, n, *members): rows are the numbers of v̇, then those of ẏ; columns those of v, then those of y. In 1 per
+            unit of time, times the unit of the row's number over that of the column's.
+        rates: v̇ and ẏ themselves, shape (n, *members).
+        names: what the n numbers are called.
+    """
+
+    def __init__(self, system: System, v: Array, y: Array, t: float, matrix: Array, rates: Array) -> None:
+        self.system = system
+        self.v, self.y, self.t = v, y, t
+        self.matrix = matrix
+        self.rates = rates
+        self.names = tuple(_names("v", system.v_shape) + _names("y", system.y_shape))
+
+    def _block(self, row: int, column: int) -> Array:
+        n_v = maps.size(self.system)[0]
+        halves = slice(0, n_v), slice(n_v, None)
+        return self.matrix[halves[row], halves[column]]
+
+    @property
+    def vv(self) -> Array:
+        """∂v̇/∂v: damping, and what turns with the velocity."""
+        return self._block(0, 0)
+
+    @property
+    def vy(self) -> Array:
+        """∂v̇/∂y: minus the stiffness, per mass."""
+        return self._block(0, 1)
+
+    @property
+    def yv(self) -> Array:
+        """∂ẏ/∂v: the identity where ẏ = v."""
+        return self._block(1, 0)
+
+    @property
+    def yy(self) -> Array:
+        """∂ẏ/∂y."""
+        return self._block(1, 1)
+
+    @property
+    def eigenvalues(self) -> Complex:
+        """The rates λ at which small disturbances grow and turn, shape (n, *members), the largest real part first."""
+        return by_growth(self.matrix)
+
+    def __repr__(self) -> str:
+        members = self.matrix.shape[2:]
+        what = f"{prod(members)} members" if members else f"largest growth {self.eigenvalues[0].real:.6g}"
+        return f"<Jacobian of {self.system!r}: {len(self.matrix)} × {len(self.matrix)}, {what}>"
+
+
+def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobian:
+    """The derivative of a system's rates at a state, exact but for rounding.
+
+    The rates are traced and their tape is differentiated, operation by operation; nothing is approximated by differences. It does
+    for a user's own equations what it does for built-in ones. States of more than 64 numbers of a built-in system take the
+    complex step instead, which is as exact.
+
+    Args:
+        system: whose rates; parameters may be arrays.
+        y: the coordinates, shape (*block, *batch), or one number for all.
+        v: the velocities, likewise; a system that has none needs none.
+        t: the time, which matters where the rates depend on it otherwise than by adding an input.
+
+    Returns:
+        A ``Jacobian``: ``matrix`` of shape (n, n, *members), and its blocks ``vv``, ``vy``, ``yv`` and ``yy``.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the rates depend on the state by an operation that has no derivative.
+
+    Example:
+        >>> sw.jacobian(sw.Pendulum(omega=2.0), v=0.0, y=0.0).matrix
+        array([[ 0., -4.],
+               [ 1.,  0.]])
+    """
+    system = a_system(system).sized(v, y)
+    v = _checks.block("v", velocities(system, v), system.v_shape, system.axes)
+    y = _checks.block("y", y, system.y_shape, system.axes)
+    t = _checks.number("t", t, unit="units of time")
+    n = sum(maps.size(system))
+    _checks.fits("the matrices", 2 * n * n + n, traced.together(system, v, y), "ask for fewer")
+    return Jacobian(system, v, y, t, *linearised(system, v, y, t))
+
+
+def linearised(system: System, v: Array, y: Array, t: Any = 0.0) -> tuple[Array, Array]:
+    """The derivative of the rates at states, shape (n, n, *members), and the rates there, shape (n, *members)."""
+    members = traced.together(system, v, y, t=t)
+    if not system.complex_step or sum(maps.size(system)) <= MAX_TRACED_NUMBERS:
+        return traced.matrix(system, "rates", None, members, v, y, t)
+    matrix = np.broadcast_to(maps.rates(system, t, v, y), (*[sum(maps.size(system))] * 2, *members))
+    with np.errstate(all="ignore"):
+        s = system.scaled(1.0, members)
+        both = ((s.dv(t, v, y), system.v_shape), (s.dy(t, v, y), system.y_shape))
+    return matrix, np.concatenate([np.broadcast_to(each, (*shape, *members)).reshape(-1, *members) for each, shape in both])
+
+
+def by_growth(matrix: Array) -> Complex:
+    """Eigenvalues, the largest real part first; of equal ones, the fastest first, and of a pair the positive angle first."""
+    values = eigen.eigenvalues(matrix)
+    size = np.abs(values).max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        real = np.round(values.real / np.where(size > 0.0, size, 1.0), 9)
+    return np.take_along_axis(values, np.lexsort((-values.imag, -np.abs(values.imag), -real), axis=0), axis=0)
+
+
+def _names(block: str, shape: Shape) -> list[str]:
+    return [block + (str(list(map(int, index))) if index else "") for index in np.ndindex(shape)]

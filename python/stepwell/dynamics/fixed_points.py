@@ -1,0 +1,304 @@
+"""``equilibria``: where a system stays, and whether it comes back there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array
+from .._value import Value
+from ..errors import ArgumentError, ShapeError
+from ..integrate import fits_together
+from ..methods import Method
+from ..methods import method as find_method
+from ..stability import eigen, maps
+from ..stability.analysis import Analysis, analyse, state
+from ..stability.eigen import Complex
+from ..systems import System
+from ..systems.base import a_system
+from .at_state import by_growth, linearised
+
+#: Newton's steps from one start, and halvings of one of them.
+MAX_ITERATIONS, MAX_HALVINGS = 100, 30
+
+#: A start has arrived when a whole Newton step changes the state by less than this part of its size.
+ARRIVED = 1e-12
+
+#: A start whose Newton step is between this and ``ARRIVED`` has arrived too if no part of it makes the rates smaller: rounding is
+#: all that is left.
+NEARLY_ARRIVED = 1e-7
+
+#: Two that are nearer than this part of their size are one: far more than rounding, far less than what users tell apart.
+SAME = 1e-8
+
+#: A singular value of the Jacobian below this part of the largest is zero: the equilibrium is one of a line or a surface of them,
+#: or a double root.
+SINGULAR = 1e-10
+
+#: A real part is zero below this part of the fastest rate, beside what rounding makes.
+ZERO_RATE = 1e-9
+
+
+class Equilibrium(Value):
+    """A state at which both rates are zero.
+
+    Attributes:
+        v: its velocities, shape (*block).
+        y: its coordinates, likewise.
+        residual: the largest rate that is left by rounding.
+        eigenvalues: λ of the Jacobian there, shape (n,), the largest real part first: small disturbances grow as e^(λt).
+        kind: what the motion nearby does, by the eigenvalues: "sink" (all disturbances die), "source" (all grow), "saddle" (some
+            grow, some do not), "centre" (all turn, and to first order neither grow nor die), or "not decided" (one neither grows
+            nor turns, or some turn while others die: higher orders decide).
+        isolated: whether there is no other in every neighbourhood; False where the Jacobian is singular.
+        analysis: what a step of the method does there, as ``analyse`` tells it; None if no method was given.
+        starts: numbers of the starts that led here.
+    """
+
+    def __init__(
+        self,
+        v: Array,
+        y: Array,
+        residual: float,
+        eigenvalues: Complex,
+        kind: str,
+        isolated: bool,
+        analysis: Analysis | None,
+        starts: tuple[int, ...],
+    ) -> None:
+        self.v, self.y = v, y
+        self.residual = residual
+        self.eigenvalues = eigenvalues
+        self.kind = kind
+        self.isolated = isolated
+        self.analysis = analysis
+        self.starts = starts
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether small disturbances die; None where first order does not say so."""
+        return {"sink": True, "source": False, "saddle": False}.get(self.kind)
+
+    def __repr__(self) -> str:
+        step = "" if self.analysis is None else f", step: {self.analysis.kind}"
+        return f"<equilibrium at v = {self.v.tolist()}, y = {self.y.tolist()}: {self.kind}{step}>"
+
+
+class Equilibria(Value):
+    """Equilibria that were found, in the order of the starts that led there; a sequence of ``Equilibrium``.
+
+    Attributes:
+        system: whose.
+        found: each once.
+        lost: numbers of the starts that led nowhere.
+    """
+
+    def __init__(self, system: System, found: tuple[Equilibrium, ...], lost: tuple[int, ...]) -> None:
+        self.system = system
+        self.found = found
+        self.lost = lost
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __getitem__(self, k: int) -> Equilibrium:
+        return self.found[k]
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        return iter(self.found)
+
+    def __repr__(self) -> str:
+        lines = [f"<{len(self.found)} equilibria of {self.system!r}, {len(self.lost)} start(s) led nowhere>"]
+        return "\n  ".join(lines + [repr(each) for each in self.found])
+
+
+def equilibria(
+    system: System, *, near: Any, t: float = 0.0, method: str | Method | None = None, dt: float | None = None
+) -> Equilibria:
+    """The equilibria to which Newton's method leads from given states, each once, with their stability.
+
+    The Jacobian is exact, and a step that would make the rates larger is halved until it does not. Where it is singular, the
+    shortest step is taken. Rates that only vanish far away (bodies that part for ever) are not taken for an equilibrium.
+
+    Args:
+        system: of one member.
+        near: states (v, y) to start from, shapes (*block, *starts); v is None of a system that has no velocities.
+        t: the time at which inputs are held.
+        method: a method to analyse at each equilibrium, or None.
+        dt: its step, in units of time.
+
+    Returns:
+        ``Equilibria``: a sequence. An equilibrium that no start leads to is not found, and nobody can say how many there are.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the rates depend on the state by an operation that has no derivative, or the method cannot do the
+            system.
+
+    Example:
+        >>> [each.kind for each in sw.equilibria(sw.Pendulum(), near=(0.0, [0.3, 3.0]))]
+        ['centre', 'saddle']
+    """
+    system = a_system(system).sized(*(near if isinstance(near, (tuple, list)) else ()))
+    if system.batch:
+        raise ShapeError(f"system: expected one member to find the equilibria of, got a batch of shape {system.batch}")
+    v, y = state("near", system, near)
+    t = _checks.number("t", t, unit="units of time")
+    if (method is None) != (dt is None):
+        raise ArgumentError("method, dt: expected both or neither, got " + ("dt" if method is None else "method") + " alone")
+    how = None if method is None else find_method(method)
+    step = None if dt is None else _checks.number("dt", dt, positive=True, unit="units of time")
+    if how is not None:
+        fits_together(system, how)
+    starts = _starts(system, v, y)
+    n = sum(maps.size(system))
+    _checks.fits("the Jacobians", 8 * n * n, starts.shape[1:], "give fewer starts")
+    states, arrived = _newton(system, starts, t)
+    sizes, begun = _size(system, states), _size(system, starts)
+    found: list[tuple[Array, list[int]]] = []
+    for k in np.flatnonzero(arrived).tolist():
+        at = states[:, k]
+        for other, own in found:
+            # A coordinate that is 0 but for rounding is as large as those from which it came.
+            size = np.maximum(np.maximum(sizes[:, k], sizes[:, own[0]]), np.minimum(begun[:, k], begun[:, own[0]]))
+            if (np.abs(at - other) <= SAME * size).all():
+                own.append(k)
+                break
+        else:
+            found.append((at, [k]))
+    each = tuple(_equilibrium(system, at, t, how, step, tuple(own)) for at, own in found)
+    return Equilibria(system, each, tuple(np.flatnonzero(~arrived).tolist()))
+
+
+def _starts(system: System, v: Array, y: Array) -> Array:
+    """The starts as columns, shape (n, starts)."""
+    batch = _checks.batch_shape({"near, v": v.shape[len(system.v_shape) :], "near, y": y.shape[len(system.y_shape) :]})
+
+    def wide(block: Array, shape: tuple[int, ...]) -> Array:
+        own = block.shape[len(shape) :]
+        aligned = block.reshape((*shape, *(1,) * (len(batch) - len(own)), *own))
+        return np.broadcast_to(aligned, (*shape, *batch)).reshape(prod(shape), prod(batch))
+
+    return np.concatenate([wide(v, system.v_shape), wide(y, system.y_shape)])
+
+
+def _blocks(system: System, states: Array) -> tuple[Array, Array]:
+    n_v = maps.size(system)[0]
+    return tuple(  # type: ignore[return-value]
+        part.reshape((*shape, *states.shape[1:]))
+        for part, shape in ((states[:n_v], system.v_shape), (states[n_v:], system.y_shape))
+    )
+
+
+def _size(system: System, states: Array) -> Array:
+    """Of each number of states the largest magnitude in its block, shape (n, starts): blocks have units of their own."""
+    n_v = maps.size(system)[0]
+    size = np.abs(states)
+    for rows in (slice(0, n_v), slice(n_v, None)):
+        if size[rows].size:
+            size[rows] = size[rows].max(axis=0)
+    return size
+
+
+def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
+    """Where Newton's method leads from each column, and whether it arrived."""
+    states = states.copy()
+    arrived = np.zeros(states.shape[1], dtype=np.bool_)
+    alive = np.ones(states.shape[1], dtype=np.bool_)
+    least = _size(system, states)
+    least = np.where(least > 0.0, least, 1.0)
+    for _ in range(MAX_ITERATIONS):
+        which = np.flatnonzero(alive)
+        if not which.size:
+            break
+        at = states[:, which]
+        matrix, rates = linearised(system, *_blocks(system, at), t)
+        usable = np.isfinite(matrix).all(axis=(0, 1)) & np.isfinite(rates).all(axis=0)
+        alive[which[~usable]] = False
+        which, at, matrix, rates = which[usable], at[:, usable], matrix[:, :, usable], rates[:, usable]
+        if not which.size:
+            break
+        change = -_solved(matrix, rates)
+        relative = (np.abs(change) / np.maximum(_size(system, at), least[:, which])).max(axis=0)
+        there = relative <= ARRIVED
+        best, better = _damped(system, at, change, rates, t)
+        stuck = ~better & (relative <= NEARLY_ARRIVED)
+        states[:, which] = np.where(better, best, at)
+        arrived[which] = there | stuck
+        alive[which] = better & ~there
+    return states, arrived
+
+
+def _solved(matrix: Array, rates: Array) -> Array:
+    """The shortest x with matrix·x = rates, or nearest to it, for each column."""
+    of_rows, of_columns = _units(matrix)
+    stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
+    singular = np.linalg.svd(stacked, compute_uv=False)
+    regular = singular[:, -1] > SINGULAR * singular[:, 0]
+    found = np.empty(right.shape)
+    found[regular] = np.linalg.solve(stacked[regular], right[regular])
+    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=SINGULAR) @ right[~regular]
+    return np.asarray(found[:, :, 0].T / of_columns)
+
+
+def _units(matrix: Array) -> tuple[Array, Array]:
+    """What rows, and then columns, are divided by so that the largest element of each is 1: units do not matter then.
+
+    Forces that fade with the distance are small numbers beside the 1 of ẏ = v, and yet not zero.
+    """
+    of_rows = np.abs(matrix).max(axis=1)
+    of_rows = np.where(of_rows > 0.0, of_rows, 1.0)
+    of_columns = np.abs(matrix / of_rows[:, np.newaxis]).max(axis=0)
+    return of_rows, np.where(of_columns > 0.0, of_columns, 1.0)
+
+
+def _damped(system: System, at: Array, change: Array, rates: Array, t: float) -> tuple[Array, Any]:
+    """The states after the longest of the step, its half, its quarter, … that makes the rates smaller; and whether one does."""
+    before = np.abs(rates).max(axis=0)
+    best, better, share = at.copy(), np.zeros(at.shape[1], dtype=np.bool_), 1.0
+    for _ in range(MAX_HALVINGS):
+        left = np.flatnonzero(~better)
+        if not left.size:
+            break
+        tried = at[:, left] + share * change[:, left]
+        after = np.abs(linearised(system, *_blocks(system, tried), t)[1]).max(axis=0)
+        good = after < before[left] * (1.0 - 1e-4 * share)
+        best[:, left[good]], better[left[good]] = tried[:, good], True
+        share *= 0.5
+    return best, better
+
+
+def _equilibrium(
+    system: System, at: Array, t: float, method: Method | None, dt: float | None, starts: tuple[int, ...]
+) -> Equilibrium:
+    v, y = _blocks(system, at)
+    matrix, rates = linearised(system, v, y, t)
+    values = by_growth(matrix)
+    analysis = None
+    if method is not None:
+        linear = system.linear  # of such a system the step is the same at every state
+        with np.errstate(all="ignore"):  # a step of any length may be asked for
+            analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
+    of_rows, of_columns = _units(matrix)
+    singular = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns, compute_uv=False)
+    isolated = bool(singular[-1] > SINGULAR * singular[0])
+    return Equilibrium(v, y, float(np.abs(rates).max()), values, _kind(matrix, values), isolated, analysis, starts)
+
+
+def _kind(matrix: Array, values: Complex) -> str:
+    """What the motion nearby does."""
+    size = np.abs(values).max()
+    tolerance = ZERO_RATE * size
+    if len(matrix) > 2:
+        tolerance = np.maximum(tolerance, np.minimum(eigen.eigen(matrix).tolerance(0.0).max(), eigen.REFINE_ABOVE * size))
+    grows, dies = values.real > tolerance, values.real < -tolerance
+    if grows.any():
+        return "source" if grows.all() else "saddle"
+    if dies.all() and size > 0.0:
+        return "sink"
+    turns = ~dies & (np.abs(values.imag) > tolerance)
+    return "centre" if turns.all() else "not decided"

@@ -1,0 +1,223 @@
+"""``stepwell.system``: a user's function becomes a kind of system."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any, overload
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Shape
+from ..errors import ArgumentError, DTypeError, UnknownNameError
+from ..systems.inputs import Sampled, Sinusoid
+from .invariants import Invariant, invariant
+
+
+class Definition:
+    """A kind of system, defined by a function: called with its parameters it gives a ``System``.
+
+    What ``stepwell.system`` returns.
+
+    Attributes:
+        function: the function.
+        order: 1 for ẏ, 2 for v̇ with ẏ = v.
+        blocks: 2 if the function gives (v̇, ẏ).
+        shape: the declared shapes of the blocks v and y; None where the state tells.
+        parameters: names and defaults.
+        invariants: what was declared constant, by name.
+    """
+
+    def __init__(self, function: Callable[..., Any], order: int, blocks: int, shape: tuple[Any, Any]) -> None:
+        self.function, self.order, self.blocks, self.shape = function, order, blocks, shape
+        self.__name__ = self.name = function.__name__
+        self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
+        self.__wrapped__ = function
+        self.parameters = _parameters(function, 3 if self.has_v else 2)
+        self.invariants: dict[str, Invariant] = {}
+
+    @property
+    def has_v(self) -> bool:
+        """Whether the function takes v."""
+        return self.order == 2 or self.blocks == 2
+
+    def __call__(self, /, **given: Any) -> Any:
+        """The system with these parameters; what is not given has its default.
+
+        Args:
+            given: by name: a number, an array over the batch (behind the axes of its own, if the default has some), a
+                ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
+
+        Raises:
+            ArgumentError: if there is no such parameter, or it is no finite number.
+        """
+        from ..systems.own import OwnSystem
+
+        for name in given:
+            if name not in self.parameters:
+                known = ", ".join(self.parameters) or "none"
+                raise UnknownNameError(f"{self.name}: there is no parameter {_checks.short(name)}. Known: {known}.")
+        return OwnSystem(self, {**self.parameters, **given})
+
+    def invariant(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Declare what is constant in the true motion; a decorator.
+
+        It can then be recorded, charted, and kept by ``Control`` or ``Projection``, by the name of the function. Its gradient is
+        derived.
+
+        Args:
+            function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` of a first-order system, that returns one number;
+                parameters are those of the system, by name. One that is called ``energy`` is what ``run.energy`` shows.
+
+        Returns:
+            The function.
+
+        Raises:
+            ArgumentError: if the system has no such parameter.
+
+        Example:
+            >>> @sw.system
+            ... def pendulum(t, v, y, *, omega=1.0):
+            ...     return -omega**2 * np.sin(y)
+            >>> @pendulum.invariant
+            ... def energy(v, y, *, omega):
+            ...     return 0.5 * v**2 + omega**2 * (1 - np.cos(y))
+        """
+        made = invariant(self, function)
+        self.invariants[made.name] = made
+        return function
+
+    def __repr__(self) -> str:
+        return f"<system {self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})>"
+
+    def __deepcopy__(self, memo: Any) -> Definition:
+        return self  # nothing of it changes
+
+    def __copy__(self) -> Definition:
+        return self
+
+    def __reduce__(self) -> Any:
+        found: Any = sys.modules.get(self.__module__)
+        for part in self.__qualname__.split("."):
+            found = getattr(found, part, None)
+        if found is not self:
+            raise ArgumentError(
+                f"{self.name}: an own system is pickled by the name of its function, so expected one at the top of a module, "
+                f"got {self.__module__}.{self.__qualname__}"
+            )
+        return _found, (self.__module__, self.__qualname__)
+
+
+def _found(module: str, name: str) -> Any:
+    """A definition, by reference."""
+    import importlib
+
+    found: Any = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
+    """Names and defaults of what comes behind the time and the state."""
+    name = function.__name__
+    expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
+    given = list(inspect.signature(function).parameters.values())
+    positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+    parameters = {}
+    for each in given:
+        if each in positional[:state]:
+            continue
+        if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD, each.POSITIONAL_ONLY):
+            raise ArgumentError(f"{name}: expected parameters with names, {expected}, got {each}")
+        if each.default is each.empty:
+            raise ArgumentError(f"{name}: expected a default of the parameter {each.name}, such as {each.name}=1.0")
+        parameters[each.name] = each.default
+    for parameter, default in parameters.items():
+        if not isinstance(default, (Sinusoid, Sampled)) and not callable(default):
+            _checks.numbers(f"{name}: default of {parameter}", default)
+    return parameters
+
+
+@overload
+def system(function: Callable[..., Any], /) -> Definition: ...
+@overload
+def system(*, order: int = 2, blocks: int = 1, shape: Any = None) -> Callable[[Callable[..., Any]], Definition]: ...
+def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: Any = None) -> Any:
+    """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
+
+    The function is run with values that stand for numbers, and what it does with them is written down; so it is run once for a
+    system and never during a step. It is written for one member: batches come by themselves.
+
+    Args:
+        function: ``f(t, v, y, *, parameters)`` that returns v̇, while ẏ is v; with ``order=1``, ``f(t, y, *, parameters)`` that
+            returns ẏ, as SciPy's ``solve_ivp`` takes it; with ``blocks=2``, ``f(t, v, y, *, parameters)`` that returns the pair
+            (v̇, ẏ). v̇ and ẏ have the shapes of v and y. Each parameter has a default. If that is an array, its axes are the
+            parameter's own, and those of a batch come behind them.
+        order: 1 or 2.
+        blocks: 2 for a function that gives both rates.
+        shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
+            is not given, the state that a run begins with tells: its first axes, as few as the function can do with.
+
+    Returns:
+        A ``Definition``: called with parameters by name, it gives a ``System``.
+
+    Raises:
+        ArgumentError: what is wrong with the function's arguments.
+        TraceError: when the system meets its first state: where the function does what cannot be traced, with the line.
+
+    Example:
+        >>> import numpy as np, stepwell as sw
+        >>> @sw.system
+        ... def duffing(t, v, y, *, alpha=-1.0, beta=1.0, delta=0.3, gamma=0.5, omega=1.2):
+        ...     return gamma * np.cos(omega * t) - delta * v - alpha * y - beta * y**3
+        >>> run = sw.integrate(duffing(beta=[0.5, 1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.01, steps=1000)
+        >>> run.y.shape
+        (1, 3)
+    """
+    order = _checks.count("order", order, 1, 2)
+    blocks = _checks.count("blocks", blocks, 1, 2)
+    if blocks == 2 and order == 1:
+        raise ArgumentError("blocks: expected 1 with order=1, whose state is one block; for (v̇, ẏ) leave order out")
+    shapes = _shapes(shape, order, blocks)
+
+    def define(function: Any) -> Definition:
+        if isinstance(function, Definition):
+            raise DTypeError(f"function: {function.name} is a system already")
+        if not isinstance(function, FunctionType):
+            raise DTypeError(f"function: expected a Python function such as f(t, v, y), got {type(function).__name__}")
+        return Definition(function, order, blocks, shapes)
+
+    return define if function is None else define(function)
+
+
+def _shapes(shape: Any, order: int, blocks: int) -> tuple[Any, Any]:
+    """The declared shapes of v and y, None where nothing was declared."""
+    if blocks == 2:
+        if shape is None:
+            return None, None
+        if not isinstance(shape, (tuple, list)) or len(shape) != 2 or any(not isinstance(each, (tuple, list)) for each in shape):
+            raise ArgumentError(f"shape: expected a pair of shapes, of v and of y, since blocks=2, got {_checks.short(shape)}")
+        return _shape(shape[0]), _shape(shape[1])
+    one = None if shape is None else _shape(shape)
+    return (one if order == 2 else (0,)), one
+
+
+def _shape(shape: Any) -> tuple[int | None, ...]:
+    if isinstance(shape, (int, np.integer)):
+        shape = (shape,)
+    if not isinstance(shape, (tuple, list)):
+        raise ArgumentError(f"shape: expected lengths such as (3,) or (None, 2), got {_checks.short(shape)}")
+    return tuple(None if each is None else _checks.count("shape", each, 1) for each in shape)
+
+
+def fits(shape: Shape, declared: tuple[int | None, ...] | None) -> bool:
+    """Whether a shape is as declared."""
+    return declared is None or (
+        len(shape) == len(declared) and all(want in (None, got) for got, want in zip(shape, declared, strict=True))
+    )

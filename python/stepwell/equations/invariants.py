@@ -1,0 +1,123 @@
+"""Invariants of own systems: what is constant in the true motion, with its gradient, which is derived from its tape."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import cached_property
+from itertools import count
+from math import prod
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from ..errors import ArgumentError
+from ..reference.marks import recording
+from ..reference.replayed import Operations
+
+if TYPE_CHECKING:
+    from .definition import Definition
+    from .trace import Equations
+
+
+class Invariant(NamedTuple):
+    """A quantity that is constant in the true motion.
+
+    Attributes:
+        name: of the function.
+        function: of v and y, or of y alone in a first-order system, and of parameters of the system by name.
+        parameters: their names.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    parameters: tuple[str, ...]
+
+
+def invariant(definition: Definition, function: Any) -> Invariant:
+    """A function of a state as an invariant of a system; see ``Definition.invariant``."""
+    if not inspect.isfunction(function):
+        raise ArgumentError(f"{definition.name}: expected a function as an invariant, got {type(function).__name__}")
+    name = f"{definition.name}: {function.__name__}"
+    state = ("v", "y") if definition.has_v else ("y",)
+    given = list(inspect.signature(function).parameters.values())
+    head, rest = given[: len(state)], given[len(state) :]
+    if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
+        raise ArgumentError(f"{name}: expected a function ({', '.join(state)}, *, …), got ({', '.join(map(str, given))})")
+    for each in rest:
+        if each.name not in definition.parameters:
+            known = ", ".join(definition.parameters) or "none"
+            raise ArgumentError(f"{name}: the system has no parameter {each.name!r}. Known: {known}.")
+    return Invariant(function.__name__, function, tuple(each.name for each in rest))
+
+
+class Traced:
+    """An invariant of a system of known shapes: its value, and its gradient, as operations.
+
+    Args:
+        invariant: what it is.
+        equations: the system.
+    """
+
+    def __init__(self, invariant: Invariant, equations: Equations) -> None:
+        self.invariant, self.equations = invariant, equations
+        shapes = equations.own_shapes
+        if changing := [each for each in invariant.parameters if shapes[each] is None]:
+            raise ArgumentError(
+                f"{equations.name}: {invariant.name}: {', '.join(changing)} changes with the time, so nothing made of it is "
+                f"constant"
+            )
+        self._tape = _core.Tape()
+        numbers = map(self._tape.param, count())
+        parameters = {each: _symbols(shapes[each], numbers) for each in invariant.parameters}
+        state = map(self._tape.state, count())
+        v, y = _symbols(equations.v_shape, state), _symbols(equations.y_shape, state)
+        with recording() as self._marks:
+            made = equations.of_state(invariant, v, y, parameters)
+        self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
+        self._state = [*v.flat, *y.flat]
+        self._of_value = Operations(*self._tape.operations([self._value]))
+
+    @cached_property
+    def _of_gradient(self) -> Operations:
+        from ..derivatives import gradient  # takes its time, and only gradients need it
+
+        along = gradient(self._tape, self._value, self._state, self._marks)
+        square = along[0] * along[0]
+        for each in along[1:]:
+            square = square + each * each
+        return Operations(*self._tape.operations([*along, square]))
+
+    def value(self, v: Any, y: Any, given: dict[str, Any]) -> Any:
+        """The invariant of a state."""
+        return self._made(self._of_value, v, y, given)[0]
+
+    def gradient(self, v: Any, y: Any, given: dict[str, Any]) -> tuple[list[Any], list[Any], Any]:
+        """Its derivatives by the numbers of v and of y, and the square of their length."""
+        *along, square = self._made(self._of_gradient, v, y, given)
+        n_v = prod(self.equations.v_shape)
+        return along[:n_v], along[n_v:], square
+
+    def _made(self, operations: Operations, v: Any, y: Any, given: dict[str, Any]) -> list[Any]:
+        equations = self.equations
+        state = [*_numbers(v, equations.v_shape), *_numbers(y, equations.y_shape)]
+        numbers: list[Any] = []
+        for name in self.invariant.parameters:
+            value = np.asarray(given[name])
+            numbers += _numbers(value, value.shape[: equations.own_axes(name)])
+        with np.errstate(all="ignore"):
+            return operations(state, numbers)
+
+
+def _symbols(shape: Any, symbols: Any) -> Any:
+    made = np.empty(shape, dtype=object)
+    for index in np.ndindex(*shape):
+        made[index] = next(symbols)
+    return made
+
+
+def _numbers(block: Any, shape: Any) -> list[Any]:
+    """The numbers of a block, each of the shape of the batch, or symbols."""
+    block = np.asarray(block)
+    return [block[index] for index in np.ndindex(*shape)]

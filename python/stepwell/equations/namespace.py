@@ -1,0 +1,123 @@
+"""The names ``np`` and ``math`` within a user's function.
+
+NumPy hands most of its functions to values that know them better. ``np.array`` it does not, and ``math`` knows floats alone; so a
+user's function is run with these names meaning what its values need, and so are functions of the same module that it calls.
+"""
+
+from __future__ import annotations
+
+import builtins
+import math
+from contextlib import suppress
+from types import CellType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from .arrays import ELEMENTWISE, elementwise_named
+from .values import Operators, array
+
+
+def _holds(x: Any) -> bool:
+    """Whether there is a value in it that is not known."""
+    if isinstance(x, Operators):
+        return True
+    if isinstance(x, np.ndarray):
+        return x.dtype == object and any(isinstance(each, Operators) for each in x.flat)
+    return isinstance(x, (list, tuple)) and any(map(_holds, x))
+
+
+def _array(given: Any, *rest: Any, **options: Any) -> Any:
+    return array(given) if _holds(given) else np.array(given, *rest, **options)
+
+
+def _asarray(given: Any, *rest: Any, **options: Any) -> Any:
+    if isinstance(given, Operators):
+        return given
+    return array(given) if _holds(given) else np.asarray(given, *rest, **options)
+
+
+class _Module:
+    """A module some of whose names mean something else."""
+
+    def __init__(self, module: ModuleType, names: dict[str, Any]) -> None:
+        self._module, self._names = module, names
+
+    def __getattr__(self, name: str) -> Any:
+        names = object.__getattribute__(self, "_names")
+        return names[name] if name in names else getattr(object.__getattribute__(self, "_module"), name)
+
+
+#: Functions of ``math`` that NumPy calls otherwise.
+OF_MATH = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power", "fabs": "abs"}
+
+
+def _of_math(name: str, function: Any) -> Any:
+    numpy_name = OF_MATH.get(name, name)
+
+    def of_any(*given: Any) -> Any:
+        return elementwise_named(numpy_name, *given) if any(map(_holds, given)) else function(*given)
+
+    return of_any
+
+
+_NUMPY = _Module(
+    np,
+    {
+        "array": _array,
+        "asarray": _asarray,
+        "asanyarray": _asarray,
+        "ascontiguousarray": _asarray,
+        "float64": lambda x: x if _holds(x) else np.float64(x),
+    },
+)
+_MATH = _Module(
+    math,
+    {name: _of_math(name, getattr(math, name)) for name in dir(math) if name in ELEMENTWISE or name in OF_MATH},
+)
+#: What names of another meaning stand for.
+_MEANING: dict[int, Any] = {
+    id(np): _NUMPY,
+    id(math): _MATH,
+    id(np.array): _array,
+    id(np.asarray): _asarray,
+} | {id(getattr(math, name)): meant for name, meant in _MATH._names.items()}
+
+
+def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
+    """The same function, with ``np`` and ``math`` meaning what its values need; likewise what it calls of its own module."""
+    if not isinstance(function, FunctionType):
+        return function
+    seen = {} if seen is None else seen
+    if id(function) in seen:
+        return seen[id(function)]
+    names = {**function.__globals__}
+    closure = tuple(CellType() for _ in function.__closure__ or ())
+    again = FunctionType(function.__code__, names, function.__name__, function.__defaults__, closure)
+    again.__kwdefaults__ = function.__kwdefaults__
+    seen[id(function)] = again
+
+    def meant(value: Any) -> Any:
+        if id(value) in _MEANING:
+            return _MEANING[id(value)]
+        if isinstance(value, FunctionType) and value.__globals__ is function.__globals__:
+            return rebound(value, seen)
+        return value
+
+    for name in _names_of(function.__code__):
+        if name in names:
+            names[name] = meant(names[name])
+    names["__builtins__"] = builtins
+    for cell, old in zip(closure, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # an empty cell: a name that is bound later
+            cell.cell_contents = meant(old.cell_contents)
+    return again
+
+
+def _names_of(code: Any) -> set[str]:
+    """All names in a function's code and in that of the functions within it."""
+    names = set(code.co_names)
+    for each in code.co_consts:
+        if hasattr(each, "co_names"):
+            names |= _names_of(each)
+    return names

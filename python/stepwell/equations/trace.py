@@ -1,0 +1,221 @@
+"""Runs a user's function: with symbols, or with the numbers of every member of a batch."""
+
+from __future__ import annotations
+
+import copy
+import linecache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._checks import Shape
+from ..errors import TraceError
+from ..reference.types import Array as Numbers
+from .namespace import rebound
+from .values import Array, Scalar, array, objects, of_shape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .definition import Definition
+    from .invariants import Invariant, Traced
+
+#: How many lines of an error are looked through for the user's own.
+MOST_FRAMES = 200
+
+#: So many characters of a line of the user's file stand in a message.
+MOST_OF_A_LINE = 80
+
+
+class Equations:
+    """A user's function for blocks of known shapes.
+
+    Attributes:
+        definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it gives.
+        v_shape: shape of a member's velocity block.
+        y_shape: shape of a member's coordinate block.
+        own_shapes: of each parameter the lengths of its own axes; None of one that changes with the time.
+        kept: the name of the invariant that a control or a projection keeps, or None.
+        limited: whether the control is of the limited form.
+        pushed: whether there is a control.
+    """
+
+    kept: str | None = None
+    limited = False
+    pushed = False
+
+    def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
+        self.definition = definition
+        self.v_shape, self.y_shape = v_shape, y_shape
+        self.own_shapes = own_shapes
+        self._invariants: dict[str, Traced] = {}
+
+    @property
+    def shapes(self) -> tuple[Shape, Shape]:
+        """Of both blocks."""
+        return self.v_shape, self.y_shape
+
+    def batches(self, v: Any, y: Any) -> tuple[Shape, Shape]:
+        """The axes of both blocks behind their own."""
+        return np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :]
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+        return len(self.own_shapes[name] or ())
+
+    @property
+    def invariants(self) -> dict[str, Traced]:
+        """Those that were declared, by name."""
+        from .invariants import Traced
+
+        for name, each in self.definition.invariants.items():
+            if name not in self._invariants or self._invariants[name].invariant is not each:
+                self._invariants[name] = Traced(each, self)
+        return self._invariants
+
+    def keeping(self, name: str, *, limited: bool, pushed: bool) -> Equations:
+        """The same, with an invariant that is kept."""
+        kept = copy.copy(self)
+        kept.kept, kept.limited, kept.pushed = name, limited, pushed
+        return kept
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_invariants": {}}
+
+    @property
+    def name(self) -> str:
+        """Of the function."""
+        return self.definition.name
+
+    @property
+    def second_order(self) -> bool:
+        """Whether ẏ is v."""
+        return self.definition.order == 2 and self.definition.blocks == 1 and not self.pushed
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Equations) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[Any, ...]:
+        return self.definition, self.v_shape, self.y_shape, self.kept, self.limited, self.pushed
+
+    def __deepcopy__(self, memo: Any) -> Equations:
+        return self  # nothing of it changes
+
+    def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
+        """v̇ and ẏ: of symbols, symbols; of numbers, those of every member. Where ẏ is v, it is not computed."""
+        batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
+        with np.errstate(all="ignore"):
+            parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
+            state = [_scalars(y, len(self.y_shape))]
+            if self.definition.has_v:
+                state.insert(0, _scalars(v, len(self.v_shape)))
+            made = self._called(Scalar(t), state, parameters)
+        dv, dy = self._checked(made)
+        v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
+        return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
+
+    def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
+        """What an invariant is of a state of symbols: one symbol, or a number that is known."""
+        state = [_scalars(y, len(self.y_shape))]
+        if self.definition.has_v:
+            state.insert(0, _scalars(v, len(self.v_shape)))
+        parameters = {name: _scalars(value, self.own_axes(name)) for name, value in given.items()}
+        name = f"{self.name}: {invariant.name}"
+        made = objects(self._run(rebound(invariant.function), name, *state, **parameters))
+        if made.ndim or not isinstance(made[()], Scalar):
+            got = f"an array of shape {made.shape}" if made.ndim else _kind(made[()])
+            raise TraceError(f"{name}: expected one number of a state, got {got}")
+        return made[()].value
+
+    def _parameter(self, name: str, value: Any, t: Any, batch: Shape) -> Any:
+        if callable(value):
+            return self._run(rebound(value), f"{self.name}: {name}", Scalar(t))
+        if hasattr(value, "at"):
+            return Scalar(value.at(t))
+        return _scalars(value, self.own_axes(name))
+
+    def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
+        return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
+
+    def _run(self, function: Callable[..., Any], name: str, *given: Any, **named: Any) -> Any:
+        try:
+            return function(*given, **named)
+        except RecursionError:
+            raise
+        except Exception as error:
+            line = _line_of(error, getattr(function, "__code__", None))
+            known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
+            said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
+            told = TraceError(f"{name}{line}: {said}")
+            told.of_shape = (
+                known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+            )
+            raise told from error
+
+    def _checked(self, made: Any) -> tuple[Any, Any]:
+        """The rates of v and of y as objects, or None for what the function does not give."""
+        if self.definition.blocks == 2:
+            if not isinstance(made, (tuple, list)) or len(made) != 2:
+                raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {_kind(made)}")
+            return self._block("v̇", made[0], self.v_shape), self._block("ẏ", made[1], self.y_shape)
+        if self.definition.order == 2:
+            return self._block("v̇", made, self.v_shape), None
+        return None, self._block("ẏ", made, self.y_shape)
+
+    def _block(self, what: str, made: Any, shape: Shape) -> Any:
+        try:
+            items = array(made).items
+        except TraceError as error:
+            raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {_kind(made)} ({error})") from None
+        if items.shape != shape:
+            raise of_shape(f"{self.name}: expected {what} of shape {shape}, that of its block, got shape {items.shape}")
+        return items
+
+
+def _kind(made: Any) -> str:
+    return "nothing: is there a return?" if made is None else f"{type(made).__name__}"
+
+
+def _scalars(numbers: Any, axes: int) -> Any:
+    """Numbers, or symbols, as scalars: the first axes are those of the array, the others those of a batch."""
+    numbers = np.asarray(numbers)
+    if axes == 0:
+        return Scalar(numbers[()])
+    items = np.empty(numbers.shape[:axes], dtype=object)
+    for index in np.ndindex(items.shape):
+        items[index] = Scalar(numbers[index])
+    return Array(items)
+
+
+def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
+    """What scalars hold, as one array: of objects if they are symbols."""
+    values = [each.value if isinstance(each, Scalar) else each for each in (objects(each)[()] for each in items.flat)]
+    if any(hasattr(value, "xor_bits") for value in values):
+        made = np.empty(len(values), dtype=object)
+        made[:] = values
+        return made.reshape(shape)
+    # Analysis steps numbers whose imaginary part is infinitesimal.
+    numbers = np.empty((len(values), *batch), dtype=np.result_type(np.float64, *(np.asarray(value).dtype for value in values)))
+    for i, value in enumerate(values):
+        numbers[i] = value
+    return numbers.reshape((*shape, *batch))
+
+
+def _line_of(error: BaseException, code: Any) -> str:
+    """Where in the file of the function it happened: the last line there."""
+    found, frame = None, error.__traceback__
+    for _ in range(MOST_FRAMES):
+        if frame is None:
+            break
+        if code is not None and frame.tb_frame.f_code.co_filename == code.co_filename:
+            found = frame
+        frame = frame.tb_next
+    if found is None:
+        return ""
+    file, line = found.tb_frame.f_code.co_filename, found.tb_lineno
+    text = linecache.getline(file, line).strip()
+    text = text if len(text) <= MOST_OF_A_LINE else f"{text[:MOST_OF_A_LINE]}…"
+    return f" ({file.replace(chr(92), '/').rsplit('/', 1)[-1]}, line {line}{f': {text}' if text else ''})"

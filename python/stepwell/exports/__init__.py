@@ -1,0 +1,170 @@
+"""A step in the source code of another language, to be taken along into an engine.
+
+``tapes`` traces a step and cuts it, ``names`` gives names that a language takes, ``written`` puts both into the words of a
+``language``, of which there is a file each; ``result`` holds what comes of it.
+"""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import _checks, engine
+from .._checks import Array, Shape
+from ..control import AnyControl, EnergyControl, a_control
+from ..errors import ArgumentError, ShapeError, UnsupportedError
+from ..integrate import fits_together
+from ..methods import Method
+from ..methods import method as find_method
+from ..systems import System
+from ..systems.base import a_system, aligned
+from .c import C
+from .head import head
+from .javascript import JavaScript
+from .language import Language
+from .names import Names, prefix, snake
+from .plain_python import Python
+from .result import ExportedStep
+from .rust import Rust
+from .tapes import Traced
+from .written import MEMBERS, Written
+
+__all__ = ["ExportedStep", "export"]
+
+LANGUAGES: dict[str, type[Language]] = {"c": C, "javascript": JavaScript, "python": Python, "rust": Rust}
+
+
+def export(
+    system: System,
+    method: str | Method,
+    language: str,
+    *,
+    dt: float = 0.01,
+    t0: float = 0.0,
+    v: Any = None,
+    y: Any = None,
+    member: int | tuple[int, ...] | None = None,
+    start: str | None = None,
+    control: AnyControl | None = None,
+    fused: bool = False,
+    name: str | None = None,
+) -> ExportedStep:
+    """A step of a system by a method as source code: one file that needs nothing else.
+
+    The file has a structure of the parameters, which may be changed there, a structure of the state, and functions: what is made
+    of the parameters before the steps, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``,
+    to the last bit.
+
+    ::
+
+        >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c")
+
+    Args:
+        system: what to step, one trajectory.
+        method: its name, or what ``stepwell.method`` returns.
+        language: ``"c"`` (C99), ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
+        dt: the step with which the file begins, in units of time; it may be changed there, as the parameters may.
+        t0: the time of step 0, likewise.
+        v: velocities of the example at the head of the file, shape (*block); zero if None. A control without a target keeps the
+            energy of v and y.
+        y: coordinates of the example, likewise; 1, 2, 3, … if None.
+        member: which trajectory of a batch, by its index, or a tuple of one index for each axis of the batch.
+        start: how a method with a choice starts; see ``method(…).starts``.
+        control: what keeps the energy, as ``integrate`` takes it.
+        fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has from 3.13 on.
+        name: what functions and types are called, or begin with; made of the system and the method if None.
+
+    Returns:
+        An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
+
+    Raises:
+        ArgumentError: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system, if the language has no fused multiply-add, or if the step has so
+            many operations that they are not written out one by one.
+    """
+    how = find_method(method)
+    system = a_system(system)
+    system = system.sized() if v is None and y is None else system.sized(*(0.0 if each is None else each for each in (v, y)))
+    fits_together(system, how)
+    kind = LANGUAGES[_checks.known("language", language, tuple(LANGUAGES))]
+    dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    t0 = _checks.number("t0", t0, unit="units of time")
+    fused = _checks.flag("fused", fused)
+    if fused and kind.fma is None:
+        raise UnsupportedError(f"fused: {kind.title} has no fused multiply-add; export without, or to another language")
+    choice = how.start_choice(start)
+    control = a_control(control)
+    called = prefix(f"{snake(type(system).__name__)}_{how.name}" if name is None else name)
+    blocks = [
+        None if block is None else _checks.block(argument, block, shape, system.axes)
+        for argument, block, shape in (("v", v, system.v_shape), ("y", y, system.y_shape))
+    ]
+    shapes = {"system": system.batch, "control": () if control is None else control.batch}
+    for argument, block, shape in (("v", blocks[0], system.v_shape), ("y", blocks[1], system.y_shape)):
+        if block is not None:
+            shapes[argument] = block.shape[len(shape) :]
+    batch = _checks.batch_shape(shapes)
+    index = _member(member, batch)
+    if control is not None:
+        system = _under(system, control, blocks, batch, dt)
+        fits_together(system, how)
+    example = _example(system, blocks, batch, index)
+    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused)
+    traced = Traced(plan, index)
+    writer = kind(called, Names(MEMBERS))
+    written = Written(traced, writer)
+    text = writer.file(written, writer.remark(head(written, *example)))
+    return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count)
+
+
+def _member(member: Any, batch: Shape) -> Shape:
+    """The index of one trajectory of a batch."""
+    if member is None:
+        if prod(batch) != 1:
+            last = tuple(n - 1 for n in batch)
+            raise ArgumentError(
+                f"member: expected one trajectory of the batch of shape {batch}, such as "
+                f"member={last[0] if len(last) == 1 else last}; one step is exported, with the parameters of one"
+            )
+        return (0,) * len(batch)
+    given = member if isinstance(member, (tuple, list)) else (member,)
+    if len(given) != len(batch):
+        raise ShapeError(f"member: expected {len(batch)} indices for the batch of shape {batch}, got {len(given)}")
+    for each, n in zip(given, batch, strict=True):
+        if n == 0:
+            raise ShapeError(f"member: there is none in a batch of shape {batch}")
+        _checks.count("member", each, 0, n - 1)
+    return tuple(_checks.count("member", each, 0, n - 1) for each, n in zip(given, batch, strict=True))
+
+
+def _under(system: System, control: AnyControl, blocks: list[Array | None], batch: Shape, dt: float) -> System:
+    """The system under control; without a state it needs all numbers of the control."""
+    v, y = blocks
+    if v is not None and y is not None:
+        v, y = (_wide(each, shape, batch) for each, shape in ((v, system.v_shape), (y, system.y_shape)))
+        return system.controlled(control, v, y, dt)
+    if control.target is None:
+        raise ArgumentError("control: expected one with a target, or v and y, of which it keeps the energy")
+    if isinstance(control, EnergyControl) and control.gain is None:
+        raise ArgumentError("control: expected one with a gain, or v and y, to which relative= relates it")
+    return system.under(control, batch)
+
+
+def _wide(block: Array, shape: Shape, batch: Shape) -> Array:
+    """A block for every member."""
+    axes = len(shape)
+    return np.broadcast_to(aligned(block, axes, batch), (*shape, *batch))
+
+
+def _example(system: System, blocks: list[Array | None], batch: Shape, index: Shape) -> tuple[list[float], list[float]]:
+    """Velocities and coordinates with which the example begins."""
+    out = []
+    for block, shape, others in zip(blocks, (system.v_shape, system.y_shape), (0.0, 1.0), strict=True):
+        if block is None:
+            out.append([others * (i + 1.0) for i in range(prod(shape))])
+        else:
+            own = _wide(block, shape, batch)[(slice(None),) * len(shape) + index]
+            out.append([float(each) for each in own.reshape(-1)])
+    return out[0], out[1]

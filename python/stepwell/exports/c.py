@@ -1,0 +1,226 @@
+"""A step as C99."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .language import Assignment, Language, indented
+from .written import Written
+
+TYPES = {"number": "double", "truth": "int", "bits": "uint64_t"}
+
+BEGIN = """
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#if defined(__FAST_MATH__)
+#error "compile without -ffast-math: it computes other numbers"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "compile for arithmetic in double precision, on x86 with -msse2 -mfpmath=sse"
+#endif
+"""
+
+BITS_OF = """static inline uint64_t PREFIX_bits_of(double x) {
+    uint64_t b;
+    memcpy(&b, &x, sizeof b);
+    return b;
+}"""
+
+NUMBER_OF = """static inline double PREFIX_number_of(uint64_t b) {
+    double x;
+    memcpy(&x, &b, sizeof x);
+    return x;
+}"""
+
+TURN_SIGN = """// x, its sign turned if the last bit of y is set.
+static inline double PREFIX_turn_sign(double x, double y) {
+    return PREFIX_number_of(PREFIX_bits_of(x) ^ PREFIX_bits_of(y) << 63);
+}"""
+
+SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
+static double PREFIX_sample(const double *samples, int count, double start, double interval, double t) {
+    double i = floor((t - start) / interval + 1e-06); // t may miss a sample's time by rounding
+    if (!(i > 0.0)) i = 0.0;
+    if (i > count - 1.0) i = count - 1.0;
+    return samples[(int)i];
+}"""
+
+
+def _on_bits(name: str, arguments: str, made: str) -> str:
+    return f"static inline uint64_t PREFIX_{name}({arguments}) {{ return {made}; }}"
+
+
+TWO, SHIFT = "uint64_t a, uint64_t b", "uint64_t a, int n"
+
+
+class C(Language):
+    """Functions and types that begin with a prefix; bits by ``memcpy``."""
+
+    title = "C"
+    endings = (".c", ".h")
+    infinity, root, floor, fma = "INFINITY", "sqrt", "floor", "fma"
+    bits_literal = "UINT64_C({})"
+    truths = ("0", "1")
+    me = "m->"
+    time = "m->t0 + (double)s->step * m->dt"
+    helpers: ClassVar[dict[str, str]] = {
+        "bits_of": BITS_OF,
+        "number_of": NUMBER_OF,
+        "turn_sign": TURN_SIGN,
+        "mask_of": _on_bits("mask_of", "int truth", "truth ? ~UINT64_C(0) : 0"),
+        "choose_bits": _on_bits("choose_bits", "uint64_t mask, uint64_t a, uint64_t b", "(mask & a) | (~mask & b)"),
+        "and_bits": _on_bits("and_bits", TWO, "a & b"),
+        "or_bits": _on_bits("or_bits", TWO, "a | b"),
+        "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
+        "add_bits": _on_bits("add_bits", TWO, "a + b"),
+        "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
+        "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+        "sample": SAMPLE,
+    }
+
+    def helper(self, name: str) -> str:
+        """With the prefix, so that several files may be compiled together."""
+        return f"{self.prefix}_{name}"
+
+    def declare(self, line: Assignment, note: str) -> str:
+        """A value that gets a name."""
+        return f"const {TYPES[line.kind]} {line.name} = {line.text};{note}"
+
+    def sample(self, table: int, t: str) -> str:
+        """The sample of a table that holds at a time."""
+        of = self.tables[table]
+        return f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"// The {name} of x.", f"static double PREFIX_{name}(double x) {{", *indented(lines), "}"])
+
+    def how(self, w: Written) -> list[str]:
+        """How to compile and call it."""
+        p, blocks = self.prefix, "".join(f", {of}" for _, of, _ in w.blocks)
+        lines = [
+            "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
+            f"{p}_defaults(&m) sets the parameters; change any of them and call {p}_prepare(&m).",
+            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s) makes one step.",
+        ]
+        if w.carries:
+            lines.append(f"{p}_finish(&m, &s, velocities) finds the velocities; in the state {w.slot} stands in their place.")
+        if w.evaluations:
+            lines.append(f"{p}_work(&m, &s) is the energy that the control has given since the start.")
+        return lines
+
+    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
+        """A program that makes some steps and prints a number of the state."""
+        p, blocks = self.prefix, [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        return [
+            "#include <stdio.h>",
+            f'#include "{p}.c"',
+            "",
+            "int main(void) {",
+            f"    {p} m;",
+            f"    {p}_state s;",
+            *(line for n, a in blocks for line in self.listed(f"const double {n}[{len(a)}] = {{", a, "};", "    ")),
+            "",
+            f"    {p}_defaults(&m);",
+            f"    {p}_start(&m, &s{''.join(f', {name}' for name, _ in blocks)});",
+            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s);",
+            f'    printf("%.17g\\n", s.{w.shown}[0]);',
+            "    return 0;",
+            "}",
+        ]
+
+    def file(self, w: Written, head: list[str]) -> str:
+        """All of it, behind the comment at the head."""
+        parts = [self._structures(w), *self._tables(w), self._prepare(w), self._defaults(w), self._start(w), self._step(w)]
+        if w.carries:
+            parts.append(self._finish(w))
+        if w.evaluations:
+            parts.append(self._work(w))
+        functions = self.functions("\n".join(parts))
+        return "\n".join(head) + "\n" + BEGIN + "\n" + "\n\n".join([*functions, *parts]) + "\n"
+
+    # ---- parts of it
+
+    def _structures(self, w: Written) -> str:
+        p = self.prefix
+        lines = ["// What a step is described by.", "typedef struct {"]
+        for each in w.parameters:
+            size = "".join(f"[{n}]" for n in each.shape)
+            lines.append(f"    double {each.name}{size};" + (f" // {each.about}" if each.about != each.name else ""))
+        if w.made:
+            lines += ["", f"    // Made of these by {p}_prepare."]
+            lines += [f"    {TYPES[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
+        lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
+        lines += [f"    double {name}[{n}];" for name, _, n in w.blocks]
+        lines += ["    double tally; // what the control has added up"] * bool(w.evaluations)
+        return "\n".join([*lines, "    int64_t step; // k; the time is t0 + k*dt", f"}} {p}_state;"])
+
+    def _tables(self, w: Written) -> list[str]:
+        return [
+            "\n".join(
+                [
+                    f"// The samples of {each.about}.",
+                    *self.listed(
+                        f"static const double {self.prefix}_{each.name}_samples[{len(each.values)}] = {{", each.values, "};"
+                    ),
+                ]
+            )
+            for each in w.tables
+        ]
+
+    def _prepare(self, w: Written) -> str:
+        lines = [f"{each.name} = {each.text};" for each in w.made] or ["(void)m;"]
+        about = "// What does not change from step to step. To be called after a change of a parameter."
+        return "\n".join([about, f"void {self.prefix}_prepare({self.prefix} *m) {{", *indented(lines), "}"])
+
+    def _defaults(self, w: Written) -> str:
+        p, tables, lines = self.prefix, [], []
+        for each in w.parameters:
+            if each.shape:
+                size = "".join(f"[{n}]" for n in each.shape)
+                table = f"static const double {each.name}[{len(each.values)}] = {{"
+                tables += self.listed(table, each.values, f"}}; // {size}" if len(each.shape) > 1 else "};")
+                lines.append(f"memcpy(m->{each.name}, {each.name}, sizeof m->{each.name});")
+            else:
+                lines.append(f"m->{each.name} = {self.signed(each.values[0])};")
+        inside = indented([*tables, *([""] if tables else []), *lines, f"{p}_prepare(m);"])
+        return "\n".join(["// The parameters with which it was exported.", f"void {p}_defaults({p} *m) {{", *inside, "}"])
+
+    def _start(self, w: Written) -> str:
+        p, start = self.prefix, w.functions.get("start")
+        arguments = "".join(f", const double {of}[{n}]" for _, of, n in w.blocks)
+        lines = ["s->step = 0;"] + ["s->tally = 0.0;"] * bool(w.evaluations)
+        lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
+        if start:
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
+        if not (start and start.needs_fields):
+            lines.insert(0, "(void)m;")
+        about = "// The state at step 0, of velocities and coordinates."
+        return "\n".join([about, f"void {p}_start(const {p} *m, {p}_state *s{arguments}) {{", *indented(lines), "}"])
+
+    def _step(self, w: Written) -> str:
+        p, f = self.prefix, w.functions["step"]
+        of = {name: f"s->{name}" for name in (w.slot, "y", "tally")}
+        lines = ["(void)m;"] * (not f.needs_fields) + [*self.body(f, of, of), "s->step += 1;"]
+        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s) {{", *indented(lines), "}"])
+
+    def _finish(self, w: Written) -> str:
+        p, f = self.prefix, w.functions["finish"]
+        lines = ["(void)m;"] * (not f.needs_fields)
+        lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
+        begin = f"void {p}_finish(const {p} *m, const {p}_state *s, double velocities[{w.n_v}]) {{"
+        return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
+
+    def _work(self, w: Written) -> str:
+        p = self.prefix
+        begin = f"double {p}_work(const {p} *m, const {p}_state *s) {{"
+        about = "// The energy that the control has given since the start."
+        return "\n".join([about, begin, f"    return s->tally / ({w.evaluations}.0 * m->dt);", "}"])

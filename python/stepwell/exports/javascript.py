@@ -1,0 +1,191 @@
+"""A step as a JavaScript module."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .language import Assignment, Language, indented
+from .names import camel
+from .written import Written
+
+VIEWS = """// The bits of a number, by views of the same memory.
+const number = new Float64Array(1);
+const halves = new Uint32Array(number.buffer);
+const whole = new BigUint64Array(number.buffer);
+halves[0] = 1;
+const low = whole[0] === 1n ? 0 : 1; // which half has the last bit"""
+
+BITS_OF = """function bits_of(x) {
+  number[0] = x;
+  return whole[0];
+}"""
+
+NUMBER_OF = """function number_of(b) {
+  whole[0] = b;
+  return number[0];
+}"""
+
+TURN_SIGN = """// x, its sign turned if the last bit of y is set.
+function turn_sign(x, y) {
+  number[0] = y;
+  return halves[low] & 1 ? -x : x;
+}"""
+
+SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
+function sample(samples, start, interval, t) {
+  let i = Math.floor((t - start) / interval + 1e-6); // t may miss a sample's time by rounding
+  if (!(i > 0)) i = 0;
+  return samples[Math.min(i, samples.length - 1)];
+}"""
+
+
+def _on_bits(name: str, arguments: str, made: str) -> str:
+    return f"function {name}({arguments}) {{\n  return {made};\n}}"
+
+
+class JavaScript(Language):
+    """A class in an ES module, for browsers and Node; bits by views of a typed array, whole numbers of 64 bits as BigInt."""
+
+    title = "JavaScript"
+    endings = (".js", ".mjs")
+    infinity, root, floor, fma = "Infinity", "Math.sqrt", "Math.floor", None
+    bits_literal = "{}n"
+    me = "this."
+    time = "this.t0 + s.step * this.dt"
+    helpers: ClassVar[dict[str, str]] = {
+        "number": VIEWS,
+        "bits_of": BITS_OF,
+        "number_of": NUMBER_OF,
+        "turn_sign": TURN_SIGN,
+        "mask_of": _on_bits("mask_of", "truth", "truth ? 0xffffffffffffffffn : 0n"),
+        "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (BigInt.asUintN(64, ~mask) & b)"),
+        "and_bits": _on_bits("and_bits", "a, b", "a & b"),
+        "or_bits": _on_bits("or_bits", "a, b", "a | b"),
+        "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
+        "add_bits": _on_bits("add_bits", "a, b", "BigInt.asUintN(64, a + b)"),
+        "shift_up": _on_bits("shift_up", "a, n", "BigInt.asUintN(64, a << BigInt(n))"),
+        "shift_down": _on_bits("shift_down", "a, n", "a >> BigInt(n)"),
+        "sample": SAMPLE,
+    }
+
+    def literal(self, x: float) -> str:
+        """A finite number: the shortest text that is read as it."""
+        return repr(float(x)).removesuffix(".0")
+
+    def declare(self, line: Assignment, note: str) -> str:
+        """A value that gets a name."""
+        return f"const {line.name} = {line.text};{note}"
+
+    def sample(self, table: int, t: str) -> str:
+        """The sample of a table that holds at a time."""
+        of = self.tables[table]
+        return f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
+
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"// The {name} of x.", f"function {name}(x) {{", *indented(lines, "  "), "}"])
+
+    def how(self, w: Written) -> list[str]:
+        """How to call it."""
+        p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
+        lines = [
+            "A module for browsers and Node.",
+            f"const m = new {p}({{ dt: ... }}) sets the parameters that are given; call m.prepare() after a change of one.",
+            f"const s = m.start({blocks}) is the state at step 0, m.step(s) makes one step.",
+        ]
+        if w.carries:
+            lines.append(f"m.finish(s) finds the velocities; in the state {w.slot} stands in their place.")
+        if w.evaluations:
+            lines.append("m.work(s) is the energy that the control has given since the start.")
+        return lines
+
+    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
+        """A program that makes some steps and prints a number of the state."""
+        p = camel(self.prefix)
+        blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        return [
+            f'import {{ {p} }} from "./{self.prefix}.mjs";',
+            "",
+            *(line for name, each in blocks for line in self.listed(f"const {name} = [", each, "];")),
+            f"const m = new {p}();",
+            f"const s = m.start({', '.join(name for name, _ in blocks)});",
+            f"for (let k = 0; k < {steps}; k++) m.step(s);",
+            f"console.log(s.{w.shown}[0]);",
+        ]
+
+    def file(self, w: Written, head: list[str]) -> str:
+        """All of it, behind the comment at the head."""
+        parts = [self._prepare(w), self._start(w), self._step(w)]
+        if w.carries:
+            parts.append(self._finish(w))
+        if w.evaluations:
+            parts.append(self._work(w))
+        tables = [
+            "\n".join([f"// The samples of {each.about}.", *self.listed(f"const {each.name}_samples = [", each.values, "];")])
+            for each in w.tables
+        ]
+        inside = "\n\n".join("\n".join(indented(each, "  ")) for each in [self._constructor(w), *parts])
+        whole = f"export class {camel(self.prefix)} {{\n{inside}\n}}"
+        return "\n".join(head) + "\n\n" + "\n\n".join([*self.functions(whole), *tables, whole]) + "\n"
+
+    # ---- parts of it
+
+    def _constructor(self, w: Written) -> list[str]:
+        lines: list[str] = []
+        for each in w.parameters:
+            about = f" // {each.about}" if each.about != each.name else ""
+            if each.shape:
+                lines += self.nested(f"this.{each.name} = ", each.values, each.shape, ";")
+            else:
+                lines.append(f"this.{each.name} = {self.signed(each.values[0])};{about}")
+        lines += [
+            "for (const name of Object.keys(given)) {",
+            "  if (!Object.prototype.hasOwnProperty.call(this, name)) throw new RangeError(`there is no parameter ${name}`);",
+            "}",
+            "Object.assign(this, given);",
+            "this.prepare();",
+        ]
+        return ["constructor(given = {}) {", *indented(lines, "  "), "}"]
+
+    def _prepare(self, w: Written) -> list[str]:
+        lines = [f"{each.name} = {each.text};" for each in w.made]
+        about = "// What does not change from step to step. To be called after a change of a parameter."
+        return [about, "prepare() {", *indented(lines, "  "), "}"]
+
+    def _start(self, w: Written) -> list[str]:
+        start = w.functions.get("start")
+        lines = []
+        for _, of, n in w.blocks:
+            numbers = f"{n} number{'s' * (n > 1)}"
+            lines.append(f"if ({of}.length !== {n}) throw new RangeError(`{of}: expected {numbers}, got ${{{of}.length}}`);")
+        lines.append("const s = { step: 0 };")
+        lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
+        for name, of, n in w.blocks:
+            carried = start and name == w.slot
+            lines.append(f"s.{name} = new Float64Array({n});" if carried else f"s.{name} = Float64Array.from({of});")
+        if start:
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
+        lines += ["return s;"]
+        about = "// The state at step 0, of velocities and coordinates."
+        return [about, f"start({', '.join(of for _, of, _ in w.blocks)}) {{", *indented(lines, "  "), "}"]
+
+    def _step(self, w: Written) -> list[str]:
+        of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
+        lines = [*self.body(w.functions["step"], of, of), "s.step += 1;"]
+        return ["// One step.", "step(s) {", *indented(lines, "  "), "}"]
+
+    def _finish(self, w: Written) -> list[str]:
+        lines = [f"const velocities = new Float64Array({w.n_v});"]
+        lines += self.body(
+            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
+        )
+        return ["// The velocities at a state.", "finish(s) {", *indented([*lines, "return velocities;"], "  "), "}"]
+
+    def _work(self, w: Written) -> list[str]:
+        about = "// The energy that the control has given since the start."
+        return [about, "work(s) {", f"  return s.tally / ({w.evaluations} * this.dt);", "}"]

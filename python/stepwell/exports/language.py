@@ -1,0 +1,372 @@
+"""Operations as a language writes them: what all have in common.
+
+A value is a number, a truth, or bits (a whole number of 64 bits). Numbers become bits, and bits numbers, by functions that stand
+in the file: numbers whose bits are those of a NaN would not come through everywhere unchanged.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from .. import _core
+from .._checks import Shape
+from ..explanation import formula as plain
+from ..explanation.formula import ALL_BITS, ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
+from ..explanation.listing import Leaf, Writer
+from .functions import FUNCTIONS, operations_of
+from .names import Names
+
+if TYPE_CHECKING:
+    from .written import Table, Written
+
+#: Characters of a line of numbers.
+WIDTH = 100
+
+#: What makes numbers.
+ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
+
+#: Operations that become calls of functions on bits.
+BIT_FUNCTIONS = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}
+BIT_FUNCTIONS |= {"shift up": "shift_up", "shift down": "shift_down"}
+
+#: The last bit of a number, put where its sign is: what turns the sign of a sine.
+LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), 63\)")
+
+
+class Assignment(NamedTuple):
+    """A value and how it is made.
+
+    Attributes:
+        name: as it is used.
+        kind: "number", "truth" or "bits".
+        text: its formula.
+        note: what it is in the method, where its name does not say so.
+        evaluation: of which evaluation of the rates it is known to be, counted from 1; 0 where that is not known.
+    """
+
+    name: str
+    kind: str
+    text: str
+    note: str = ""
+    evaluation: int = 0
+
+
+class Place(NamedTuple):
+    """A number of a state, and what it is called in a function; ``at`` is −1 if its block is one number."""
+
+    block: str
+    at: int
+    name: str
+
+
+class Function(NamedTuple):
+    """What a function does.
+
+    Attributes:
+        reads: the numbers of the state that it needs.
+        needs_time: whether it needs the time.
+        needs_fields: whether it reads parameters, or what is made of them.
+        of_time: what depends on the time alone.
+        lines: what depends on the state.
+        writes: the numbers that it makes.
+    """
+
+    reads: list[Place]
+    needs_time: bool
+    needs_fields: bool
+    of_time: list[Assignment]
+    lines: list[Assignment]
+    writes: list[Place]
+
+
+class Language(Notation, ABC):
+    """How a language writes values; one object for each file.
+
+    Attributes:
+        title: the language's name.
+        endings: those of its files.
+        comment: what begins a comment.
+        helpers: the text of each function that a file may need.
+        kinds: of each value with a name of its own, as it is used: "number", "truth" or "bits".
+    """
+
+    title: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]]
+    comment: ClassVar[str] = "//"
+    helpers: ClassVar[dict[str, str]]
+    truths: ClassVar[tuple[str, str]] = ("false", "true")
+    words: ClassVar[tuple[str, str, str]] = ("!", "&&", "||")
+    infinity: ClassVar[str]
+    root: ClassVar[str]
+    floor: ClassVar[str]
+    fma: ClassVar[str | None]
+    bits_literal: ClassVar[str]
+    #: What is written before a field and a parameter.
+    me: ClassVar[str]
+    #: What ends a statement.
+    end: ClassVar[str] = ";"
+    #: The time of the step that a state is at.
+    time: ClassVar[str]
+    tables: list[Table]
+    longest = 88
+    called = FUNCTIONS
+
+    def __init__(self, prefix: str, fields: Names) -> None:
+        self.prefix, self.fields = prefix, fields
+        self.names = Names()
+        self.kinds: dict[str, str] = {}
+        self.before = False  # whether what is written is made before the steps, and kept in fields
+
+    # ---- values
+
+    def number(self, bits: int) -> Formula:
+        """A constant; one that is no number is made of its bits."""
+        (x,) = struct.unpack("<d", struct.pack("<Q", bits))
+        if x != x:
+            return Formula(self.call("number_of", self.whole(bits)))
+        text = self.infinity if abs(x) == float("inf") else self.literal(abs(x))
+        return Formula(f"−{text}", SIGN) if bits >> 63 else Formula(text)
+
+    def literal(self, x: float) -> str:
+        """A finite number: the shortest text that is read as it."""
+        return repr(float(x))
+
+    def whole(self, bits: int) -> str:
+        """Bits."""
+        return self.bits_literal.format(hex(bits))
+
+    def named(self, name: str, value: Formula) -> Formula:
+        """A value that has a name of its own, where it is used."""
+        word = self.me + self.fields(name, f"made {name}") if self.before else self.names(name)
+        self.kinds[word] = "truth" if value.is_truth else "bits" if value.is_bits else "number"
+        return Formula(word, is_truth=value.is_truth, is_bits=value.is_bits)
+
+    def call(self, helper: str, *of: str) -> str:
+        """A call of a function that stands in the file."""
+        return f"{self.helper(helper)}({', '.join(of)})"
+
+    def helper(self, name: str) -> str:
+        """What such a function is called."""
+        return name
+
+    def as_number(self, value: Formula) -> Formula:
+        """The number of these bits."""
+        if value.is_truth:
+            value = self.as_bits(value, None)
+        return Formula(self.call("number_of", value.text)) if value.is_bits else value
+
+    def as_bits(self, value: Formula, known: int | None) -> Formula:
+        """The bits of a number; ``known`` are those of a constant."""
+        if known is not None:
+            return Formula(self.whole(known), is_bits=True)
+        if value.is_bits:
+            return value
+        return Formula(self.call("mask_of" if value.is_truth else "bits_of", value.text), is_bits=True)
+
+    # ---- operations
+
+    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+        """An operation of these; ``bits`` are those of the operands that are constants."""
+        if name in BIT_FUNCTIONS:
+            return self._on_bits(name, of, given, bits)
+        if name == "choose":
+            return self._choice(of, bits)
+        numbers = [self.as_number(each) for each in of]
+        match name:
+            case "copy":
+                return numbers[0]
+            case "less" | "at most" | "equal":
+                sign = {"less": "<", "at most": "<=", "equal": "=="}[name]
+                a, b = numbers
+                return Formula(f"{a.within(SUM)} {sign} {b.within(SUM)}", COMPARISON, is_truth=True)
+            case "square root":
+                return Formula(f"{self.root}({numbers[0].text})")
+            case "floor":
+                return Formula(f"{self.floor}({numbers[0].text})")
+            case "divide":
+                return self.quotient(numbers[0], numbers[1], bits[1])
+            case "sample":
+                return Formula(self.sample(given, numbers[0].text))
+            case "multiply add" | "multiply subtract" | "subtract multiply":
+                made = plain.formula(name, numbers, given, bits)
+                return Formula(f"{self.fma}{made.text.removeprefix('fma')}")
+            case _ if name in FUNCTIONS:
+                return Formula(self.call(name, numbers[0].text))
+            case _ if name in ARITHMETIC:
+                return plain.formula(name, numbers, given, bits)
+            case _:
+                raise NotImplementedError(f"{self.title} for the operation {name!r}")
+
+    def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
+        """A quotient; ``divisor`` are the bits of one that is a constant."""
+        return plain.formula("divide", (a, b), 0, (None, divisor))
+
+    def _choice(self, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
+        truth, a, b = of
+        if not truth.is_truth:
+            mask, a, b = (self.as_bits(each, known) for each, known in zip(of, bits, strict=True))
+            return Formula(self.call("choose_bits", mask.text, a.text, b.text), is_bits=True)
+        if a.is_bits or b.is_bits or a.is_truth != b.is_truth:
+            a, b = (self.as_bits(each, known) for each, known in zip((a, b), bits[1:], strict=True))
+        return Formula(self.choice(truth, a, b), CHOICE, a.is_truth, a.is_bits)
+
+    def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
+        """One of two values."""
+        return f"{truth.within(EITHER)} ? {a.within(EITHER)} : {b.within(EITHER)}"
+
+    def _on_bits(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+        alike = all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True))
+        if name in ("and", "or", "exclusive or") and alike and any(each.is_truth for each in of):
+            return self._of_truths(name, of, bits)
+        if name == "exclusive or":
+            for x, turning in (of, of[::-1]):
+                if (last := LAST_BIT.fullmatch(turning.text)) and not x.is_truth:
+                    return Formula(self.call("turn_sign", self.as_number(x).text, last[1]))
+        operands = [self.as_bits(each, known).text for each, known in zip(of, bits, strict=True)]
+        more = [str(given)] if name.startswith("shift") else []
+        return Formula(self.call(BIT_FUNCTIONS[name], *operands, *more), is_bits=True)
+
+    def _of_truths(self, name: str, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
+        negation, both, either = self.words
+        a, b = (
+            each if known is None else Formula(self.truths[known == ALL_BITS], is_truth=True)
+            for each, known in zip(of, bits, strict=True)
+        )
+        if name == "and":
+            return Formula(f"{a.within(NOT)} {both} {b.within(NOT)}", BOTH, True)
+        if name == "or":  # compilers want parentheses round what is and in or
+            return Formula(f"{a.within(NOT)} {either} {b.within(NOT)}", EITHER, True)
+        if ALL_BITS in bits:
+            text = f"{negation}{(b if bits[0] is not None else a).within(ATOM)}"
+            return Formula(f"({text})" if negation.isalpha() else text, ATOM, True)
+        return Formula(f"{a.within(SIGN)} != {b.within(SIGN)}", COMPARISON, True)
+
+    # ---- texts
+
+    def text(self, formula: str) -> str:
+        """A formula with the language's signs."""
+        return formula.replace("·", " * ").replace("/", " / ").replace("−", "-")
+
+    def signed(self, x: float) -> str:
+        """A finite number, of either sign."""
+        (bits,) = struct.unpack("<Q", struct.pack("<d", x))
+        return self.text(self.number(bits).text)
+
+    def functions(self, text: str) -> list[str]:
+        """The functions that this text of a file needs, in their order; each may need those before it."""
+        needed: list[str] = []
+        for name in reversed([*self.helpers, *FUNCTIONS]):
+            if re.search(rf"\b{self.helper(name)}\b", text):
+                function = self.helpers[name] if name in self.helpers else self._of_one_number(name)
+                needed.insert(0, function.replace("PREFIX", self.prefix))
+                text += needed[0]
+        return needed
+
+    def _of_one_number(self, name: str) -> str:
+        """A function of one number, from its operations."""
+        operations, (root,) = operations_of(name)
+        self.names = Names(("x",))
+        body = [*operations, ("copy", [root], 0)], [len(operations)]
+        section, _ = Writer(_core.Tape(), {}, self).section(
+            "member step", body, lambda *_: Leaf(Formula("x"), None, 4), 4, "a", ["result"]
+        )
+        *lines, result = [(self.names(line.name), self.text(line.formula)) for line in section.lines]
+        inside = [self.declare(Assignment(word, self.kinds.get(word, "number"), text), "") for word, text in lines]
+        return self.function(name, [*inside, f"return {result[1]}{self.end}"])
+
+    @abstractmethod
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+
+    def remark(self, lines: Iterable[str]) -> list[str]:
+        """Lines as a comment."""
+        return [f"{self.comment} {printable(line)}".rstrip() for line in lines]
+
+    def listed(self, begin: str, values: Sequence[float], end: str, indent: str = "") -> list[str]:
+        """Numbers between two texts, in one line or in several."""
+        return listed(indent + begin, [self.signed(each) for each in values], end, indent)
+
+    def nested(self, begin: str, values: Sequence[float], shape: Shape, end: str, indent: str = "") -> list[str]:
+        """An array of arrays of numbers, between two texts."""
+        if len(shape) == 1:
+            return self.listed(f"{begin}[", values, f"]{end}", indent)
+        size = len(values) // shape[0]
+        lines = [f"{indent}{begin}["]
+        for i in range(shape[0]):
+            lines += self.nested("", values[i * size : (i + 1) * size], shape[1:], ",", indent + "    ")
+        return [*lines, f"{indent}]{end}"]
+
+    def body(
+        self, f: Function, read: Mapping[str, str], write: Mapping[str, str], after: str = "The state after the step."
+    ) -> list[str]:
+        """What is in a function, not indented: where each block is read and written, and what is said of what is written."""
+
+        def place(block: str, index: int, of: Mapping[str, str]) -> str:
+            return of[block] if index < 0 else f"{of[block]}[{index}]"
+
+        groups = [
+            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
+            ("What depends on the time alone.", f.of_time),
+            ("What depends on the state.", f.lines),
+        ]
+        out = [self.declare(Assignment("t", "number", self.time), "")] if f.needs_time else []
+        for title, lines in groups:
+            if lines:
+                out += ["", f"{self.comment} {title}"]
+            evaluation = 1
+            for each in lines:
+                if each.evaluation > evaluation:
+                    evaluation = each.evaluation
+                    out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
+                out.append(self.declare(each, f" {self.comment} {each.note}" if each.note else ""))
+        out += ["", f"{self.comment} {after}"]
+        out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
+        return out if out[0] else out[1:]
+
+    @abstractmethod
+    def declare(self, line: Assignment, note: str) -> str:
+        """A value that gets a name."""
+
+    @abstractmethod
+    def sample(self, table: int, t: str) -> str:
+        """The sample of a table that holds at a time."""
+
+    @abstractmethod
+    def how(self, w: Written) -> list[str]:
+        """How to compile and call it."""
+
+    @abstractmethod
+    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
+        """A program that makes some steps and prints a number of the state."""
+
+    @abstractmethod
+    def file(self, w: Written, head: list[str]) -> str:
+        """All of it, behind the comment at the head."""
+
+
+def indented(lines: Iterable[str], by: str = "    ") -> list[str]:
+    """Lines that are no further to the left than this."""
+    return [by + line if line else "" for line in lines]
+
+
+def listed(begin: str, items: Sequence[str], end: str, indent: str) -> list[str]:
+    """Words between two texts, in one line or in several."""
+    if len(one := begin + ", ".join(items) + end) <= WIDTH:
+        return [one]
+    lines, line = [begin], indent + "   "
+    for item in items:
+        if len(line) + len(item) > WIDTH - 2 and line.strip():
+            lines.append(line)
+            line = indent + "   "
+        line += f" {item},"
+    return [*lines, line, indent + end]
+
+
+def printable(line: str) -> str:
+    """What ends no comment and joins no lines."""
+    line = "".join(letter if letter.isprintable() else " " for letter in line)
+    return line.replace("*/", "* /").replace("??", "? ?").rstrip("\\ ")

@@ -1,0 +1,231 @@
+"""A step as Python that needs nothing but its standard library."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ..explanation import formula as plain
+from ..explanation.formula import CHOICE, EITHER, Formula
+from .language import Assignment, Language, indented
+from .names import camel
+from .written import Written
+
+QUOTIENT = '''def quotient(a, b):
+    """a / b, which is an infinity or no number where Python raises an error."""
+    if b != 0.0:
+        return a / b
+    return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)'''
+
+ROOT = '''def square_root(x):
+    """The square root, which is no number where Python raises an error."""
+    return math.sqrt(x) if x >= 0.0 else math.nan'''
+
+FLOOR = '''def floor(x):
+    """The next whole number below."""
+    return float(math.floor(x)) if x != 0.0 and math.isfinite(x) else x'''
+
+FMA = '''if not hasattr(math, "fma"):
+    raise ImportError("PREFIX needs Python 3.13, which has a fused multiply-add; export it without fused=True")
+
+
+def fused(a, b, c):
+    """a*b + c, rounded once; an infinity or no number where Python raises an error."""
+    try:
+        return math.fma(a, b, c)
+    except ValueError:
+        return math.nan
+    except OverflowError:
+        return math.copysign(math.inf, a * b + c)'''
+
+BITS_OF = """def bits_of(x):
+    return struct.unpack("<Q", struct.pack("<d", x))[0]"""
+
+NUMBER_OF = """def number_of(b):
+    return struct.unpack("<d", struct.pack("<Q", b))[0]"""
+
+TURN_SIGN = '''def turn_sign(x, y):
+    """x, its sign turned if the last bit of y is set."""
+    return -x if bits_of(y) & 1 else x'''
+
+SAMPLE = '''def sample(samples, start, interval, t):
+    """The sample that holds at a time: the last that is not after it; before all the first."""
+    i = floor((t - start) / interval + 1e-06)  # t may miss a sample's time by rounding
+    return samples[int(min(i, len(samples) - 1.0)) if i > 0.0 else 0]'''
+
+ALL_BITS = "0xFFFFFFFFFFFFFFFF"
+
+
+def _on_bits(name: str, arguments: str, made: str) -> str:
+    return f"def {name}({arguments}):\n    return {made}"
+
+
+class Python(Language):
+    """A class of plain floats; bits by ``struct``."""
+
+    title = "Python"
+    endings = (".py",)
+    comment = "#"
+    infinity, root, floor, fma = "math.inf", "square_root", "floor", "fused"
+    bits_literal = "{}"
+    truths = ("False", "True")
+    words = ("not ", "and", "or")
+    me = "self."
+    end = ""
+    time = "self.t0 + s.step * self.dt"
+    helpers: ClassVar[dict[str, str]] = {
+        "quotient": QUOTIENT,
+        "square_root": ROOT,
+        "floor": FLOOR,
+        "fused": FMA,
+        "bits_of": BITS_OF,
+        "number_of": NUMBER_OF,
+        "turn_sign": TURN_SIGN,
+        "mask_of": _on_bits("mask_of", "truth", f"{ALL_BITS} if truth else 0"),
+        "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (~mask & b)"),
+        "and_bits": _on_bits("and_bits", "a, b", "a & b"),
+        "or_bits": _on_bits("or_bits", "a, b", "a | b"),
+        "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
+        "add_bits": _on_bits("add_bits", "a, b", f"(a + b) & {ALL_BITS}"),
+        "shift_up": _on_bits("shift_up", "a, n", f"(a << n) & {ALL_BITS}"),
+        "shift_down": _on_bits("shift_down", "a, n", "a >> n"),
+        "sample": SAMPLE,
+    }
+
+    def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
+        """A quotient; by a constant that is not zero Python's own."""
+        if divisor is not None and divisor & (2**63 - 1):
+            return plain.formula("divide", (a, b), 0, (None, divisor))
+        return Formula(self.call("quotient", a.text, b.text))
+
+    def choice(self, truth: Formula, a: Formula, b: Formula) -> str:
+        """One of two values."""
+        return f"{a.within(EITHER)} if {truth.within(EITHER)} else {b.within(CHOICE)}"
+
+    def declare(self, line: Assignment, note: str) -> str:
+        """A value that gets a name."""
+        return f"{line.name} = {line.text}{' ' if note else ''}{note}"
+
+    def sample(self, table: int, t: str) -> str:
+        """The sample of a table that holds at a time."""
+        of = self.tables[table]
+        return f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
+
+    def function(self, name: str, lines: list[str]) -> str:
+        """A function of one number x."""
+        return "\n".join([f"def {name}(x):", f'    """The {name} of x."""', *indented(lines)])
+
+    def how(self, w: Written) -> list[str]:
+        """How to call it."""
+        p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
+        needs = (
+            "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs only the standard library."
+        )
+        lines = [
+            needs,
+            f"m = {p}(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",
+            f"s = m.start({blocks}) is the state at step 0, m.step(s) makes one step.",
+        ]
+        if w.carries:
+            lines.append(f"m.finish(s) finds the velocities; in the state {w.slot} stands in their place.")
+        if w.evaluations:
+            lines.append("m.work(s) is the energy that the control has given since the start.")
+        return lines
+
+    def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
+        """A program that makes some steps and prints a number of the state."""
+        p = camel(self.prefix)
+        blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        return [
+            f"from {self.prefix} import {p}",
+            "",
+            *(line for name, each in blocks for line in self.listed(f"{name} = [", each, "]")),
+            f"m = {p}()",
+            f"s = m.start({', '.join(name for name, _ in blocks)})",
+            f"for _ in range({steps}):",
+            "    m.step(s)",
+            f"print(s.{w.shown}[0])",
+        ]
+
+    def file(self, w: Written, head: list[str]) -> str:
+        """All of it, behind the comment at the head."""
+        p = camel(self.prefix)
+        parts = [self._init(w), self._prepare(w), self._start(w), self._step(w)]
+        if w.carries:
+            parts.append(self._finish(w))
+        if w.evaluations:
+            parts.append(self._work(w))
+        tables = [
+            "\n".join([f"# The samples of {each.about}.", *self.listed(f"{each.name}_samples = [", each.values, "]")])
+            for each in w.tables
+        ]
+        step = f'class {p}:\n    """What a step is described by, and the step."""\n\n'
+        step += "\n\n".join("\n".join(indented(each)) for each in parts)
+        state = [f"class {p}State:", '    """A state."""', "", *indented(self._state(w))]
+        whole = "\n\n\n".join([*tables, "\n".join(state), step])
+        functions = self.functions(whole)
+        used = "\n".join([*functions, whole])
+        imports = [f"import {name}" for name in ("math", "struct") if f"{name}." in used]
+        begin = "\n".join(head) + "\n\n" + ("\n".join(imports) + "\n\n\n" if imports else "\n")
+        return begin + "\n\n\n".join([*functions, whole]) + "\n"
+
+    # ---- parts of it
+
+    def _state(self, w: Written) -> list[str]:
+        arguments = ", ".join(name for name, _, _ in w.blocks)
+        lines = ["self.step = 0  # k; the time is t0 + k*dt", *(f"self.{name} = {name}" for name, _, _ in w.blocks)]
+        lines += ["self.tally = 0.0  # what the control has added up"] * bool(w.evaluations)
+        return [f"def __init__(self, {arguments}):", *indented(lines)]
+
+    def _init(self, w: Written) -> list[str]:
+        lines: list[str] = []
+        for each in w.parameters:
+            about = f"  # {each.about}" if each.about != each.name else ""
+            if each.shape:
+                lines += self.nested(f"self.{each.name} = ", each.values, each.shape, "")
+            else:
+                lines.append(f"self.{each.name} = {self.signed(each.values[0])}{about}")
+        lines += [
+            "for name, value in given.items():",
+            "    if name not in vars(self):",
+            '        raise TypeError(f"there is no parameter {name}")',
+            "    setattr(self, name, value)",
+            "self.prepare()",
+        ]
+        return ["def __init__(self, **given):", *indented(lines)]
+
+    def _prepare(self, w: Written) -> list[str]:
+        lines = ['"""What does not change from step to step. To be called after a change of a parameter."""']
+        return ["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made)])]
+
+    def _start(self, w: Written) -> list[str]:
+        start = w.functions.get("start")
+        lines = ['"""The state at step 0, of velocities and coordinates."""']
+        for _, of, n in w.blocks:
+            numbers = f"{n} number{'s' * (n > 1)}"
+            lines += [f"if len({of}) != {n}:", f'    raise ValueError(f"{of}: expected {numbers}, got {{len({of})}}")']
+            lines.append(f"{of} = [float(each) for each in {of}]")
+        given = [f"[0.0] * {n}" if start and name == w.slot else of for name, of, n in w.blocks]
+        lines.append(f"s = {camel(self.prefix)}State({', '.join(given)})")
+        if start:
+            lines += [
+                "",
+                *self.body(
+                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
+                ),
+            ]
+        return [f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])]
+
+    def _step(self, w: Written) -> list[str]:
+        of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
+        return ["def step(self, s):", *indented(['"""One step."""', *self.body(w.functions["step"], of, of), "s.step += 1"])]
+
+    def _finish(self, w: Written) -> list[str]:
+        lines = ['"""The velocities at a state."""', f"velocities = [0.0] * {w.n_v}"]
+        lines += self.body(
+            w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
+        )
+        return ["def finish(self, s):", *indented([*lines, "return velocities"])]
+
+    def _work(self, w: Written) -> list[str]:
+        about = '    """The energy that the control has given since the start."""'
+        return ["def work(self, s):", about, f"    return s.tally / ({w.evaluations} * self.dt)"]

@@ -1,0 +1,185 @@
+"""What a file says, in the words of its language but not yet in its order: fields, what is made before the steps, functions."""
+
+from __future__ import annotations
+
+import re
+from math import prod
+from typing import NamedTuple
+
+from ..control import EnergyControl
+from ..explanation.formula import Formula
+from ..explanation.listing import Leaf, Line, Writer
+from .language import Assignment, Function, Language, Place
+from .names import Field, Names, fields
+from .tapes import STATE, STEP, TALLY, Operations, Part, Traced
+
+#: What is already called something in a function: its arguments and the time.
+LOCALS = ("m", "s", "t", "self", "coordinates", "velocities")
+
+#: Names that fields may not have, because something else of the object has them.
+MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
+
+
+#: What is named after an evaluation of the rates: the state at which it is made, and the increments.
+EVALUATION = re.compile(r"−?d?[vy](\d+)")
+
+
+class Table(NamedTuple):
+    """A sampled input: what its samples are called, where the first is in time, and how far the next."""
+
+    name: str
+    about: str
+    values: list[float]
+    start: str
+    interval: str
+
+
+class Written:
+    """All that a file says.
+
+    Attributes:
+        parameters: the fields that users may change, dt and t0 first.
+        made: what is made of them before the steps.
+        functions: "step", and "start" and "finish" of a method that carries something else than v.
+        tables: the sampled inputs.
+        slot: what the first block of a state is called.
+        n_v: how many numbers it has.
+        n_y: how many the second has.
+        evaluations: how often a step adds to the tally of a control; 0 without one.
+    """
+
+    def __init__(self, traced: Traced, language: Language) -> None:
+        plan, self.traced, self.language = traced.plan, traced, language
+        self.slot = plan.method.carry or "v"
+        self.n_v, self.n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+        control = plan.system.control
+        self.evaluations = 0 if control is None else plan.method.evaluations if isinstance(control, EnergyControl) else 1
+        names = language.fields
+        operations = traced.operations
+        used = {given for name, _, given in operations.all if name == "parameter"}
+        self.parameters = [Field(names("dt"), "the step", [plan.dt]), Field(names("t0"), "the time of step 0", [plan.t0])]
+        own, self._where = fields(traced.numbers, used, names)
+        self.parameters += own
+        self.tables: list[Table] = []
+        tables = Names()
+        for table in traced.tables:
+            of_time = [
+                Field(names(f"{table.name}.start"), f"{table.name}: the time of the first sample", [table.start]),
+                Field(names(f"{table.name}.interval"), f"{table.name}: the time to the next sample", [table.interval]),
+            ]
+            self.parameters += of_time
+            self.tables.append(Table(tables(table.name), table.name, table.values, *(each.name for each in of_time)))
+        language.tables = self.tables
+        kept = operations.kept(list(traced.parts.values()))
+        self.made, known = self._prepared(operations, kept)
+        self.functions = {name: self._function(part, operations, kept, known) for name, part in traced.parts.items()}
+
+    @property
+    def carries(self) -> bool:
+        """Whether something else than v is in the place of v."""
+        return self.slot != "v"
+
+    @property
+    def blocks(self) -> list[tuple[str, str, int]]:
+        """Of each block that is not empty: what it is called, what its velocities or coordinates are called, its length."""
+        both = [(self.slot, "velocities", self.n_v), ("y", "coordinates", self.n_y)]
+        return [each for each in both if each[2]]
+
+    @property
+    def shown(self) -> str:
+        """The block of which an example prints the first number."""
+        return "y" if self.n_y else self.slot
+
+    # ---- leaves
+
+    def _parameter(self, tape: object, i: int) -> Leaf:
+        name, place = self._where[i]
+        text = f"{self.language.me}{name}{''.join(f'[{each}]' for each in place)}"
+        return Leaf(Formula(text), tape.param(i), 1)  # type: ignore[attr-defined]
+
+    def _length(self, tape: object) -> Leaf:
+        return Leaf(Formula(f"{self.language.me}{self.language.fields('dt')}"), tape.step(), 1)  # type: ignore[attr-defined]
+
+    # ---- parts
+
+    def _prepared(self, operations: Operations, kept: list[int]) -> tuple[list[Assignment], list[Leaf]]:
+        """What is made before the steps, with how each is read afterwards."""
+        tape, names = next((part.tape, dict(part.names)) for part in self.traced.parts.values())
+        numbers = [name for name, _ in self.traced.numbers]
+        for i, name in enumerate(numbers):
+            if name == "omega":
+                names[(tape.step() * tape.param(i)).id] = "Φ"
+        self.language.before = True
+        writer = Writer(tape, names, self.language)
+
+        def leaf(name: str, given: int) -> Leaf:
+            return self._length(tape) if name == "step" else self._parameter(tape, given)
+
+        section, known = writer.section("run", operations.body(kept, {}, separate=False), leaf, 1, "c")
+        made = [self._assignment(line) for line in section.lines]
+        self.language.before = False
+        return made, known
+
+    def _function(self, part: Part, operations: Operations, kept: list[int], known: list[Leaf]) -> Function:
+        language, tape = self.language, part.tape
+        language.names = Names(LOCALS)
+        reads: dict[int, Place] = {}
+        asked: set[str] = set()
+
+        def place(names: list[str], i: int) -> Place:
+            """Where a number of the state is; what a control has added up comes last."""
+            block = names[i].partition("[")[0].rstrip("'")
+            at = -1 if block == TALLY else i if i < self.n_v else i - self.n_v
+            return Place(block, at, language.names(names[i]))
+
+        def state(i: int) -> Leaf:
+            reads[i] = place(part.inputs, i)
+            return Leaf(Formula(reads[i].name), tape.state(i), 4)
+
+        entries: list[Leaf] = []
+
+        def leaf(name: str, given: int) -> Leaf:
+            asked.add(name)
+            match name:
+                case "made":  # names of values are found again on a tape; these are of the step's
+                    return known[given] if tape is self.traced.parts["step"].tape else known[given]._replace(symbol=None)
+                case "entry":
+                    return entries[given]
+                case "step":
+                    return self._length(tape)
+                case "parameter":
+                    return self._parameter(tape, given)
+                case "time":
+                    return Leaf(Formula("t"), tape.time(), 3)
+                case _:
+                    return state(given)
+
+        made = {line: ("made", i) for i, line in enumerate(kept)}
+        rank = operations.rank
+        needed = operations.needed(part.roots, lambda line: rank[line] <= STEP)
+        read = {each for line in needed if rank[line] == STATE for each in operations.all[line][1]} | set(part.roots)
+        of_time = sorted(each for each in read if rank[each] == STEP and operations.all[each][1])
+        writer = Writer(tape, part.names, language)
+        before, entries = writer.section("step", operations.body(of_time, made, separate=False), leaf, 3, "s")
+        leaves = made | {line: ("entry", i) for i, line in enumerate(of_time)}
+        body = operations.body(part.roots, leaves, separate=True)
+        after, _ = writer.section("member step", body, leaf, 4, "a", part.results)
+        of_time_lines, lines = ([self._assignment(line) for line in section.lines] for section in (before, after))
+        writes = [place(part.results, i) for i in range(len(part.results))]
+        text = " ".join(each.text for each in [*of_time_lines, *lines])
+        return Function(
+            [reads[i] for i in sorted(reads)],
+            "time" in asked,
+            "time" in asked or language.me in text,
+            of_time_lines,
+            lines,
+            writes,
+        )
+
+    def _assignment(self, line: Line) -> Assignment:
+        language = self.language
+        word = language.me + language.fields(line.name, f"made {line.name}") if language.before else language.names(line.name)
+        note = line.note.replace("−", "-")
+        found = EVALUATION.match(line.note or line.name)
+        evaluation = int(found[1]) if found else 0
+        return Assignment(word, language.kinds.get(word, "number"), language.text(line.formula), note, evaluation)

@@ -1,0 +1,120 @@
+"""Logarithms.
+
+x = 2ᵏ·(1 + f) with 1 + f between √½ and √2, and s = f/(2 + f), so that ln(1 + f) = 2·artanh s = f − f²/2 + s·(f²/2 + R(s²)), as
+in fdlibm. ``docs/coefficients.py`` finds the coefficients of R.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from .exponential import LN2
+from .operations import add_bits, and_bits, either_bits, elementary, equal, or_bits, shift_down, sign_of, where
+from .pieces import fast_sum, halves, polynomial, power_of_two
+
+#: 2·(artanh s − s)/s³ in powers of s².
+LOG = (
+    0.6666666666666736,
+    0.39999999999405483,
+    0.28571428744061894,
+    0.22222198426151224,
+    0.18183571057432849,
+    0.15313895728652202,
+    0.1479736350587642,
+)
+#: √½, cut: the mantissa is taken from √½ to √2.
+HALF_ROOT = 0x3FE6A09E00000000
+TO_ONE = 0x3FF0000000000000 - HALF_ROOT
+MANTISSA = 0x000FFFFFFFFFFFFF
+#: 2⁵²: its low bits hold a whole number.
+TWO_52 = 0x4330000000000000
+LEAST_NORMAL = 2.0**-1022
+INFINITY, NAN = float("inf"), float("nan")
+#: 1/ln 2, 1/ln 10: a first part of 26 bits, and the rest.
+LOG2_E = (1.4426950514316559, -1.0542692476429138e-08)
+LOG10_E = (0.4342944845557213, -2.6524694553078553e-09)
+#: log₁₀ 2; k times the first part, of 40 bits, is exact.
+LOG10_2 = (0.3010299956640665, -8.532344317057107e-14)
+
+
+def exponent_and_rest(x: Any, *, normal: bool = False) -> tuple[Any, Any]:
+    """K and m of x = 2ᵏ·m with m from √½ to √2, of a positive number, which is not subnormal if ``normal``."""
+    offset: Any = 4503599627370496.0 + 1023.0
+    if not normal:
+        tiny = x < LEAST_NORMAL
+        x, offset = where(tiny, x * 2.0**54, x), where(tiny, offset + 54.0, offset)
+    u = add_bits(x, TO_ONE)
+    return or_bits(shift_down(u, 52), TWO_52) - offset, add_bits(and_bits(u, MANTISSA), HALF_ROOT)
+
+
+class Reduced(NamedTuple):
+    """ln x = k·ln 2 + f − half + rest, half = f²/2; s as above."""
+
+    k: Any
+    f: Any
+    half: Any
+    s: Any
+    rest: Any
+
+
+def reduced(x: Any, *, normal: bool = False) -> Reduced:
+    """Of a positive number."""
+    k, m = exponent_and_rest(x, normal=normal)
+    f = m - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    half = (0.5 * f) * f
+    return Reduced(k, f, half, s, s * (half + z * polynomial(z, LOG)))
+
+
+def at_the_ends(x: Any, value: Any) -> Any:
+    """A logarithm where x is positive and finite; −∞ of zero, NaN of negative numbers, ∞ and NaN as they are."""
+    value = where(x < INFINITY, value, x)
+    return where(x > 0.0, value, where(equal(x, 0.0), -INFINITY, NAN))
+
+
+@elementary
+def log(x: Any) -> Any:
+    """Natural logarithm of x, subnormal numbers included; −∞ of zero, NaN of what is below (fdlibm's algorithm).
+
+    Example:
+        >>> print(log(2.0))
+        0.6931471805599453
+    """
+    p = reduced(x)
+    return at_the_ends(x, p.k * LN2[0] - ((p.half - (p.rest + p.k * LN2[1])) - p.f))
+
+
+@elementary
+def log1p(x: Any) -> Any:
+    """Natural logarithm of 1 + x, also where x is small; −∞ of −1, NaN of what is below."""
+    u = 1.0 + x
+    one = u - x
+    lost = (1.0 - one) + (x - (u - one))  # 1 + x = u + lost (Knuth)
+    p = reduced(u, normal=True)
+    # The derivative, (1 − s)/(1 + s), is 1 − 2s + 2s² to a hundredth, and lost is that small beside the result.
+    lost = (lost * power_of_two(1.0 - p.k)) * (0.5 - (p.s - p.s * p.s))
+    value = p.k * LN2[0] - ((p.half - (p.rest + (p.k * LN2[1] + lost))) - p.f)
+    return at_the_ends(u, either_bits(value, sign_of(x)))
+
+
+def _in_base(x: Any, factor: tuple[float, float], unit: tuple[float, float]) -> Any:
+    """A logarithm to a base b, given 1/ln b and log_b 2, each in two parts."""
+    p = reduced(x)
+    upper, _ = halves(p.f - p.half)
+    lower = ((p.f - upper) - p.half) + p.rest
+    s, lost = fast_sum(p.k * unit[0], upper * factor[0])
+    lower = (lower * (factor[0] + factor[1]) + upper * factor[1]) + p.k * unit[1]
+    return at_the_ends(x, s + (lost + lower))
+
+
+@elementary
+def log2(x: Any) -> Any:
+    """Logarithm to base 2; exact for powers of 2. See ``log``."""
+    return _in_base(x, LOG2_E, (1.0, 0.0))
+
+
+@elementary
+def log10(x: Any) -> Any:
+    """Logarithm to base 10. See ``log``."""
+    return _in_base(x, LOG10_E, LOG10_2)

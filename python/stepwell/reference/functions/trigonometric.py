@@ -1,0 +1,127 @@
+"""Sine, cosine and tangent.
+
+The argument is reduced by n·π/2 to r in [−π/4, π/4] (Cody and Waite), with π/2 in four parts. n times each of the first three is
+exact for n < 2²⁴, so what remains of x near a multiple of π/2 is right to its own last bits, and a tail beyond them is kept. Of r
+both sine and cosine are computed, by polynomials as in fdlibm's kernels, and one of them is taken: a step that asks for both pays
+little more than for one. ``docs/coefficients.py`` finds the coefficients.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from .operations import add_bits, and_bits, elementary, equal, magnitude, shift_up, sign_of, turn_bits, where
+from .pieces import MAGIC, fast_sum, halves, polynomial, quotient
+
+#: π/2: three parts of 29 bits, and what then remains to 53.
+HALF_PI = (1.570796325802803, 9.920935808982456e-10, -1.2177051780877821e-18, 2.9038559739793605e-28)
+TWO_OVER_PI = 0.6366197723675814
+#: (sin r − r)/r³ in powers of r².
+SIN = (
+    -0.1666666666666663,
+    0.008333333333321976,
+    -0.00019841269829525107,
+    2.755731360899387e-06,
+    -2.505074680230245e-08,
+    1.5896212232510631e-10,
+)
+#: (cos r − 1 + r²/2)/r⁴ in powers of r².
+COS = (
+    0.041666666666666595,
+    -0.0013888888888873461,
+    2.480158728911982e-05,
+    -2.75573142586856e-07,
+    2.0875711707973604e-09,
+    -1.1359097367080523e-11,
+)
+#: π/180 and 180/π.
+DEGREE, RADIAN = 0.017453292519943295, 57.29577951308232
+#: The number of which only the lowest bit is set.
+ODD = 2.0**-1074
+#: Beyond it an argument is further from its neighbours than 1/8 of a radian, and has no sine worth the name.
+LARGEST_ANGLE = 2.0**50
+
+
+class Reduced(NamedTuple):
+    """|x| − n·π/2, and from it sine and cosine as sums of two numbers.
+
+    Attributes:
+        turn: a number in whose low bits n stands.
+        odd: whether n is odd.
+        z: r², rounded.
+        sine, sine_rest: sin r is their sum, of which the first is r.
+        cosine, cosine_rest: cos r is their sum, of which the first is 1 − r²/2, rounded.
+    """
+
+    turn: Any
+    odd: Any
+    z: Any
+    sine: Any
+    sine_rest: Any
+    cosine: Any
+    cosine_rest: Any
+
+
+def reduced(x: Any) -> Reduced:
+    """Both functions of what remains of |x|; NaN where it is too large."""
+    x = magnitude(x)
+    x = where(x <= LARGEST_ANGLE, x, float("nan"))
+    turn = x * TWO_OVER_PI + MAGIC
+    n = turn - MAGIC
+    a = x - n * HALF_PI[0]
+    b = n * HALF_PI[1]
+    c = a - b
+    d = n * HALF_PI[2] - ((a - c) - b)
+    r = c - d
+    tail = ((c - r) - d) - n * HALF_PI[3]
+    z = r * r
+    half = 0.5 * z
+    cosine = 1.0 - half
+    sine_rest = (z * r) * polynomial(z, SIN) + tail * cosine
+    cosine_rest = ((1.0 - cosine) - half) + ((z * z) * polynomial(z, COS) - r * tail)
+    return Reduced(turn, equal(and_bits(turn, 1), ODD), z, r, sine_rest, cosine, cosine_rest)
+
+
+@elementary
+def sin(x: Any) -> Any:
+    """Sin x, x in radians; NaN beyond 2⁵⁰ (fdlibm's kernels; Cody and Waite's reduction).
+
+    Example:
+        >>> print(sin(0.5))
+        0.479425538604203
+    """
+    p = reduced(x)
+    value = where(p.odd, p.cosine + p.cosine_rest, p.sine + p.sine_rest)
+    return turn_bits(value, sign_of(turn_bits(shift_up(p.turn, 62), x)))
+
+
+@elementary
+def cos(x: Any) -> Any:
+    """Cos x, x in radians; NaN beyond 2⁵⁰ (see ``sin``)."""
+    p = reduced(x)
+    value = where(p.odd, p.sine + p.sine_rest, p.cosine + p.cosine_rest)
+    return turn_bits(value, sign_of(shift_up(add_bits(p.turn, 1), 62)))
+
+
+@elementary
+def tan(x: Any) -> Any:
+    """Tan x, x in radians; NaN beyond 2⁵⁰ (see ``sin``). The quotient of both, each to more than 53 bits."""
+    p = reduced(x)
+    r1, r2 = halves(p.sine)
+    z_rest = (r1 * r1 - p.z) + r2 * (p.sine + r1)  # what is lost of r² would be a quarter of a unit in the last place
+    (s, s_rest), (c, c_rest) = fast_sum(p.sine, p.sine_rest), fast_sum(p.cosine, p.cosine_rest - 0.5 * z_rest)
+    pairs = zip((c, c_rest, s, s_rest), (s, s_rest, c, c_rest), strict=True)
+    q, rest = quotient(*(where(p.odd, yes, no) for yes, no in pairs))
+    return turn_bits(q + rest, sign_of(turn_bits(shift_up(p.turn, 63), x)))
+
+
+@elementary
+def deg2rad(x: Any) -> Any:
+    """Degrees in radians: x times π/180, rounded."""
+    return x * DEGREE
+
+
+@elementary
+def rad2deg(x: Any) -> Any:
+    """Radians in degrees: x times 180/π, rounded."""
+    return x * RADIAN

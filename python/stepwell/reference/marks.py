@@ -1,0 +1,111 @@
+"""Marks: which values on a tape are sin x, log x and so on, of which arguments.
+
+Such a function is made of sums, products, roundings and operations on bits. Its value is right to the last bits; a derivative
+taken line by line would not be, since rounding to a whole number and moving bits have none. So whoever differentiates a tape
+(``stepwell.derivatives``) needs to know that a value is sin x, and takes cos x. The functions say so while they are traced:
+
+    with recording() as marks:
+        ...  # trace something that calls functions decorated with @differentiable
+
+Outside of ``recording`` nothing is noted, and on numbers nothing ever is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from .._core import Symbol
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: The decorated functions by name, with which derivatives of others are written.
+FUNCTIONS: dict[str, Callable[..., Any]] = {}
+
+
+class Mark(NamedTuple):
+    """That a value is a function of others.
+
+    Attributes:
+        name: of the function.
+        arguments: symbols, or numbers that are known.
+        function: the function itself, if it is decorated.
+    """
+
+    name: str
+    arguments: tuple[Any, ...]
+    function: Callable[..., Any] | None
+
+
+#: Of the symbols of one tape, by the number of the operation that makes them, what they are.
+Marks = dict[int, Mark]
+
+_active: ContextVar[Marks | None] = ContextVar("marks", default=None)
+
+
+@contextmanager
+def recording(marks: Marks | None = None) -> Iterator[Marks]:
+    """Note the functions that are called with symbols, in a new table or in this one. All symbols must be of one tape."""
+    kept: Marks = {} if marks is None else marks
+    before = _active.set(kept)
+    try:
+        yield kept
+    finally:
+        _active.reset(before)
+
+
+def active() -> Marks | None:
+    """The table in use, or None."""
+    return _active.get()
+
+
+def mark(name: str, result: Any, *arguments: Any, function: Callable[..., Any] | None = None) -> Any:
+    """Note that ``result`` is the function ``name`` of ``arguments``, number by number, and return it.
+
+    Nothing is noted outside of ``recording``, and of results that are no symbols.
+    """
+    marks = _active.get()
+    if marks is None:
+        return result
+    if isinstance(result, Symbol) and not any(isinstance(each, np.ndarray) for each in arguments):
+        _note(marks, name, result, arguments, function)
+    elif np.asarray(result).dtype == object:
+        for value, *each in np.broadcast(result, *arguments):
+            _note(marks, name, value, tuple(each), function)
+    return result
+
+
+def _note(marks: Marks, name: str, result: Any, arguments: tuple[Any, ...], function: Callable[..., Any] | None) -> None:
+    """Note one number's function.
+
+    A value that is older than its arguments is none that the function made: the tape found it equal to an earlier one, as
+    maximum(x, x) is x. It keeps the derivative that it has; what was noted first stays for the same reason.
+    """
+    if isinstance(result, Symbol) and all(each.id < result.id for each in arguments if isinstance(each, Symbol)):
+        marks.setdefault(result.id, Mark(name, arguments, function))
+
+
+def differentiable(name: str, *, general: bool = True) -> Callable[[Function], Function]:
+    """Decorate a function over arrays and symbols, all arguments numbers, so that its values are marked.
+
+    Args:
+        name: the function's name in the table of derivatives, ``stepwell.derivatives.rules``.
+        general: whether derivatives of functions in other files may be written with this one.
+    """
+
+    def decorate(function: Function) -> Function:
+        @wraps(function)
+        def marked(*arguments: Any) -> Any:
+            value = function(*arguments)
+            return value if _active.get() is None else mark(name, value, *arguments, function=function)
+
+        if general or name not in FUNCTIONS:
+            FUNCTIONS[name] = marked
+        return marked  # type: ignore[return-value]
+
+    return decorate

@@ -1,0 +1,83 @@
+"""A user's own equations: their function, run with the numbers of a state."""
+
+from typing import Any
+
+import numpy as np
+
+from ..functions.operations import where
+from ..types import Array
+
+
+class Equations:
+    """The rates are what ``rates`` makes of the time, the state and what the system is given by name.
+
+    ``rates`` runs the user's function over arrays whose last axes are those of the batch. Under a control both rates are pushed
+    along the gradient of an invariant I, by −gain·(I − target)·∇I/|∇I|², so that I − target decays as exp(−gain·t) (Baumgarte
+    1972); in the limited form by as much as backward Euler, gain/(1 + h·gain), for which no gain is too large.
+    """
+
+    def __init__(self, h: float, /, **given: Any) -> None:
+        self.h = np.asarray(h)
+        self.equations = given.pop("equations()")
+        self.gain, self.target = given.pop("control.gain", None), given.pop("control.target", None)
+        self.given = given
+
+    def rates(self, t: float, v: Array, y: Array) -> tuple[Array, Array]:
+        """v̇ and ẏ."""
+        rates: tuple[Array, Array] = self.equations.rates(t, v, y, self.given)
+        if self.gain is None:
+            return rates
+        push, along = self._push(v, y), self.gradient(v, y)
+        return rates[0] - push * along[0], rates[1] - push * along[1]
+
+    def _push(self, v: Array, y: Array) -> Any:
+        """By how much of the gradient both rates are pushed; by nothing where it is zero."""
+        square = self.gradient(v, y)[2]
+        gain = self.gain[()]
+        if self.equations.limited:
+            gain = gain / (1.0 + self.h[()] * gain)
+        off = self._invariant().value(v, y, self.given) - self.target[()]
+        return where(square > 0.0, (gain * off) / square, 0.0)
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇."""
+        return self.h * self.rates(t, v, y)[0]
+
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
+        return self.h * (v if self.equations.second_order else self.rates(t, v, y)[1])
+
+    def velocity(self, d: Array) -> Array:
+        """The v whose increment of y is d."""
+        velocity: Array = d / self.h
+        return velocity
+
+    def _invariant(self) -> Any:
+        return self.equations.invariants[self.equations.kept]
+
+    def energies(self, v: Array, y: Array) -> tuple[Any, Any, Any]:
+        """Nothing of h·v̇ and of a kinetic energy; h times the invariant that is kept."""
+        return None, None, self.h * self._invariant().value(v, y, self.given)
+
+    def gradient(self, v: Array, y: Array, dv: Any = None) -> tuple[Array, Array, Any]:
+        """The derivatives of the invariant that is kept by v and y, and the square of their length."""
+        along_v, along_y, square = self._invariant().gradient(v, y, self.given)
+        (own_v, own_y), (batch_v, batch_y) = self.equations.shapes, self.equations.batches(v, y)
+        return stacked(along_v, own_v, batch_v), stacked(along_y, own_y, batch_y), square
+
+    def record(self, name: str, v: Array, y: Array) -> Array:
+        """An invariant of a state."""
+        value: Array = self.equations.invariants[name].value(v, y, self.given)
+        return value
+
+
+def stacked(rows: list[Any], own: tuple[int, ...], batch: tuple[int, ...]) -> Any:
+    """Numbers, or symbols, as a block of this shape, whose last axes are those of the batch."""
+    if any(hasattr(row, "xor_bits") for row in rows):
+        made = np.empty(len(rows), dtype=object)
+        made[:] = rows
+        return made.reshape(own)
+    made = np.empty((len(rows), *np.broadcast_shapes(batch, *(np.shape(row) for row in rows))))
+    for i, row in enumerate(rows):
+        made[i] = row
+    return made.reshape((*own, *made.shape[1:]))

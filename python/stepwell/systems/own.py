@@ -1,0 +1,282 @@
+"""Systems of users' own equations."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from .. import _checks, _core
+from .._checks import Array, Shape
+from ..control import WAYS, Control, EnergyControl, Projection
+from ..equations.definition import Definition, fits
+from ..equations.trace import Equations
+from ..errors import ShapeError, TraceError, UnsupportedError
+from ..reference.systems.equations import Equations as Reference
+from ..reference.traced import Tracer
+from .base import TINY, Given, System, aligned, flat, shown
+from .inputs import Input, Sampled, Sinusoid
+
+#: What the function is given as, among the names of parameters; none of these can be called so.
+RATES = "equations()"
+#: Attributes that are found out of the others and kept.
+FOUND_LATER = ("_core", "_bounds")
+#: Without a state the shortest vector is looked for that the function can do with, up to this length.
+LONGEST_GUESS = 32
+
+
+class OwnSystem(System):
+    """A system of equations of one's own: what a function decorated by ``stepwell.system`` returns."""
+
+    kernel = "equations"
+    reference = Reference
+    #: What keeps an invariant as a part of the rates, if anything does.
+    push: Control | None = None
+
+    def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
+        self.definition = definition
+        self.parameters_given: dict[str, Any] = {}
+        batches = {}
+        for name, value in parameters.items():
+            default = definition.parameters[name]
+            own = 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+            argument = f"{definition.name}: {name}"
+            if isinstance(value, (Sinusoid, Sampled)) or callable(value):
+                if own:
+                    raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
+                self.parameters_given[name] = value
+                batches[name] = getattr(value, "batch", ())
+                continue
+            numbers = _checks.numbers(argument, value)
+            if numbers.ndim < own:
+                raise ShapeError(f"{argument}: expected {own} axes of its own, as its default has, got shape {numbers.shape}")
+            self.parameters_given[name] = numbers
+            batches[name] = numbers.shape[own:]
+        self.batch = _checks.batch_shape({f"{definition.name}: {name}": shape for name, shape in batches.items()})
+        self.second_order = definition.order == 2 and definition.blocks == 1
+        self.equations: Equations | None = None
+        self._core: Any = None
+        #: For states of shapes that were met before.
+        self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
+
+    def said(self) -> list[str]:
+        """The parameters."""
+        return shown(**self.parameters_given)
+
+    def __repr__(self) -> str:
+        said = self.said() + [repr(each) for each in (self.control, self.push) if each is not None]
+        return f"{self.definition.name}({', '.join(said)})"
+
+    def _held(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in FOUND_LATER}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._held() | {"_core": None, "_bounds": {}}
+
+    def __deepcopy__(self, memo: Any) -> OwnSystem:
+        again = copy.copy(self)
+        again.parameters_given = copy.deepcopy(self.parameters_given, memo)
+        if self.control is not None:
+            again.control = copy.deepcopy(self.control, memo)
+        again._bounds = {}
+        return again
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+        default = self.definition.parameters[name]
+        return 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+
+    # ---- shapes
+
+    def sized(self, *states: Any) -> OwnSystem:
+        """The same system for the states v and y of these shapes; None is what was not given."""
+        given = dict(zip(("v", "y"), states, strict=False))
+        shapes = {name: _checks.shape_of(name, state) for name, state in given.items() if state is not None}
+        if self.equations is not None and self._fits(shapes):
+            return self
+        refused: list[TraceError] = []
+        for v_shape, y_shape in self._candidates(shapes):
+            try:
+                return self._bound(v_shape, y_shape)
+            except TraceError as error:
+                refused.append(error)
+        if not refused:
+            raise ShapeError(
+                f"{self.definition.name}: no state of the declared shape {self.definition.shape[1]} fits what was given: "
+                + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
+            )
+        # What a function of an array says when it is given a number is not what is wrong with it.
+        raise next((error for error in refused if not error.of_shape), refused[0])
+
+    def _fits(self, shapes: dict[str, Shape]) -> bool:
+        """Whether blocks of the known shapes can be the first axes of these."""
+        mine = {"v": self.v_shape, "y": self.y_shape}
+        return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
+
+    def _candidates(self, shapes: dict[str, Shape]) -> Iterator[tuple[Shape, Shape]]:
+        """Shapes of v and y that the function may be written for, the least first."""
+        declared_v, declared_y = self.definition.shape
+        v, y = shapes.get("v", ()), shapes.get("y", ())
+        if self.definition.blocks == 2:
+            pairs = [(v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1)]
+        elif not (v or y):
+            # Nothing is said of the state: a number, or the shortest vector.
+            shortest = [(), *((n,) for n in range(1, LONGEST_GUESS + 1))]
+            whole = declared_y is not None and None not in declared_y
+            sizes: list[Shape] = [tuple(n or 1 for n in declared_y)] if whole and declared_y is not None else shortest
+            pairs = [((0,) if self.definition.order == 1 else size, size) for size in sizes]
+        elif self.definition.order == 1:
+            pairs = [((0,), y[:n]) for n in range(len(y) + 1)]
+        else:
+            longest = max(v, y, key=len)
+            pairs = [(longest[:n], longest[:n]) for n in range(len(longest) + 1)]
+        for v_shape, y_shape in pairs:
+            if fits(v_shape, declared_v) and fits(y_shape, declared_y):
+                yield v_shape, y_shape
+
+    def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
+        """The same system for blocks of these shapes; the function is traced, twice to see that it always does the same."""
+        if (known := self._bounds.get((v_shape, y_shape))) is not None:
+            return known
+        definition = self.definition
+        bound = copy.copy(self)
+        bound._bounds = {}
+        bound.v_shape, bound.y_shape = v_shape, y_shape
+        shapes = {
+            name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
+            for name, value in self.parameters_given.items()
+        }
+        bound.equations = Equations(definition, v_shape, y_shape, shapes)
+        bound._trace()
+        self._bounds[v_shape, y_shape] = bound
+        return bound
+
+    def _trace(self) -> None:
+        """Run the function with symbols, twice to see that it always does the same; a control is a part of the rates."""
+        equations, definition = self.equations, self.definition
+        assert equations is not None
+        plain = copy.copy(self)
+        plain.control = None  # a projection comes after the step, and is the core's
+        tape = _core.Tape()
+        traced = []
+        for _ in range(2):
+            tracer = Tracer(plain, tape)
+            v, y, _more = tracer.state()
+            s = tracer.scaled(tape.step())
+            dv, dy = s.rates(tape.time(), v, y)
+            traced.append((tracer.flat(dv), tracer.flat(dy)))
+        if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
+            raise TraceError(
+                f"{definition.name}: expected the same operations at every call, got others: a function of a step may not draw "
+                f"random numbers or count its calls"
+            )
+        dv, dy = traced[0]
+        quantities = [(name, *tracer.flat(s.record(name, v, y))) for name in self.quantities]
+        kept = None
+        if equations.kept is not None and not equations.pushed:
+            value = equations.invariants[equations.kept].value(v, y, s.given)
+            along_v, along_y, square = s.gradient(v, y)
+            kept = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
+        self._core = tape.equations(
+            dv if equations.v_shape != (0,) else [], None if equations.second_order else dy, quantities, kept
+        )
+        self.velocity_term = "forces that do" if self._core.reads_v else None
+
+    def _known(self) -> OwnSystem:
+        """The same system, of which the shapes of its blocks are known."""
+        return self if self.equations is not None else self.sized()
+
+    # ---- what the core and the reference take
+
+    def given(self, batch: Shape) -> dict[str, Any]:
+        """The function, and parameters by name."""
+        made: dict[str, Any] = {RATES: self._known().equations}
+        for name, value in self.parameters_given.items():
+            if isinstance(value, (Sinusoid, Sampled)):
+                made[name] = value.signal()
+            elif isinstance(value, np.ndarray):
+                own = self.own_axes(name)
+                made[name] = aligned(value, own, batch) if own else value
+            else:
+                made[name] = value
+        return made if self.push is None else made | self.push.given()
+
+    def parameters(self, batch: Shape) -> Given:
+        """The operations of the function, and parameters by name, as the core takes them."""
+        bound = self._retraced()
+        given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, bound._core), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+
+    def _retraced(self) -> OwnSystem:
+        """With its operations, which a copy from a file has not."""
+        known = self._known()
+        if known._core is None:
+            known._trace()
+        return known
+
+    # ---- invariants
+
+    @property
+    def quantities(self) -> dict[str, Shape]:
+        """The invariants, each one number."""
+        return dict.fromkeys(self.definition.invariants, ())
+
+    def energy(self, v: Array, y: Array) -> Array:
+        """The invariant that is called ``energy``."""
+        if "energy" not in self.definition.invariants:
+            raise UnsupportedError(
+                f"energy: {self!r} has no invariant of that name; declare one: @{self.definition.name}.invariant above "
+                f"def energy({'v, y' if self.definition.has_v else 'y'}, *, …)"
+            )
+        return np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+
+    def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
+        """The same system with an invariant that is kept, at its value at the start if the control has no target."""
+        name = self._invariant_of(control)
+        with np.errstate(all="ignore"):
+            start = np.asarray(self.alone(1.0, np.shape(y)[len(self.y_shape) :]).record(name, v, y))
+        return self._keeping(name, control.aimed(start, start, dt))
+
+    def under(self, control: Any, batch: Shape) -> OwnSystem:
+        """The same, for unknown states of that batch shape."""
+        return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
+
+    def _invariant_of(self, control: Any) -> str:
+        """The name of the invariant that a control is for."""
+        if isinstance(control, EnergyControl):
+            raise UnsupportedError(
+                f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "
+                f"Control('energy', gain), which pushes along the gradient of an invariant"
+            )
+        name = control.invariant
+        if isinstance(control, Projection) and control.way in WAYS:
+            if control.way == "scaling":
+                raise UnsupportedError(
+                    f"control: Projection('scaling') scales velocities by the kinetic energy, which {self!r} does not tell; use "
+                    f"Projection('energy'), which goes along the gradient of an invariant"
+                )
+            name = "energy"
+        return _checks.known("control", name, self.definition.invariants)
+
+    def _keeping(self, name: str, control: Any) -> OwnSystem:
+        known = self._known()
+        assert known.equations is not None
+        kept = copy.copy(known)
+        kept._bounds = {}
+        kept._free = known
+        kept.batch = _checks.batch_shape({"system": known.batch, "control": control.batch})
+        pushed = isinstance(control, Control)
+        kept.equations = known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed)
+        if pushed:
+            kept.push, kept.second_order = control, False
+        else:
+            kept.control = control
+        kept._trace()
+        kept.velocity_term = kept.velocity_term or "a control of an invariant"
+        return kept
+
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs among the parameters, by name."""
+        return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}

@@ -1,0 +1,282 @@
+//! A user's own equations: the rates as operations, from the state, the parameters, the inputs and the time.
+//!
+//! They come from a function that was run once with symbols. Run again over any kind of number, they are a system like others.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use crate::{
+    error::Error,
+    number::{Number, Symbol},
+    spec::{Given, Parameters},
+    system::{Block, Energies, Gradient, Kind, Shape, System},
+    tape::{Id, Op, eval},
+};
+
+/// What the core knows of it. Given: the equations, and what their leaves are numbered by.
+pub const KIND: Kind = Kind {
+    name: "equations",
+    shape,
+    velocity_term: |given| given.equations.as_ref().filter(|e| e.reads_v()).map(|_| "a force that depends on v"),
+    quantities,
+    operations: |given| given.equations.as_ref().map_or(0, |e| e.ops.len()),
+    long: None,
+    numbers: make,
+    symbols: make,
+};
+
+/// An invariant that is kept, and its gradient.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Invariant {
+    /// Its value.
+    pub value: Id,
+    /// Its derivatives by the numbers of v.
+    pub along_v: Vec<Id>,
+    /// Its derivatives by the numbers of y.
+    pub along_y: Vec<Id>,
+    /// The square of the gradient's length.
+    pub square: Id,
+}
+
+/// The rates of a system, as operations.
+#[derive(Clone, Debug)]
+pub struct Equations {
+    ops: Vec<Op>,
+    /// How many numbers v has, and their rates.
+    dv: Vec<Id>,
+    /// The rates of y; none if they are v itself.
+    dy: Option<Vec<Id>>,
+    /// Quantities of a state, each one number, by name.
+    quantities: Vec<(String, Id)>,
+    /// What a projection keeps.
+    kept: Option<Invariant>,
+    /// What tells it from others, found once: steps are looked up by what they are made of.
+    digest: u64,
+}
+
+impl PartialEq for Equations {
+    fn eq(&self, other: &Equations) -> bool {
+        let parts = |e: &Equations| (e.dv.clone(), e.dy.clone(), e.quantities.clone(), e.kept.clone());
+        self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other)
+    }
+}
+
+impl Eq for Equations {}
+
+impl Hash for Equations {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.digest.hash(state);
+    }
+}
+
+impl Equations {
+    /// Rates as operations; those of y are none if they are v itself.
+    pub fn new(
+        ops: Vec<Op>,
+        dv: Vec<Id>,
+        dy: Option<Vec<Id>>,
+        quantities: Vec<(String, Id)>,
+        kept: Option<Invariant>,
+    ) -> Equations {
+        let mut hasher = DefaultHasher::new();
+        (&ops, &dv, &dy, &quantities, &kept).hash(&mut hasher);
+        Equations { ops, dv, dy, quantities, kept, digest: hasher.finish() }
+    }
+
+    /// The same without operations that nothing asks for.
+    #[must_use]
+    pub fn without_the_rest(self) -> Equations {
+        let needed = self.needed(&self.roots().collect::<Vec<_>>());
+        let mut place = vec![0; self.ops.len()];
+        let mut ops = Vec::new();
+        for (id, op) in self.ops.iter().enumerate().filter(|(id, _)| needed[*id]) {
+            place[id] = ops.len() as Id;
+            ops.push(op.with(|operand| place[operand as usize]));
+        }
+        let at = |id: Id| place[id as usize];
+        let all = |ids: Vec<Id>| ids.into_iter().map(at).collect::<Vec<_>>();
+        let kept = self.kept.map(|kept| Invariant {
+            value: at(kept.value),
+            along_v: all(kept.along_v),
+            along_y: all(kept.along_y),
+            square: at(kept.square),
+        });
+        let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
+        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept)
+    }
+
+    /// Whether there is an invariant that a projection can keep.
+    pub fn has_gradient(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// All values that are asked for.
+    fn roots(&self) -> impl Iterator<Item = Id> {
+        let kept = self.kept.iter().flat_map(|kept| kept.along_v.iter().chain(&kept.along_y).chain([&kept.value, &kept.square]));
+        self.dv.iter().chain(self.dy.iter().flatten()).chain(self.quantities.iter().map(|(_, id)| id)).chain(kept).copied()
+    }
+
+    fn shape(&self) -> Shape {
+        Shape { v: self.dv.len(), y: self.dy.as_ref().map_or(self.dv.len(), Vec::len) }
+    }
+
+    /// Whether a rate of v depends on v.
+    pub fn reads_v(&self) -> bool {
+        let needed = self.needed(&self.dv);
+        self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
+    }
+
+    /// Which operations these values are made of.
+    fn needed(&self, roots: &[Id]) -> Vec<bool> {
+        let mut needed = vec![false; self.ops.len()];
+        roots.iter().for_each(|id| needed[*id as usize] = true);
+        for (id, op) in self.ops.iter().enumerate().rev() {
+            if needed[id] {
+                let (operands, n) = op.operands();
+                operands[..n].iter().for_each(|operand| needed[*operand as usize] = true);
+            }
+        }
+        needed
+    }
+
+    /// An error unless each operation comes after what it reads and no leaf is beyond what is given.
+    fn check(&self, given: &Given) -> Result<(), Error> {
+        let states = self.shape().v + self.shape().y;
+        let (parameters, tables) = (given.parameters(), given.tables.len());
+        let fits = |(id, op): (usize, &Op)| {
+            let (operands, n) = op.operands();
+            let leaf = match *op {
+                Op::State(i) => (i as usize) < states,
+                Op::Param(i) => (i as usize) < parameters,
+                Op::Sample(table, _) => (table as usize) < tables,
+                Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => false,
+                _ => true,
+            };
+            leaf && operands[..n].iter().all(|operand| (*operand as usize) < id)
+        };
+        let shape = self.shape();
+        let whole = self.kept.as_ref().is_none_or(|kept| (kept.along_v.len(), kept.along_y.len()) == (shape.v, shape.y));
+        if whole && self.ops.iter().enumerate().all(fits) && self.roots().all(|id| (id as usize) < self.ops.len()) {
+            Ok(())
+        } else {
+            Err(Error::Options { system: given.system.clone(), options: "operations that do not belong together".into() })
+        }
+    }
+}
+
+fn quantities(given: &Given) -> Vec<(String, usize)> {
+    given.equations.iter().flat_map(|e| &e.quantities).map(|(name, _)| (name.clone(), 1)).collect()
+}
+
+fn shape(given: &Given) -> Result<Shape, Error> {
+    let Some(equations) = &given.equations else {
+        return Err(Error::Shape { what: "equations", expected: 1, got: 0 });
+    };
+    equations.check(given)?;
+    Ok(equations.shape())
+}
+
+/// A number that any operation can make.
+trait Operand: Number {
+    fn made(op: Op, operands: [Self; 3]) -> Self;
+}
+
+impl Operand for f64 {
+    fn made(op: Op, operands: [f64; 3]) -> f64 {
+        let [a, b, c] = operands.map(f64::to_bits);
+        f64::from_bits(eval::apply(op, a, b, c))
+    }
+}
+
+impl Operand for Symbol {
+    fn made(op: Op, operands: [Symbol; 3]) -> Symbol {
+        let mut operands = operands.into_iter().map(|symbol| symbol.0);
+        Symbol::new(op.with(|id| operands.next().unwrap_or(id)))
+    }
+}
+
+struct Own<N: Number> {
+    h: N,
+    numbers: Vec<N>,
+    sample: fn(u32, N) -> N,
+    equations: std::sync::Arc<Equations>,
+    /// Which operations the rates of v, and those of y, need.
+    of_v: Vec<bool>,
+    of_y: Vec<bool>,
+}
+
+fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
+    let equations = p.given.equations.clone().unwrap_or_else(|| Equations::new(Vec::new(), Vec::new(), None, Vec::new(), None).into());
+    let (of_v, of_y) = (equations.needed(&equations.dv), equations.needed(equations.dy.as_deref().unwrap_or(&[])));
+    Box::new(Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations, of_v, of_y })
+}
+
+impl<N: Operand> Own<N> {
+    /// h times these rates.
+    fn rates(&self, needed: &[bool], roots: &[Id], t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.values(needed, roots, t, v, y) * self.h
+    }
+
+    /// Values of a state, whatever the time.
+    fn of_state(&self, roots: &[Id], v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.values(&self.equations.needed(roots), roots, N::of(0.0), v, y)
+    }
+
+    fn values(&self, needed: &[bool], roots: &[Id], t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let mut made: Vec<N> = Vec::with_capacity(needed.len());
+        for (op, needed) in self.equations.ops.iter().zip(needed) {
+            let (operands, n) = op.operands();
+            // What is not needed is not there: nothing that is needed reads it.
+            let value = match *op {
+                _ if !needed => t,
+                Op::State(i) if (i as usize) < v.len() => v[i as usize],
+                Op::State(i) => y[i as usize - v.len()],
+                Op::Param(i) => self.numbers[i as usize],
+                Op::Time => t,
+                Op::Step => self.h,
+                Op::Sample(table, at) => (self.sample)(table, made[at as usize]),
+                _ => {
+                    let mut values = [t; 3];
+                    operands[..n].iter().zip(&mut values).for_each(|(id, value)| *value = made[*id as usize]);
+                    N::made(*op, values)
+                }
+            };
+            made.push(value);
+        }
+        Block::from_iterator(roots.len(), roots.iter().map(|id| made[*id as usize]))
+    }
+}
+
+impl<N: Operand> System<N> for Own<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.rates(&self.of_v, &self.equations.dv, t, v, y)
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        match &self.equations.dy {
+            Some(dy) => self.rates(&self.of_y, dy, t, v, y),
+            None => v * self.h,
+        }
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        d.map(|d| d / self.h)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        let kept = self.equations.kept.as_ref()?;
+        let unknown = N::of(f64::NAN); // what is kept is one number, of which no part is kinetic; rates are not asked for
+        let whole = self.h * self.of_state(&[kept.value], v, y)[0];
+        Some(Energies { dv: Block::from_element(v.len(), unknown), kinetic: unknown, whole })
+    }
+
+    fn gradient(&self, v: &Block<N>, y: &Block<N>, _: &Energies<N>) -> Option<Gradient<N>> {
+        let kept = self.equations.kept.as_ref()?;
+        let along = |roots: &[Id]| self.of_state(roots, v, y);
+        Some(Gradient { v: along(&kept.along_v), y: along(&kept.along_y), square: along(&[kept.square])[0] })
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        let (_, id) = self.equations.quantities.iter().find(|(name, _)| name == quantity)?;
+        Some(vec![self.of_state(&[*id], v, y)[0]])
+    }
+}

@@ -1,0 +1,206 @@
+"""Exported steps, compiled and run in their languages: many in one program, which tells the bits of every number."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import struct
+import subprocess
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+from stepwell.exports.names import camel
+from stepwell.reference.fused import fma
+
+#: Seconds that compilers and programs may take on a busy machine.
+PATIENCE = 300
+
+#: What compilers are asked to complain of.
+C_FLAGS = ["-O2", "-ffp-contract=off", "-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+RUST_FLAGS = ["--edition=2021", "-C", "opt-level=1", "-C", "debuginfo=0", "-D", "warnings"]
+
+TOOLS = {"c": "cc", "javascript": "node", "rust": "rustc", "python": "python"}
+
+
+def missing(language: str) -> bool:
+    """Whether this machine cannot run a language."""
+    return language != "python" and shutil.which(TOOLS[language]) is None
+
+
+@dataclass
+class Journey:
+    """A step that goes abroad: what is exported, the state at the start, and how many steps are made.
+
+    ``changed`` are parameters that are set in the exported code, and have these values in ``twin``, the system by which
+    ``integrate`` says what should come of it.
+    """
+
+    system: sw.System
+    method: str
+    v: Any
+    y: Any
+    steps: int = 30
+    dt: float = 0.1
+    t0: float = 0.37
+    member: int | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+    changed: dict[str, float] = field(default_factory=dict)
+    twin: sw.System | None = None
+    expected: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        given = {"v": self.v, "y": self.y, "dt": self.dt, "t0": self.t0, **self.options}
+        with np.errstate(all="ignore"):
+            run = sw.integrate(self.twin or self.system, self.method, steps=self.steps, **given)
+        at = (...,) if self.member is None else (..., self.member)
+        blocks = [run.v[-1][at], run.y[-1][at]] + ([] if run.work is None else [run.work[at]])
+        self.expected = [float(each) for block in blocks for each in np.ravel(block)]
+
+    def export(self, language: str, name: str) -> sw.ExportedStep:
+        """The step in a language."""
+        options = {"dt": self.dt, "t0": self.t0, "member": self.member, **self.options}
+        return sw.export(self.system, self.method, language, v=self.v, y=self.y, name=name, **options)
+
+    @property
+    def blocks(self) -> list[list[float]]:
+        """The state of the member at the start."""
+        at = (...,) if self.member is None else (..., self.member)
+        shapes = self.system.v_shape, self.system.y_shape
+        wide = [np.broadcast_to(b, s) if np.ndim(b) == 0 else b[at] for b, s in zip((self.v, self.y), shapes, strict=True)]
+        return [[float(each) for each in np.ravel(block)] for block in wide]
+
+    @property
+    def carries(self) -> bool:
+        return sw.method(self.method).carry is not None
+
+    @property
+    def works(self) -> bool:
+        return "control" in self.options
+
+
+def bits(x: float) -> int:
+    (whole,) = struct.unpack("<Q", struct.pack("<d", x))
+    return int(whole)
+
+
+def same(a: float, b: float) -> bool:
+    """To the bit, but for which NaN a NaN is."""
+    return (a != a and b != b) or bits(a) == bits(b)
+
+
+def run(language: str, journeys: Sequence[Journey], folder: Path, sources: Sequence[str] | None = None) -> list[list[float]]:
+    """What comes of each: velocities, coordinates, what a control has given. ``sources`` stand in the place of the exports."""
+    if sources is None:
+        sources = [each.export(language, f"step_{i}").source for i, each in enumerate(journeys)]
+    lines = {"c": _c, "javascript": _javascript, "rust": _rust, "python": _python}[language](journeys, sources, folder)
+    return [[struct.unpack("<d", struct.pack("<Q", int(word, 16)))[0] for word in line.split()] for line in lines]
+
+
+def executed(command: Iterable[Any], folder: Path) -> str:
+    done = subprocess.run([str(each) for each in command], cwd=folder, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stderr[-4000:]
+    assert not done.stderr, done.stderr[-4000:]
+    return done.stdout
+
+
+def _hex(values: Iterable[float]) -> str:
+    return ", ".join(map(float.hex, values))
+
+
+def _c(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
+    text = "".join(sources) + "\n#include <stdio.h>\n"
+    text += "static void tell(const double *x, int n) { for (int i = 0; i < n; i++) { uint64_t b; memcpy(&b, x + i, 8); "
+    text += 'printf("%llx ", (unsigned long long)b); } }\n'
+    for i, each in enumerate(journeys):
+        p, (v, y) = f"step_{i}", each.blocks
+        slot = sw.method(each.method).carry or "v"
+        arrays = [(name, a) for name, a in (("v", v), ("y", y)) if a]
+        text += f"static void run_{i}(void) {{\n    {p} m;\n    {p}_state s;\n"
+        text += "".join(f"    const double {n}[] = {{{_hex(a)}}};\n" for n, a in arrays)
+        text += f"    {p}_defaults(&m);\n" + "".join(f"    m.{n} = {x.hex()};\n" for n, x in each.changed.items())
+        text += f"    {p}_prepare(&m);\n    {p}_start(&m, &s{''.join(f', {n}' for n, _ in arrays)});\n"
+        text += f"    for (int k = 0; k < {each.steps}; k++) {p}_step(&m, &s);\n"
+        if each.carries:
+            text += f"    double out[{len(v)}];\n    {p}_finish(&m, &s, out);\n    tell(out, {len(v)});\n"
+        elif v:
+            text += f"    tell(s.{slot}, {len(v)});\n"
+        text += f"    tell(s.y, {len(y)});\n" if y else ""
+        text += f"    const double work = {p}_work(&m, &s);\n    tell(&work, 1);\n" if each.works else ""
+        text += '    printf("\\n");\n}\n'
+    text += f"int main(void) {{ {' '.join(f'run_{i}();' for i in range(len(journeys)))} return 0; }}\n"
+    (folder / "all.c").write_text(text, encoding="utf-8")
+    executed(["cc", *C_FLAGS, "all.c", "-lm", "-o", "all"], folder)
+    return executed([folder / "all"], folder).splitlines()
+
+
+def _javascript(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
+    text = "const view = new DataView(new ArrayBuffer(8));\n"
+    text += "const word = (x) => { view.setFloat64(0, x); return view.getBigUint64(0).toString(16); };\n"
+    begin = ""
+    for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
+        (folder / f"step_{i}.mjs").write_text(source, encoding="utf-8")
+        begin += f'import {{ Step{i} }} from "./step_{i}.mjs";\n'
+        v, y = (f"[{', '.join(map(repr, block))}]" for block in each.blocks)
+        given = ", ".join(block for block, numbers in zip((v, y), each.blocks, strict=True) if numbers)
+        changed = "".join(f"m.{name} = {value!r}; " for name, value in each.changed.items())
+        text += f"{{ const m = new {camel(f'step_{i}')}(); {changed}m.prepare(); const s = m.start({given});\n"
+        text += f"  for (let k = 0; k < {each.steps}; k++) m.step(s);\n"
+        told = ["m.finish(s)" if each.carries else "s.v ?? []", "s.y ?? []"] + ["[m.work(s)]"] * each.works
+        text += f"  console.log([{', '.join(f'...({part})' for part in told)}].map(word).join(' ')); }}\n"
+    (folder / "all.mjs").write_text(begin + text, encoding="utf-8")
+    return executed(["node", "all.mjs"], folder).splitlines()
+
+
+def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
+    text = 'fn tell(x: &[f64]) { for each in x { print!("{:x} ", each.to_bits()); } }\n'
+    for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
+        text += f"pub mod step_{i} {{\n{source}\n}}\n"
+        arrays = [block for block in each.blocks if block]
+        given = ", ".join(f"[{', '.join(f'f64::from_bits({bits(x)})' for x in block)}]" for block in arrays)
+        text += f"fn run_{i}() {{\n    let mut m = step_{i}::Step{i}::new();\n"
+        text += "".join(f"    m.{name} = {value!r};\n" for name, value in each.changed.items())
+        text += f"    m.prepare();\n    let mut s = m.start({given});\n    for _ in 0..{each.steps} {{ m.step(&mut s); }}\n"
+        if each.carries:
+            text += "    tell(&m.finish(&s));\n"
+        elif each.blocks[0]:
+            text += "    tell(&s.v);\n"
+        text += "    tell(&s.y);\n" if each.blocks[1] else ""
+        text += "    tell(&[m.work(&s)]);\n" if each.works else ""
+        text += "    println!();\n}\n"
+    text += f"fn main() {{ {' '.join(f'run_{i}();' for i in range(len(journeys)))} }}\n"
+    (folder / "all.rs").write_text(text, encoding="utf-8")
+    executed(["rustc", *RUST_FLAGS, "all.rs", "-o", "all_rust"], folder)
+    return executed([folder / "all_rust"], folder).splitlines()
+
+
+def _python(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
+    lines = []
+    for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
+        space: dict[str, Any] = {"__name__": f"step_{i}"}
+        if each.options.get("fused") and not hasattr(math, "fma"):
+            # A fused multiply-add as Python 3.13 has it, errors and all.
+            space["math"] = SimpleNamespace(**vars(math), fma=raising_fma)
+            source = source.replace("import math\n", "")
+        exec(compile(source, f"step_{i}.py", "exec"), space)
+        m = space[f"Step{i}"](**each.changed)
+        s = m.start(*(block for block in each.blocks if block))
+        for _ in range(each.steps):
+            m.step(s)
+        v = m.finish(s) if each.carries else getattr(s, "v", [])
+        lines.append(" ".join(f"{bits(x):x}" for x in [*v, *getattr(s, "y", []), *([m.work(s)] if each.works else [])]))
+    return lines
+
+
+def raising_fma(a: float, b: float, c: float) -> float:
+    """As ``math.fma``: what is no number and what overflows is an error, unless it was given."""
+    made = float(fma(a, b, c))
+    if made != made and not any(map(math.isnan, (a, b, c))):
+        raise ValueError("invalid operation in fma")
+    if math.isinf(made) and not any(map(math.isinf, (a, b, c))):
+        raise OverflowError("overflow in fma")
+    return made

@@ -1,0 +1,391 @@
+"""Own equations: what a function may be, what it is given, what cannot be traced and what the user then reads."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+import own_systems as own
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TraceError, UnknownNameError, UnsupportedError
+
+
+def run(system: Any, method: str = "rk4", **given: Any) -> sw.Run:
+    """Ten steps, by the core and by the reference, which agree to the bit."""
+    given = {"dt": 0.05, "steps": 10, "every": 3, **given}
+    made, reference = (sw.integrate(system, method, **given, backend=backend) for backend in ("rust", "numpy"))
+    np.testing.assert_array_equal(made.v, reference.v)
+    np.testing.assert_array_equal(made.y, reference.y)
+    return made
+
+
+# ---- what it is
+
+
+def test_an_own_pendulum_is_the_built_in_one() -> None:
+    """ω² is multiplied with the step at another place, so by rounding alone."""
+    mine = sw.integrate(own.pendulum(omega=1.3), "rk4", v=0.0, y=2.0, dt=0.01, steps=1000)
+    theirs = sw.integrate(sw.Pendulum(1.3), "rk4", v=0.0, y=2.0, dt=0.01, steps=1000)
+    # A thousand steps of some ten roundings each, of numbers up to 2; on such an orbit errors grow tenfold at most.
+    assert abs(mine.y[-1] - theirs.y[-1]) < 1000 * 10 * 2.0 * 2**-53 * 10
+
+
+def test_lorenz_against_many_digits() -> None:
+    """A value of 50 digits by a Taylor series of another program's kind: here by mpmath's own, at t = 1 from (1, 1, 1)."""
+    mpmath = pytest.importorskip("mpmath")
+    with mpmath.workdps(30):
+        solution = mpmath.odefun(
+            lambda t, y: [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - mpmath.mpf(8) / 3 * y[2]], 0, [1, 1, 1]
+        )
+        true = np.array([float(each) for each in solution(1.0)])
+    made = sw.integrate(own.lorenz(), "dop853", y=np.ones(3), tolerance=1e-13, at=[1.0])
+    # The flow stretches errors by less than exp(∫ λ) < 1e3 over this stretch, and 1e-13 is the error of a step.
+    np.testing.assert_allclose(made.y[-1], true, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", [each.name for each in sw.methods()])
+def test_every_method_takes_them(method: str) -> None:
+    rng = np.random.default_rng(3)
+    run(own.springs(), method, v=rng.normal(size=(4, 2, 3)), y=rng.normal(size=(4, 2, 3)))
+    record = sw.method(method)
+    if not record.needs_acceleration:
+        run(own.duffing(beta=[0.5, 1.0]), method, v=0.0, y=1.0)
+        run(own.lorenz(), method, y=np.ones(3))
+
+
+def test_a_first_order_system_has_no_velocities() -> None:
+    made = run(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), y=np.ones(3))
+    assert made.y.shape == (5, 3, 7)
+    assert made.v.shape == (5, 0, 7)
+    again = sw.integrate(own.lorenz(rho=np.linspace(1.0, 30.0, 7)), "rk4", **made.resume, dt=0.05, steps=1)
+    assert again.start_step == 10
+    with pytest.raises(ArgumentError, match=r"v: expected the velocities"):
+        sw.integrate(own.duffing(), "rk4", y=1.0, dt=0.1, steps=1)
+
+
+def test_the_state_has_as_few_axes_as_the_function_can_do_with() -> None:
+    assert run(own.duffing(), v=0.0, y=np.ones(3)).system.y_shape == ()
+    assert run(own.lorenz(), y=np.ones((3, 4))).system.y_shape == (3,)
+    assert run(own.springs(), v=0.0, y=np.random.default_rng(0).normal(size=(5, 3, 2))).system.y_shape == (5, 3)
+    made = run(own.top(), v=np.ones((3, 2)), y=np.array([1.0, 0.0, 0.0, 0.0]))
+    assert (made.system.v_shape, made.system.y_shape, made.y.shape) == ((3,), (4,), (5, 4, 2))
+
+    @sw.system(shape=(None, 2))
+    def declared(t: Any, v: Any, y: Any) -> Any:
+        return -y
+
+    assert run(declared(), v=0.0, y=np.ones((3, 2))).system.y_shape == (3, 2)
+    with pytest.raises(ShapeError, match=r"declared: no state of the declared shape \(None, 2\) fits .* y of shape \(3, 3\)"):
+        sw.integrate(declared(), "rk4", v=0.0, y=np.ones((3, 3)), dt=0.1, steps=1)
+
+
+def test_parameters_of_all_kinds() -> None:
+    rng = np.random.default_rng(5)
+    start = {"v": 0.0, "y": rng.normal(size=6)}
+    sine = run(own.pushed(x=sw.Sinusoid(1.0, 2.0)), **start)
+    function = run(own.pushed(x=lambda t: np.sin(2.0 * t)), **start)
+    np.testing.assert_allclose(sine.y, function.y, rtol=1e-13)  # two sines, each right to a unit of the last place of 1
+    run(own.pushed(x=sw.Sampled(rng.normal(size=(9, 6)), 0.1)), "verlet", **start)
+    run(own.pushed(k=rng.uniform(size=6), x=2), **start)
+    masses = run(own.attracted(masses=rng.uniform(size=(4, 5))), v=0.0, y=rng.normal(size=(4, 2, 5)))
+    assert masses.y.shape == (5, 4, 2, 5)
+    with pytest.raises(ShapeError, match=r"attracted: masses: expected 1 axes of its own"):
+        own.attracted(masses=1.0)
+
+
+def test_the_users_arrays_stay_live_and_equal_systems_are_equal() -> None:
+    beta = np.array([1.0, 2.0])
+    system = own.duffing(beta=beta)
+    before = run(system, v=0.0, y=1.0).y[-1].copy()
+    beta[1] = 1.0
+    after = run(system, v=0.0, y=1.0).y[-1]
+    assert after[0] == before[0]
+    assert after[1] == before[0]
+    assert own.duffing(beta=3.0) == own.duffing(beta=3.0) != own.duffing(beta=4.0)
+    for again in (pickle.loads(pickle.dumps(system)), copy.deepcopy(system)):
+        assert again == system
+        np.testing.assert_array_equal(run(again, v=0.0, y=1.0).y[-1], after)
+    bound = run(system, v=0.0, y=1.0).system
+    assert pickle.loads(pickle.dumps(bound)) == bound
+    run(pickle.loads(pickle.dumps(bound)), v=0.0, y=1.0)
+
+
+def test_a_world() -> None:
+    v, y = np.zeros(2), np.ones(2)
+    world = sw.World(own.duffing(beta=[0.5, 1.0]), "rk4", v=v, y=y, dt=0.05)
+    world.step(10)
+    np.testing.assert_array_equal(y, run(own.duffing(beta=[0.5, 1.0]), v=0.0, y=1.0).y[-1])
+    again = pickle.loads(pickle.dumps(world))
+    again.step()
+    world.step()
+    np.testing.assert_array_equal(again.y, world.y)
+    first_order = sw.World(own.lorenz(), "rk4", y=np.ones(3), dt=0.05)
+    first_order.step(10)
+    np.testing.assert_array_equal(first_order.y, run(own.lorenz(), y=np.ones(3)).y[-1])
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_adaptive_steps(fused: bool) -> None:
+    given = {"y": np.ones(3), "tolerance": 1e-6, "at": [0.5, 1.0], "fused": fused}
+    system = own.lorenz(rho=np.linspace(1.0, 30.0, 7))
+    made, reference = (sw.integrate(system, "dop853", **given, backend=backend) for backend in ("rust", "numpy"))
+    np.testing.assert_array_equal(made.y, reference.y)
+
+
+def test_a_long_one_is_stepped_by_its_rates() -> None:
+    """A ring of 600 springs in space is past what becomes one tape for a step."""
+    rng = np.random.default_rng(0)
+    y = rng.normal(size=(600, 3))
+    assert "not one tape" in str(sw.explain(own.springs().sized(None, y), "rk4"))
+    run(own.springs(), v=0.0, y=y, steps=2, every=None)
+
+
+def test_functions_of_a_module_and_math_are_traced() -> None:
+    """``network`` calls a function of its module, which calls ``math.sqrt``."""
+    made = run(
+        own.network(weights=np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])),
+        y=[0.1, 0.2, 0.3],
+        method="standard_euler",
+        steps=1,
+        every=None,
+    )
+    y = np.array([0.1, 0.2, 0.3])
+    x = np.roll(y, -1)
+    np.testing.assert_allclose(made.y[-1], y + 0.05 * (x / np.sqrt(1 + x * x) - y), rtol=1e-14)
+
+
+def test_scipys_functions_are_taken_as_they_are() -> None:
+    made = sw.integrate(own.scipys(), "dop853", y=[0.0, 1.0], tolerance=1e-12, at=[1.0])
+    np.testing.assert_allclose(made.y[-1], [math.sin(1.0), math.cos(1.0)], rtol=1e-10)
+
+
+# ---- NumPy's functions
+
+
+ARRAYS = {
+    "sum": lambda y: np.sum(y) * np.ones(3),
+    "sum along an axis": lambda y: np.sum(np.outer(y, y), axis=1),
+    "mean": lambda y: y - np.mean(y),
+    "dot": lambda y: np.dot(y, y) * y,
+    "matrix": lambda y: np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 0.0], [2.0, 0.0, 1.0]]) @ y,
+    "vector times matrix": lambda y: y @ np.arange(9.0).reshape(3, 3),
+    "cross": lambda y: np.cross(y, [1.0, 2.0, 3.0]),
+    "norm": lambda y: y / np.linalg.norm(y),
+    "outer": lambda y: np.outer(y, y)[0],
+    "stack": lambda y: np.stack([y[2], y[0], y[1]]),
+    "concatenate": lambda y: np.concatenate([y[1:], y[:1]]),
+    "roll": lambda y: np.roll(y, 1) - y,
+    "slices": lambda y: y[::-1] * 2.0,
+    "broadcasting": lambda y: (y[:, None] - y[None, :]).sum(axis=0),
+    "where": lambda y: np.where(y > 0.2, y, -y),
+    "minimum, maximum": lambda y: np.minimum(y, 0.1) + np.maximum(y, 0.2),
+    "clip": lambda y: np.clip(y, -0.1, 0.25),
+    "comparisons as numbers": lambda y: (y > 0.2) * y + (y == 0.5),
+    "and, or, not": lambda y: np.where((y > 0.1) & ~(y > 0.4) | (y < -1.0), 1.0, y),
+    "diff": lambda y: np.append(np.diff(y), 0.0) if not hasattr(y, "items") else np.concatenate([np.diff(y), [0.0]]),
+    "cumsum": lambda y: np.cumsum(y),
+    "prod, max, min": lambda y: y * np.prod(y) + np.max(y) - np.min(y),
+    "powers": lambda y: y**2 + y**3 - 1.0 / (2.0 + y),
+    "abs": lambda y: abs(y) + np.abs(y - 0.3),
+    "floor": lambda y: np.floor(3.0 * y) + y // 0.25,
+    "full": lambda y: np.full_like(y, 2.0) * y,
+    "loops": lambda y: np.array([sum(y[j] * (j + 1) for j in range(i + 1)) for i in range(3)]),
+    "linspace": lambda y: y * np.linspace(0.0, 1.0, 3) + np.zeros(3) + np.eye(3)[1],
+    "reshape": lambda y: y.reshape(3, 1).T.ravel() + y.flatten(),
+    "tile": lambda y: np.tile(y, 2)[1:4],
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_function_means_what_it_means_in_numpy(name: str) -> None:
+    """Standard Euler with the step 1 from y gives y + f(y); NumPy gives f of the same numbers, but for the order of sums."""
+    function = ARRAYS[name]
+
+    @sw.system(order=1)
+    def rates(t: Any, y: Any) -> Any:
+        return function(y)
+
+    y = np.array([0.5, -0.25, 0.125])
+    made = run(rates(), "standard_euler", y=y, dt=1.0, steps=1, every=None).y[-1]
+    np.testing.assert_allclose(made, y + function(y), rtol=4e-16, atol=4e-16)
+
+
+# ---- what cannot be
+
+
+def refused(function: Any, **given: Any) -> str:
+    with pytest.raises(ArgumentError) as raised:
+        sw.integrate(sw.system(function)(), "rk4", **{"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1, **given})
+    text = str(raised.value)
+    assert function.__name__ in text
+    return text
+
+
+def branch(t: Any, v: Any, y: Any) -> Any:
+    if y > 0.0:
+        return -y
+    return y
+
+
+def chained(t: Any, v: Any, y: Any) -> Any:
+    return -y * (0.0 < y < 1.0)
+
+
+def smaller(t: Any, v: Any, y: Any) -> Any:
+    return min(y, 0.0)
+
+
+def floats(t: Any, v: Any, y: Any) -> Any:
+    return float(y)
+
+
+def writes(t: Any, v: Any, y: Any) -> Any:
+    y[0] = 0.0
+    return y
+
+
+def fills(t: Any, v: Any, y: Any) -> Any:
+    out = np.zeros(3)
+    out[0] = y[1]
+    return out
+
+
+def unknown(t: Any, v: Any, y: Any) -> Any:
+    return np.sinc(y)
+
+
+def indexed(t: Any, v: Any, y: Any) -> Any:
+    return np.arange(3.0)[y]
+
+
+def nothing(t: Any, v: Any, y: Any) -> Any:
+    -y  # noqa: B018
+
+
+def longer(t: Any, v: Any, y: Any) -> Any:
+    return np.array([y, y])
+
+
+def named(t: Any, v: Any, y: Any) -> Any:
+    return undefined * y  # type: ignore[name-defined]  # noqa: F821
+
+
+def random(t: Any, v: Any, y: Any) -> Any:
+    return np.random.default_rng().normal() * y
+
+
+def words(t: Any, v: Any, y: Any) -> Any:
+    return "y"
+
+
+REFUSED = {
+    branch: ("line", "if y > 0.0:", "np.where"),
+    chained: ("line", "np.where", "&"),
+    smaller: ("line", "np.minimum"),
+    floats: ("line", "float()"),
+    writes: ("line", "y[0] = 0.0", "np.stack"),
+    fills: ("line", "out[0] = y[1]", "np.stack"),
+    unknown: ("line", "np.sinc", "np.sin"),
+    indexed: ("line", "index"),
+    nothing: ("return",),
+    longer: ("shape ()", "(2,)"),
+    named: ("line", "NameError", "undefined"),
+    random: ("random",),
+    words: ("str",),
+}
+
+
+@pytest.mark.parametrize("function", REFUSED)
+def test_what_cannot_be_traced_is_said_with_its_line(function: Any) -> None:
+    text = refused(function, y=np.ones(3) if function in (writes, fills) else 1.0)
+    for each in REFUSED[function]:
+        assert each in text, text
+    if "line" in REFUSED[function]:
+        first = function.__code__.co_firstlineno
+        (line,) = re.findall(r"test_equations\.py, line (\d+)", text)
+        assert first < int(line) <= first + 3
+
+
+def test_what_is_wrong_with_parameters() -> None:
+    with pytest.raises(UnknownNameError, match=r"duffing: there is no parameter 'bta'. Known: alpha, beta"):
+        own.duffing(bta=1.0)
+    with pytest.raises(NotFiniteError, match=r"duffing: beta: expected finite numbers, got nan"):
+        own.duffing(beta=np.nan)
+    with pytest.raises(DTypeError, match=r"duffing: beta: expected real numbers"):
+        own.duffing(beta="x")
+    with pytest.raises(ShapeError, match=r"duffing: alpha .*duffing: beta"):
+        own.duffing(alpha=np.ones(2), beta=np.ones(3))
+    with pytest.raises(ArgumentError, match=r"f: expected a default of the parameter k"):
+        sw.system(lambda_of("f", "t, v, y, *, k"))
+    with pytest.raises(ArgumentError, match=r"f: expected a function \(t, v, y, \*, …\), got \(t, y\)"):
+        sw.system(lambda_of("f", "t, y"))
+    with pytest.raises(ArgumentError, match=r"f: expected parameters with names"):
+        sw.system(lambda_of("f", "t, v, y, **rest"))
+    with pytest.raises(DTypeError, match=r"function: expected a Python function"):
+        sw.system(3.0)  # type: ignore[call-overload]
+    with pytest.raises(ArgumentError, match=r"order: expected 1"):
+        sw.system(order=3)
+    with pytest.raises(ArgumentError, match=r"blocks: expected 1 with order=1"):
+        sw.system(order=1, blocks=2)
+    with pytest.raises(TraceError, match=r"pushed: x .*np\.sinc"):
+        sw.integrate(own.pushed(x=lambda t: np.sinc(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+
+
+def lambda_of(name: str, arguments: str) -> Any:
+    """A function with these arguments."""
+    made: dict[str, Any] = {}
+    exec(f"def {name}({arguments}):\n    return -y", made)
+    return made[name]
+
+
+def test_a_bare_function_is_to_be_wrapped() -> None:
+    with pytest.raises(DTypeError, match=r"system: .* got the function branch; wrap it with sw.system\(branch\)"):
+        sw.integrate(branch, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)  # type: ignore[arg-type]
+    sw.integrate(own.duffing, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)  # without parameters it need not be called
+
+
+def test_methods_for_accelerations_refuse_forces_that_depend_on_v() -> None:
+    with pytest.raises(
+        UnsupportedError, match=r"verlet needs forces that do not depend on the velocity, but duffing.* has forces that do"
+    ):
+        sw.integrate(own.duffing(), "verlet", v=0.0, y=1.0, dt=0.1, steps=1)
+    with pytest.raises(UnsupportedError, match=r"leapfrog needs a second-order system"):
+        sw.integrate(own.lorenz(), "leapfrog", y=np.ones(3), dt=0.1, steps=1)
+
+
+def test_a_local_function_is_not_pickled() -> None:
+    @sw.system
+    def local(t: Any, v: Any, y: Any) -> Any:
+        return -y
+
+    with pytest.raises(ArgumentError, match=r"local: an own system is pickled by the name of its function"):
+        pickle.dumps(local())
+
+
+def test_a_wrong_rate_is_noticed() -> None:
+    """The mutant: were the sign of one term wrong in the tape, the reference would tell."""
+
+    @sw.system
+    def wrong(
+        t: Any, v: Any, y: Any, *, alpha: Any = -1.0, beta: Any = 1.0, delta: Any = 0.3, gamma: Any = 0.5, omega: Any = 1.2
+    ) -> Any:
+        return gamma * np.cos(omega * t) - delta * v - alpha * y + beta * y**3
+
+    right = sw.integrate(own.duffing(), "rk4", v=0.0, y=1.0, dt=0.05, steps=10, backend="numpy")
+    assert (sw.integrate(wrong(), "rk4", v=0.0, y=1.0, dt=0.05, steps=10).y != right.y).all()
+
+
+# ---- scenes
+
+
+def test_a_scene_of_ones_own_in_three_lines() -> None:
+    scene = sw.Scene(own.duffing(), v=0.0, y=1.0, until=10.0)
+    advice = sw.advise(scene, frame=None, tolerance=1e-3)
+    assert advice.best.error <= 1e-3
+    first_order = sw.Scene(own.lorenz(), y=[1.0, 1.0, 1.0], until=2.0)
+    assert sw.advise(first_order, frame=None, tolerance=1e-3).best.error <= 1e-3

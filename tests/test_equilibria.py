@@ -1,0 +1,162 @@
+"""Equilibria that are known: of the pendulum, of the restricted three bodies, of linear systems; and what is none."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+
+EPS = np.finfo(float).eps
+
+
+def test_the_pendulum_hangs_or_stands() -> None:
+    found = sw.equilibria(sw.Pendulum(2.0), near=(0.0, [0.3, 3.0, -0.2, 9.0]), method="rk4", dt=0.1)
+    assert [each.starts for each in found] == [(0, 2), (1,), (3,)]
+    below, above, beyond = found
+    # The sine near kπ is right to 10⁻²⁰ but its argument to half an eps of kπ, which is what Newton's method can find.
+    for each, true in zip(found, (0.0, np.pi, 3 * np.pi), strict=True):
+        assert abs(each.y - true) <= EPS * true
+        assert each.v == 0.0
+        assert each.isolated
+        assert each.residual <= 4.0 * 4 * EPS * max(true, 1.0)
+    assert [each.kind for each in found] == ["centre", "saddle", "saddle"]
+    assert [each.stable for each in found] == [None, False, False]
+    np.testing.assert_allclose(below.eigenvalues, [2j, -2j], rtol=4 * EPS)
+    np.testing.assert_allclose(above.eigenvalues, [2.0, -2.0], rtol=4 * EPS)
+    # A step of RK4 turns a mode λ by 1 + λh + … + (λh)⁴/24.
+    for each in (below, above):
+        z = [sum((rate * 0.1) ** k / math.factorial(k) for k in range(5)) for rate in each.eigenvalues]
+        np.testing.assert_allclose(np.sort_complex(each.analysis.eigenvalues), np.sort_complex(z), rtol=0, atol=40 * EPS)
+    assert below.analysis.kind == "damped oscillation"
+    assert above.analysis.kind == beyond.analysis.kind == "monotonic unstable"
+
+
+@pytest.mark.parametrize(
+    ("damping", "kinds"), [(0.1, ["sink", "saddle"]), (3.0, ["sink", "saddle"]), (-0.1, ["source", "saddle"])]
+)
+def test_damping_decides(damping: float, kinds: list[str]) -> None:
+    found = sw.equilibria(sw.Pendulum(1.0, damping), near=(0.1, [0.3, 3.0]))
+    assert [each.kind for each in found] == kinds
+    # λ² + 2Dλ ± 1 = 0
+    for each, sign in zip(found, (1.0, -1.0), strict=True):
+        root = np.sqrt(complex(damping**2 - sign))
+        true = np.sort_complex([-damping + root, -damping - root])
+        np.testing.assert_allclose(np.sort_complex(each.eigenvalues), true, rtol=0, atol=16 * EPS * (1 + damping) ** 2)
+
+
+def quintics(mu: float) -> list[float]:
+    """The x of L1, L2 and L3, from Euler's quintics in the distance from the nearer body (Szebehely 1967, §4.4), by bisection.
+
+    γ⁵ ∓ (3 − μ)γ⁴ + (3 − 2μ)γ³ − μγ² ± 2μγ − μ = 0 for L1 and L2, γ the distance from the light body; for L3, at the distance γ
+    from the heavy one, γ⁵ + (2 + μ)γ⁴ + (1 + 2μ)γ³ − (1 − μ)γ² − 2(1 − μ)γ − (1 − μ) = 0.
+    """
+    polynomials = [
+        [1, -(3 - mu), 3 - 2 * mu, -mu, 2 * mu, -mu],
+        [1, 3 - mu, 3 - 2 * mu, -mu, -2 * mu, -mu],
+        [1, 2 + mu, 1 + 2 * mu, -(1 - mu), -2 * (1 - mu), -(1 - mu)],
+    ]
+    found = []
+    for coefficients in polynomials:
+        low, high = 0.0, 1.0 if coefficients is polynomials[0] else 2.0
+        for _ in range(100):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if np.polyval(coefficients, middle) < 0 else (low, middle)
+        found.append(low)
+    return [1 - mu - found[0], 1 - mu + found[1], -mu - found[2]]
+
+
+@pytest.mark.parametrize("mu", [0.012277471, 0.2, 3e-6])
+def test_the_five_points_of_lagrange(mu: float) -> None:
+    hill = (mu / 3) ** (1 / 3)
+    x = [1 - mu - hill, 1 - mu + hill, -1.0, 0.5, 0.5]
+    y = [0.0, 0.0, 0.0, 0.8, -0.8]
+    found = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros((2, 5)), np.array([x, y])))
+    assert found.lost == ()
+    true = [*((each, 0.0) for each in quintics(mu)), (0.5 - mu, np.sqrt(0.75)), (0.5 - mu, -np.sqrt(0.75))]
+    # Forces of size 1/γ² are right to some ten eps of themselves, γ the distance to the light body, and grow at least as fast as
+    # the distance: the point is right to 10·eps/γ² over a slope of 1 at least. Of L4 and L5 the slope along the circle is as
+    # small as 27μ/4. The quintic's own root is as uncertain, its values being sums of numbers up to 3. As ẏ = v, rounding leaves
+    # some eps of the last step in v, which was below 10⁻⁷.
+    for each, place in zip(found, true, strict=True):
+        gamma = min(1.0, np.hypot(place[0] - 1 + mu, place[1]))
+        slope = min(1.0, 27 * mu / 4) if place[1] or place[0] < 0 else 1.0
+        np.testing.assert_allclose(each.y, place, rtol=0, atol=100 * EPS / gamma**2 / slope)
+        np.testing.assert_allclose(each.v, 0.0, rtol=0, atol=EPS * 1e-7)
+    # Gascheau and Routh: L4 and L5 are centres if 27μ(1 − μ) < 1.
+    of_triangle = "centre" if 27 * mu * (1 - mu) < 1 else "saddle"
+    assert [each.kind for each in found] == ["saddle"] * 3 + [of_triangle] * 2
+    # Their eigenvalues: λ⁴ + λ² + 27μ(1 − μ)/4 = 0.
+    for each in found[3], found[4]:
+        left = each.eigenvalues**4 + each.eigenvalues**2 + 27 * mu * (1 - mu) / 4
+        np.testing.assert_allclose(np.abs(left), 0.0, atol=200 * EPS)
+
+
+def test_a_wrong_quintic_would_be_seen() -> None:
+    mu = 0.012277471
+    found = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros(2), np.array([0.8, 0.0])))[0]
+    assert abs(found.y[0] - quintics(mu * (1 + 1e-9))[0]) > 100 * EPS / 0.15**2
+
+
+def test_a_linear_system_is_solved_at_once() -> None:
+    A = np.array([[-1.0, 2.0, 0.0], [0.0, -3.0, 1.0], [1.0, 0.0, -2.0]])
+    system = sw.LinearSystem(A, [[1.0], [2.0], [3.0]], x=[2.0], velocities=1)
+    (found,) = sw.equilibria(system, near=(np.full(1, 7.0), np.full(2, -5.0)), method="rk4", dt=0.1)
+    true = np.linalg.solve(A, [-2.0, -4.0, -6.0])
+    np.testing.assert_allclose([*found.v, *found.y], true, rtol=0, atol=40 * EPS * np.abs(true).max() * np.linalg.cond(A))
+    np.testing.assert_allclose(np.sort_complex(found.eigenvalues), np.sort_complex(np.linalg.eigvals(A)), rtol=0, atol=1e-14)
+    assert found.kind == "sink"
+    assert found.stable
+    assert found.analysis.stable
+
+
+def test_bodies_that_part_have_no_equilibrium() -> None:
+    """Their forces fade, so a residual alone would call far enough an equilibrium."""
+    for force in ("logarithmic", "newton"):
+        found = sw.equilibria(sw.NBody([1.0, 2.0], force=force), near=(np.zeros((2, 2)), np.array([[1.0, 0.0], [0.0, 1.0]])))
+        assert len(found) == 0
+        assert found.lost == (0,)
+
+
+def test_a_line_of_equilibria_is_not_isolated() -> None:
+    """A mass that nothing holds stays anywhere."""
+    (found,) = sw.equilibria(sw.LinearSystem([[0.0, 0.0], [1.0, 0.0]]), near=(np.array([1.0]), np.array([5.0])))
+    assert found.y == 5.0
+    assert found.v == 0.0
+    assert not found.isolated
+    assert found.kind == "not decided"
+
+
+def test_units_do_not_matter() -> None:
+    """A pendulum in years: rates of 10⁸ beside velocities, and the same two places."""
+    found = sw.equilibria(sw.Pendulum(3e8), near=(1e8, [0.3, 3.0]))
+    assert [each.kind for each in found] == ["centre", "saddle"]
+    assert found[0].v == found[1].v == 0.0
+
+
+def test_many_starts_are_found_once() -> None:
+    starts = np.linspace(-4.0, 4.0, 60).reshape(3, 20)
+    found = sw.equilibria(sw.Pendulum(), near=(np.zeros(20), starts))
+    places = np.array([each.y for each in found])
+    assert len(np.unique(np.round(places / np.pi))) == len(found)
+    np.testing.assert_allclose(np.sin(places), 0.0, atol=EPS * (1 + np.abs(places).max()))
+    assert sum(len(each.starts) for each in found) + len(found.lost) == 60
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"near": 1.0}, "near: expected a pair"),
+        ({"system": sw.Pendulum([1.0, 2.0])}, "system: expected one member"),
+        ({"dt": 0.1}, "method, dt: expected both"),
+        ({"method": "rk4"}, "method, dt: expected both"),
+        ({"method": "rk4", "dt": -1.0}, "dt"),
+        ({"near": ([0.0, np.nan], 0.0)}, "near"),
+        ({"near": (np.zeros(2), np.zeros(3))}, "near"),
+    ],
+)
+def test_wrong_calls_say_what_is_wrong(wrong: dict[str, Any], says: str) -> None:
+    with pytest.raises(sw.errors.ArgumentError, match=says):
+        sw.equilibria(**{"system": sw.Pendulum(), "near": (0.0, 0.3)} | wrong)

@@ -1,0 +1,132 @@
+"""Elementary functions of symbols: what stands on a tape makes the bits that arrays have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import symbols
+from stepwell import _core
+from stepwell.reference import functions as fn
+from stepwell.reference.fused import MEANING, Evaluated, Operation
+from true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
+
+NAMES = [*OF_ONE, *OF_TWO]
+
+
+def as_it_stands(tape: Any, made: Any, state: list[np.ndarray]) -> np.ndarray:
+    """What a tape makes, one operation after the other, none of them fused."""
+    operations, (root,) = tape.operations([made])
+    values: list[Any] = []
+    for kind, of, given in operations:
+        values.append(state[given] if kind == "state" else MEANING[kind](*(values[each] for each in of), given))
+    return np.broadcast_to(values[root], np.broadcast_shapes(*(each.shape for each in state)))
+
+
+def patterns(seed: int, n: int) -> np.ndarray:
+    """Bits at random, so numbers of all sizes and some NaN, then numbers near 1, and all that is special."""
+    rng = np.random.default_rng(seed)
+    bits = rng.integers(0, 2**64, n, dtype=np.uint64).view(np.float64)
+    return rng.permutation(np.concatenate([bits, rng.uniform(-4.0, 4.0, n), rng.uniform(-800.0, 800.0, n), SPECIALS]))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_tape_has_the_bits_of_arrays(name: str) -> None:
+    tape, state = _core.Tape(), [patterns(1, 2000), patterns(2, 2000)][: 2 if name in OF_TWO else 1]
+    made = getattr(fn, name)(*map(tape.state, range(len(state))))
+    with np.errstate(all="ignore"):
+        assert same(as_it_stands(tape, made, state), getattr(fn, name)(*state)).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tape_that_shortens_nothing_has_the_same_bits(name: str) -> None:
+    """The second tape, in Python: so no bit depends on what the core's does beforehand or leaves out."""
+    tape, state = symbols.Tape(), [patterns(1, 500), patterns(2, 500)][: 2 if name in OF_TWO else 1]
+    made = getattr(fn, name)(*map(tape.state, range(len(state))))
+    (found,) = symbols.evaluate(tape, [made], {("state", i): each for i, each in enumerate(state)}, lambda _, t: t)
+    with np.errstate(all="ignore"):
+        assert same(np.broadcast_to(found, state[0].shape), getattr(fn, name)(*state)).all()
+
+
+@pytest.mark.parametrize("name", OF_TWO)
+@pytest.mark.parametrize("known", [0.0, -0.0, 1.0, -3.0, 0.3, 7.0, 1e300, np.inf, np.nan])
+def test_a_number_beside_a_symbol_is_a_symbol(name: str, known: float) -> None:
+    x, f = patterns(3, 500), getattr(fn, name)
+    tape = _core.Tape()
+    with np.errstate(all="ignore"):
+        assert same(as_it_stands(tape, f(tape.state(0), known), [x]), f(x, known)).all()
+        assert same(as_it_stands(tape, f(known, tape.state(0)), [x]), f(known, x)).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_known_beforehand_is_computed_beforehand(name: str) -> None:
+    """Unless a NaN comes up on the way, which the tape leaves to whoever computes."""
+    folded = 0
+    for x in [0.0, -0.0, 0.3, -2.0, 5e-324, 1e6, *np.random.default_rng(4).uniform(0.0, 1.0, 20).tolist()]:
+        tape = _core.Tape()
+        given = (x, 0.7)[: 2 if name in OF_TWO else 1]
+        operations, (root,) = tape.operations([getattr(fn, name)(*map(tape.number, given))])
+        expected = getattr(fn, name)(*(np.array(each) for each in given))
+        with np.errstate(all="ignore"):
+            assert same(as_it_stands(tape, getattr(fn, name)(*map(tape.number, given)), [np.zeros(1)]), expected).all()
+        folded += [kind for kind, _, _ in operations] == ["constant"]
+        assert root == len(operations) - 1  # nothing else
+    assert folded >= 20
+
+
+@pytest.mark.parametrize("exponent", [0, 1, -1, 5, 16, 0.5, -1.5, 2.3, -0.0])
+def test_known_powers_of_symbols(exponent: float) -> None:
+    x, tape = patterns(5, 1000), _core.Tape()
+    with np.errstate(all="ignore"):
+        assert same(as_it_stands(tape, fn.power(tape.state(0), exponent), [x]), fn.power(x, exponent)).all()
+
+
+@pytest.mark.parametrize("name", COMPARE)
+def test_comparisons_by_name(name: str) -> None:
+    x, y, tape = patterns(9, 1000), np.random.default_rng(9).permutation(patterns(9, 1000)), _core.Tape()
+    x[::3] = y[::3]
+    f, theirs = getattr(fn, name), getattr(np, name)(x, y)
+    assert (f(x, y) == theirs).all()
+    for made in (f(tape.state(0), tape.state(1)), f(np.array([tape.state(0)], dtype=object), tape.state(1))[0]):
+        assert same(as_it_stands(tape, fn.where(made, 1.0, 0.0), [x, y]), np.where(theirs, 1.0, 0.0)).all()
+    assert isinstance(f(1.0, 2), np.bool_)
+
+
+def test_choices_and_arrays_of_symbols() -> None:
+    x, y = patterns(6, 1000), patterns(7, 1000)
+    tape = _core.Tape()
+    a, b = tape.state(0), tape.state(1)
+    with np.errstate(all="ignore"):
+        made = fn.where((a < b) & ~(a <= 1.0), fn.clip(a, -2.0, 2.0), 3)
+        assert same(as_it_stands(tape, made, [x, y]), fn.where((x < y) & ~(x <= 1.0), fn.clip(x, -2.0, 2.0), 3)).all()
+        both = np.array([a, b], dtype=object)
+        for made, expected in zip(fn.arctan2(both, [1.0, 2.0]), (fn.arctan2(x, 1.0), fn.arctan2(y, 2.0)), strict=True):
+            assert same(as_it_stands(tape, made, [x, y]), expected).all()
+        chosen = fn.where(fn.less(both, 1.0) | ~fn.less(both, 3.0), both, 0.0)
+        assert same(as_it_stands(tape, chosen[1], [x, y]), fn.where((y < 1.0) | ~(y < 3.0), y, 0.0)).all()
+        mixed = fn.exp(np.array([a, 1.0], dtype=object))
+        assert mixed[1] == fn.exp(1.0)
+        assert mixed[0].id == fn.exp(a).id
+        assert fn.where(True, a, 2.0).id == a.id
+        assert fn.where(np.array([True, False]), both, 2.0)[0].id == a.id
+
+
+def test_sine_and_cosine_of_one_angle_share_their_work() -> None:
+    tape = _core.Tape()
+    x = tape.state(0)
+    one, both = (len(tape.operations(made)[0]) for made in ([fn.sin(x)], [fn.sin(x), fn.cos(x)]))
+    assert both - one < 10
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_fused_they_are_as_accurate(name: str) -> None:
+    """Products that are exact stay so when they are fused, and the others lose a rounding."""
+    given = arguments(name, np.random.default_rng(8), 400)
+    tape = _core.Tape()
+    operations, roots = tape.operations([getattr(fn, name)(*map(tape.state, range(len(given))))])
+    plain = [Operation(kind, tuple(of), more) for kind, of, more in operations]
+    fused = Evaluated(plain, roots, {}, [])
+    with np.errstate(all="ignore"):
+        (found,) = fused(given, 0.0, 1.0)
+    assert errors(found, name, given).max() < 1.0

@@ -1,0 +1,183 @@
+"""Invariants of own systems: recorded, kept by a control or a projection, their gradients derived."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import own_systems as own
+import pytest
+import stepwell as sw
+from stepwell import _core, engine
+from stepwell.errors import ArgumentError, UnknownNameError, UnsupportedError
+from stepwell.reference.traced import Tracer
+from test_graphs import assert_one_graph
+
+START: dict[str, Any] = {"v": np.array([0.0, 0.5]), "y": np.array([1.0, -2.0]), "dt": 0.05, "steps": 40, "every": 5}
+QUATERNION = {"v": np.array([1.0, 0.1, 0.2]), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.05, "steps": 40, "every": 5}
+
+
+def both(system: Any, method: str, **given: Any) -> sw.Run:
+    """By the core and by the reference, which agree to the bit."""
+    made, reference = (sw.integrate(system, method, **given, backend=backend) for backend in ("rust", "numpy"))
+    for a, b in (
+        (made.v, reference.v),
+        (made.y, reference.y),
+        *((made.recorded[name], reference.recorded[name]) for name in made.recorded),
+    ):
+        np.testing.assert_array_equal(a, b)
+    return made
+
+
+def test_an_invariant_is_recorded() -> None:
+    made = both(own.pendulum(omega=1.3), "rk4", **START, record="energy")
+    expected = 0.5 * made.v**2 + 1.3**2 * (1.0 - np.cos(made.y))
+    # Four operations and a cosine of numbers up to 4, each right to half a unit or one in the last place.
+    np.testing.assert_allclose(made.recorded["energy"], expected, rtol=0, atol=8 * 4 * 2**-53)
+    np.testing.assert_array_equal(made.energy, made.recorded["energy"])
+    norm = both(own.top(), "rk4", **QUATERNION, record="norm").recorded["norm"]
+    assert norm.shape == (9,)
+    np.testing.assert_allclose(norm, 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "dop853"])
+@pytest.mark.parametrize(
+    "control", [sw.Control("energy", 2.0), sw.Control("energy", 2.0, "printed"), sw.Projection("energy")], ids=repr
+)
+def test_the_core_and_the_reference_are_one_graph_under_control(method: str, control: Any) -> None:
+    system = own.pendulum(omega=np.array([0.8, 1.3]))
+    held = system.sized(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
+    plan = engine.Plan(held, sw.method(method), held.batch, 0.05)
+    tape = _core.Tape()
+    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(held, tape).step(sw.method(method)))
+    both(system, method, **START, control=control, record="energy")
+
+
+def test_a_control_keeps_what_the_method_loses() -> None:
+    """Standard Euler's energy grows by (1 + h²ω²) a step near the middle; the control takes it away as exp(−gain·t)."""
+    given = START | {"steps": 400}
+    free = sw.integrate(own.pendulum(), "standard_euler", **given, record="energy").recorded["energy"]
+    held = both(own.pendulum(), "standard_euler", **given, record="energy", control=sw.Control("energy", 10.0)).recorded["energy"]
+    onto = both(own.pendulum(), "standard_euler", **given, record="energy", control=sw.Projection("energy")).recorded["energy"]
+    start = free[0]
+    assert (np.abs(free[-1] - start) > 0.3 * start).all()
+    # In balance a step's growth, below h²·ω²·E·(1 + …) ≤ 2·h²·E, is a step's decay, h·gain/(1 + h·gain) of what is left.
+    assert (np.abs(held[-1] - start) < 2 * 0.05**2 * start * (1 + 0.05 * 10) / (0.05 * 10) * 1.5).all()
+    # A projection is right to the square of what a step does.
+    assert (np.abs(onto[-1] - start) < (2 * 0.05**2) * start).all()
+    assert (np.abs(onto[-1] - start) < np.abs(held[-1] - start)).all()
+
+
+def test_the_error_of_an_invariant_decays_as_it_is_said() -> None:
+    """A ring of the norm alone, kept: the state goes radially, and the norm's error by exp(−gain·t)."""
+    y = np.array([1.2, 0.0, 0.0, 0.0])
+    control = sw.Control("norm", 3.0, "printed", target=1.0)
+    made = sw.integrate(own.top(), "rk4", v=np.zeros(3), y=y, dt=0.01, steps=100, every=1, control=control, record="norm")
+    error = made.recorded["norm"] - 1.0
+    # |q|² − 1 decays with the rate 3 exactly; RK4's own error is (0.03)⁵/120 a step.
+    np.testing.assert_allclose(error, error[0] * np.exp(-3.0 * made.t), rtol=100 * 0.03**5)
+
+
+def test_a_limited_control_never_overshoots() -> None:
+    y = np.array([1.2, 0.0, 0.0, 0.0])
+    for gain in (10.0, 1e3, 1e6):
+        made = sw.integrate(
+            own.top(),
+            "standard_euler",
+            v=np.zeros(3),
+            y=y,
+            dt=0.1,
+            steps=60,
+            every=1,
+            control=sw.Control("norm", gain, target=1.0),
+            record="norm",
+        )
+        error = made.recorded["norm"] - 1.0
+        assert (np.diff(np.abs(error)) <= 2**-52).all()
+    with pytest.warns(sw.ControlWarning, match=r"gain: h·gain = 100"):
+        sw.integrate(own.top(), "standard_euler", v=np.zeros(3), y=y, dt=0.1, steps=1, control=sw.Control("norm", 1e3, "printed"))
+
+
+def test_where_the_gradient_is_zero_nothing_is_pushed() -> None:
+    made = sw.integrate(own.pendulum(), "rk4", v=0.0, y=0.0, dt=0.1, steps=3, control=sw.Control("energy", 1.0, target=1.0))
+    assert made.v[-1] == made.y[-1] == 0.0
+
+
+def test_runs_worlds_and_pickles_under_control() -> None:
+    control = sw.Control("energy", 2.0)
+    system = own.pendulum()
+    whole = sw.integrate(system, "rk4", **START, control=control)
+    half = sw.integrate(system, "rk4", **START | {"steps": 20}, control=control)
+    again = sw.integrate(half.system, "rk4", **half.resume, steps=20)
+    np.testing.assert_array_equal(again.y[-1], whole.y[-1])
+    v, y = START["v"].copy(), START["y"].copy()
+    world = sw.World(system, "rk4", v=v, y=y, dt=0.05, control=control)
+    world.step(40)
+    np.testing.assert_array_equal(y, whole.y[-1])
+    for each in (pickle.loads(pickle.dumps(whole.system)), copy.deepcopy(whole.system)):
+        assert each == whole.system
+    projected = sw.integrate(system, "rk4", **START, control=sw.Projection("energy"))
+    assert projected.work is not None
+    sw.integrate(projected.system, "rk4", **projected.resume, steps=5)
+
+
+def test_batches_of_gains_and_targets() -> None:
+    control = sw.Control("energy", np.array([0.0, 5.0]), target=np.array([1.0, 2.0]))
+    made = both(own.pendulum(), "rk4", **START | {"steps": 200}, control=control, record="energy")
+    free = sw.integrate(own.pendulum(), "rk4", **START | {"steps": 200}, record="energy")
+    np.testing.assert_allclose(made.recorded["energy"][:, 0], free.recorded["energy"][:, 0], rtol=1e-9)
+    np.testing.assert_allclose(made.recorded["energy"][-1, 1], 2.0, rtol=1e-6)
+
+
+def test_what_cannot_be() -> None:
+    given = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
+    with pytest.raises(UnknownNameError, match=r"control: there is no 'enrgy'; did you mean 'energy'"):
+        sw.integrate(own.pendulum(), "rk4", **given, control=sw.Control("enrgy", 1.0))
+    with pytest.raises(UnsupportedError, match=r"EnergyControl .* use Control\('energy', gain\)"):
+        sw.integrate(own.pendulum(), "rk4", **given, control=sw.EnergyControl(1.0))
+    with pytest.raises(UnsupportedError, match=r"Projection\('scaling'\) .* use Projection\('energy'\)"):
+        sw.integrate(own.pendulum(), "rk4", **given, control=sw.Projection())
+    with pytest.raises(UnsupportedError, match=r"is for an invariant of an own system"):
+        sw.integrate(
+            sw.NBody(),
+            "rk4",
+            v=0.0,
+            y=np.random.default_rng(0).normal(size=(3, 2)),
+            dt=0.1,
+            steps=1,
+            control=sw.Control("energy", 1.0),
+        )
+    with pytest.raises(UnsupportedError, match=r"energy: duffing.* declare one: @duffing.invariant"):
+        sw.integrate(own.duffing(), "rk4", **given, record="energy")
+    with pytest.raises(UnsupportedError, match=r"verlet needs"):
+        sw.integrate(own.pendulum(), "verlet", **given, control=sw.Control("energy", 1.0))
+
+    @sw.system
+    def plain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+        return -k * y
+
+    with pytest.raises(ArgumentError, match=r"plain: wrong: the system has no parameter 'm'. Known: k"):
+
+        @plain.invariant
+        def wrong(v: Any, y: Any, *, m: Any) -> Any:
+            return m * v
+
+    with pytest.raises(ArgumentError, match=r"plain: short: expected a function \(v, y, \*, …\)"):
+
+        @plain.invariant
+        def short(y: Any) -> Any:
+            return y
+
+    @plain.invariant
+    def vector(v: Any, y: Any) -> Any:
+        return np.array([v, y])
+
+    with pytest.raises(ArgumentError, match=r"plain: vector: expected one number of a state, got an array of shape \(2,\)"):
+        sw.integrate(plain(), "rk4", **given, record="vector")
+
+
+def test_a_parameter_that_changes_makes_no_invariant() -> None:
+    with pytest.raises(ArgumentError, match=r"pendulum: energy: omega changes with the time"):
+        sw.integrate(own.pendulum(omega=lambda t: 1.0 + 0.1 * np.sin(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="energy")

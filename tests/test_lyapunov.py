@@ -1,0 +1,243 @@
+"""Lyapunov exponents that are known: of linear systems, by symmetry, by volume; and that states are those of ``integrate``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.dynamics import Lyapunov
+from stepwell.systems import System
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize("method", ["standard_euler", "false_euler", "rk4", "merson", "false_heun"])
+def test_of_a_linear_system_they_are_the_logarithms_of_the_eigenvalues(method: str) -> None:
+    """Real rates far apart, so that vectors find their directions: ln|z|/dt of the method's own step."""
+    system = sw.LinearSystem([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]], velocities=1)
+    dt, transient, steps = 0.05, 1000, 600
+    found = sw.lyapunov(
+        system, method, v=np.zeros(1), y=np.zeros(2), dt=dt, steps=steps, transient=transient, exponents="all", every=7
+    )
+    radii = sw.analyse(system, method, dt=dt).radii
+    # After the transient, directions are off by the ratio of two radii to the power of 1000: e^(−50·1.1) at most, which is below
+    # eps. Each step rounds some ten times on each number of vectors of length 1, and so does each orthonormalisation; that is
+    # eps/dt of a rate, and adds up over the condition of the eigenvectors, below 2 here.
+    np.testing.assert_allclose(found.exponents, np.sort(np.log(radii) / dt)[::-1], rtol=0, atol=40 * EPS / dt)
+    assert found.history.shape == (-(-steps // 7), 3)
+    assert found.t[-1] == (transient + steps) * dt
+
+
+def test_one_exponent_is_the_largest_of_all() -> None:
+    system = sw.LinearSystem([[-1.0, 0.3], [0.2, 0.5]])
+    given = {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 200, "transient": 400}
+    every = sw.lyapunov(system, "rk4", exponents="all", **given).exponents
+    np.testing.assert_allclose(sw.lyapunov(system, "rk4", **given).exponents, every[:1], rtol=0, atol=40 * EPS / 0.1)
+    np.testing.assert_allclose(sw.lyapunov(system, "rk4", exponents=2, **given).exponents, every, rtol=0, atol=40 * EPS / 0.1)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "pefrl", "verlet", "rk4"])
+def test_the_states_are_those_of_integrate(method: str) -> None:
+    system = sw.Pendulum(np.array([1.0, 2.0]), a=sw.Sinusoid(0.5, 0.7, 0.1))
+    v, y = np.array([0.3, 0.1]), np.array([[1.0], [2.0], [3.0]])
+    found = sw.lyapunov(system, method, v=v, y=y, dt=0.05, steps=60, transient=40, t0=2.0, every=8)
+    run = sw.integrate(system, method, v=v, y=y, dt=0.05, steps=100, t0=2.0)
+    np.testing.assert_array_equal(found.y, run.y[-1])
+    np.testing.assert_array_equal(found.v, run.v[-1] if run.carry is None else run.carry)
+    assert found.exponents.shape == (1, 3, 2)
+
+
+def test_a_member_has_the_same_exponents_alone() -> None:
+    """To the bit: members do not mix."""
+    omega, y = np.array([1.0, 1.5, 2.0]), np.array([1.0, 2.0, 3.0])
+    company = sw.lyapunov(sw.Pendulum(omega, 0.1), "rk4", v=0.1, y=y, dt=0.1, steps=50, exponents="all")
+    for k in range(3):
+        alone = sw.lyapunov(sw.Pendulum(omega[k], 0.1), "rk4", v=0.1, y=y[k], dt=0.1, steps=50, exponents="all")
+        np.testing.assert_array_equal(alone.exponents, company.exponents[:, k])
+        np.testing.assert_array_equal(alone.history, company.history[..., k])
+
+
+def test_damping_is_the_sum() -> None:
+    """Volumes shrink by −2Dω₀ per unit of time. RK4 misses ln det by O(dt⁴): halving the step divides what is left by 16."""
+    misses = []
+    for dt in (0.025, 0.0125):
+        found = sw.lyapunov(sw.Pendulum(1.5, 0.1), "rk4", v=0.0, y=2.0, dt=dt, steps=round(20.0 / dt), exponents="all")
+        misses.append(float(found.sum) + 2 * 0.1 * 1.5)
+    assert abs(misses[1]) < 1e-8
+    # a·h⁴·(1 + b·h) with b of the size of some rates of the motion: b·h/2 is 0.075 for b = 4ω₀.
+    assert 16 * 0.925 < misses[0] / misses[1] < 16 * 1.075
+
+
+def test_a_symplectic_method_keeps_pairs_and_volume() -> None:
+    """Exponents of ± the same size, and a sum of zero to rounding, at any step."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
+    system = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
+    for method in ("false_euler", "pefrl"):
+        found = sw.lyapunov(system, method, v=np.zeros((3, 2)), y=y, dt=0.05, steps=400, exponents="all", every=5)
+        # A step has determinant 1, of which some 200 roundings leave eps each, and an orthonormalisation as many.
+        assert abs(found.sum) <= 400 * EPS / 0.05
+        np.testing.assert_allclose(found.history.sum(axis=1), 0.0, rtol=0, atol=400 * EPS / 0.05)
+        # Pairs come out in time: a vector started as a unit one is not along its direction at once, which leaves ln(n·κ)/T.
+        np.testing.assert_allclose(found.exponents + found.exponents[::-1], 0.0, atol=np.log(12 * 20) / 20.0)
+        assert found.exponents[0] > 0.05  # three bodies close together part
+
+
+def test_a_pendulum_that_swings_has_none() -> None:
+    """Its disturbances grow linearly, as the period depends on the swing: (ln T)/T and no more, and not for ever."""
+    found = sw.lyapunov(sw.Pendulum(), "pefrl", v=0.0, y=2.0, dt=0.1, steps=4000, exponents="all", every=20)
+    T = 400.0
+    # Growth is at most 1 + c·T with c = |dω/dA|·A below 1 at this swing, in the norm of (v, y).
+    assert abs(found.exponents[0]) <= np.log(2 * T) / T
+    half = found.history[len(found.history) // 2 - 1].max()
+    assert found.exponents[0] < half
+
+
+def test_the_carry_has_the_same_exponents_as_the_state() -> None:
+    """Verlet and leapfrog are False Euler in other numbers: what one grows by in the long run the others do."""
+    given: dict[str, Any] = {"v": 0.0, "y": np.array([1.0, 0.0]), "dt": 0.1, "steps": 500, "transient": 500, "exponents": "all"}
+    unstable = sw.LinearSystem([[0, 0, 1.0, 0.5], [0, 0, 0.5, 2.0], [1, 0, 0, 0], [0, 1, 0, 0]])
+    found = [sw.lyapunov(unstable, method, **given).exponents for method in ("false_euler", "leapfrog", "verlet")]
+    true = np.log(sw.analyse(unstable, "false_euler", dt=0.1).radii) / 0.1
+    for each in found:
+        # Verlet divides by the step, which costs 1/dt of the digits; directions settle as e^(−50·0.5).
+        np.testing.assert_allclose(each, np.sort(true)[::-1], rtol=0, atol=1e4 * EPS / 0.1)
+
+
+def test_under_a_control_volumes_change_as_the_steps_say() -> None:
+    """The sum is the logarithm of the determinant of the product of all steps, as ``analyse`` finds it in another way."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
+    start = {"v": 0.1 * y[::-1], "y": y, "dt": 0.05, "steps": 40}
+    run = sw.integrate(sw.NBody([1.0, 1.0, 1.0], softening=0.3), "rk4", **start, every=1, control=sw.EnergyControl(0.1))
+    found = sw.lyapunov(run.system, "rk4", **start, exponents="all")
+    np.testing.assert_array_equal(found.y, run.y[-1])
+    determinant = np.linalg.det(sw.analyse(run.system, "rk4", at=run).monodromy)
+    # Forty products of matrices, and one determinant of a matrix whose condition is e^(2·1.1) at most: some thousand eps.
+    assert float(found.sum) * 2.0 == pytest.approx(np.log(determinant), abs=4000 * EPS)
+
+
+def test_the_dimension_of_kaplan_and_yorke() -> None:
+    def dimension(*exponents: float) -> float:
+        n = len(exponents)
+        system = sw.LinearSystem(np.diag(exponents))
+        found = Lyapunov(system, sw.method("rk4"), 0.1, np.ones(1), np.array(exponents), np.ones((1, n)), np.ones(1), np.ones(1))
+        return float(found.dimension)
+
+    assert dimension(0.9, 0.0, -14.5) == pytest.approx(2 + 0.9 / 14.5, rel=4 * EPS)
+    assert dimension(-1.0, -2.0) == 0.0
+    assert dimension(2.0, -1.0, -3.0) == pytest.approx(2 + 1 / 3, rel=4 * EPS)
+    assert dimension(2.0, 1.0) == 2.0
+    assert np.isnan(sw.lyapunov(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).dimension)
+
+
+def test_a_member_that_diverges_has_none_and_is_named() -> None:
+    system = sw.Oscillator(np.array([1.0, 50.0]))
+    with pytest.warns(sw.DivergenceWarning, match="1 of 2"):
+        found = sw.lyapunov(sw.NBody([1.0, 1.0], force="newton"), "rk4", v=0.0, y=_pairs(), dt=0.1, steps=20)
+    assert np.isnan(found.exponents[:, 1]).all()
+    assert np.isfinite(found.exponents[:, 0]).all()
+    # Of a linear system the disturbances stay finite, since they are shortened, though the states overflow long before.
+    found = sw.lyapunov(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=1000)
+    np.testing.assert_allclose(
+        found.exponents[0, 1], np.log(sw.analyse(sw.Oscillator(50.0), "rk4", dt=0.1).radius) / 0.1, rtol=1e-3
+    )
+
+
+def _pairs() -> Any:
+    """Two bodies apart, and two in one place, whose force is infinite."""
+    return np.array([[[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]]])
+
+
+def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With −sin for the derivative of the sine, the sum of a damped pendulum is no longer −2Dω₀."""
+    from stepwell.derivatives import rules
+
+    monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -1e-3 - f("cos")(x),))
+    found = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")
+    right = 2.0 * 0.1 * 1.5
+    monkeypatch.undo()
+    plain = sw.lyapunov(sw.Pendulum(1.5, 0.1), "false_euler", v=0.0, y=2.0, dt=0.1, steps=200, exponents="all")
+    assert abs(found.exponents[0] - plain.exponents[0]) > 0.1
+    # A step of False Euler has determinant 1 − 2Dω₀h: that alone does not depend on the sine.
+    assert float(plain.sum) == pytest.approx(np.log(1 - right * 0.1) / 0.1, abs=40 * EPS / 0.1)
+
+
+class Rates:
+    """The reference of Lorenz's system."""
+
+    def __init__(self, h: float, sigma: Any, rho: Any, beta: Any) -> None:
+        self.h, self.sigma, self.rho, self.beta = h, sigma, rho, beta
+
+    def dv(self, t: float, v: Any, y: Any) -> Any:
+        return self.h * v
+
+    def dy(self, t: float, v: Any, y: Any) -> Any:
+        x, y, z = y
+        return self.h * np.stack([self.sigma * (y - x), x * (self.rho - z) - y, x * y - self.beta * z])
+
+
+class Lorenz(System):
+    """Three coordinates and no velocity: what a system must say of itself to be differentiated, and nothing of the core's."""
+
+    kernel = "none"
+    reference = Rates
+    second_order = False
+    v_shape, y_shape = (0,), (3,)
+
+    def said(self) -> list[str]:
+        return []
+
+    def given(self, batch: tuple[int, ...]) -> dict[str, Any]:
+        return {"sigma": np.array(10.0), "rho": np.array(28.0), "beta": np.array(8.0 / 3.0)}
+
+
+def near_the_attractor(members: int) -> Any:
+    return np.array([np.linspace(1, 2, members), np.linspace(1, 3, members), np.full(members, 20.0)])
+
+
+def test_the_exponents_of_lorenz() -> None:
+    """0.9056, 0 and −14.572 (Sprott 2003), whose sum is −σ − 1 − β at every point of the motion."""
+    given: dict[str, Any] = {"y": near_the_attractor(64), "exponents": "all"}
+    found = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.01, steps=3000, transient=2500)
+    assert_lorenz(found)
+    assert found.dimension.mean() == pytest.approx(2.062, abs=0.005)
+    # RK4 misses the determinant by a·h⁴ per unit of time: with half the step by a sixteenth, so that (16·S(h/2) − S(h))/15 has
+    # none of it. What is left is of the next order, and the averages of two motions differ a little: a third of the difference.
+    finer = sw.lyapunov(Lorenz(), "rk4", **given, dt=0.005, steps=1000, transient=200)
+    S, half = found.sum.mean(), finer.sum.mean()
+    assert abs((16 * half - S) / 15 + 10.0 + 1.0 + 8.0 / 3.0) < abs(S - half) / 3 < 1e-4
+
+
+def assert_lorenz(found: Lyapunov) -> None:
+    members = found.exponents.shape[1]
+    mean, error = found.exponents.mean(axis=1), found.exponents.std(axis=1) / np.sqrt(members)
+    # Members lose sight of each other within the transient, so the error of the mean is that of so many samples.
+    assert (np.abs(mean - [0.9056, 0.0, -14.572]) < 5 * error + 1e-3).all()
+    assert (error < 0.01).all()
+
+
+def test_equilibria_and_limits_of_lorenz() -> None:
+    """The origin and (±√(β(ρ − 1)), ±√(β(ρ − 1)), ρ − 1)."""
+    near = np.array([[0.1, 8.0, -8.0], [0.1, 8.0, -8.0], [0.1, 27.0, 27.0]])
+    found = sw.equilibria(Lorenz(), near=(None, near), method="rk4", dt=0.01)
+    c = np.sqrt(8 / 3 * 27)
+    np.testing.assert_allclose([each.y for each in found], [[0, 0, 0], [c, c, 27], [-c, -c, 27]], rtol=0, atol=27 * 20 * EPS)
+    assert [each.kind for each in found] == ["saddle"] * 3
+    for each in found:
+        z = np.exp(each.eigenvalues * 0.01)  # RK4's is that to (λh)⁵/120, below 10⁻⁵ for λ up to 22.8
+        np.testing.assert_allclose(np.sort_complex(each.analysis.eigenvalues), np.sort_complex(z), rtol=0, atol=1e-5)
+    limit = sw.stability_limit(Lorenz(), "rk4", y=np.zeros(3))
+    assert limit == 0.0  # the origin's own motion grows
+
+
+@pytest.mark.skipif(not hasattr(sw, "system"), reason="there are no systems of a user's own equations yet")
+def test_the_exponents_of_lorenz_as_a_users_own_equations() -> None:
+    @sw.system(order=1)  # type: ignore[attr-defined]
+    def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
+        return [sigma * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - beta * y[2]]
+
+    y = near_the_attractor(64)
+    assert_lorenz(sw.lyapunov(lorenz(), "rk4", y=y, dt=0.01, steps=3000, transient=2500, exponents="all"))
+    at = y[:, 0]
+    np.testing.assert_array_equal(sw.jacobian(lorenz(), y=at).matrix, sw.jacobian(Lorenz(), y=at).matrix)
