@@ -27,7 +27,7 @@ LAST_STEP = 2**53
 
 _FLOAT64 = np.dtype(np.float64)
 
-#: The truths of up to so many numbers are looked at as bytes, which is quicker than to ask NumPy and costs a copy.
+#: Up to so many booleans are checked as bytes, which costs a copy but is faster than a call of NumPy.
 _FEW_TRUTHS = 1 << 16
 
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
@@ -90,7 +90,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
 
 
 def all_true(truths: Any) -> bool:
-    """Whether all of an array of truths, or the one, are so."""
+    """Whether all booleans of an array, or a single one, are true."""
     return b"\0" not in truths.tobytes() if truths.size <= _FEW_TRUTHS else bool(truths.all())
 
 

@@ -96,13 +96,13 @@ class Control(Value):
     """Keeps an invariant I of a system near a target, by a push −gain·(I − target)·∇I/|∇I|² on both rates in every stage.
 
     The error of the invariant then decays as exp(−gain·t) (Baumgarte 1972). ∇I is derived from the operations of the invariant.
-    Where it is zero, nothing is pushed.
+    Where it is zero, there is no push.
 
     Args:
         invariant: its name; see ``Definition.invariant``.
         gain: in 1 per unit of time, zero or more; broadcasts over the batch.
-        form: ``"limited"`` takes in a step what backward Euler takes, gain/(1 + h·gain), which never overshoots; ``"printed"``
-            takes gain itself, and overshoots where h·gain is above 1.
+        form: ``"limited"`` uses gain/(1 + h·gain), as backward Euler would, which never overshoots; ``"printed"`` uses gain
+            itself, and overshoots where h·gain is above 1.
         target: the value to keep; that of the start if None. Broadcasts.
 
     Raises:
@@ -144,7 +144,7 @@ class Control(Value):
         return aimed
 
     def given(self) -> dict[str, Any]:
-        """What describes it, beside what describes the system."""
+        """Its parameters, in addition to those of the system."""
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
@@ -169,7 +169,7 @@ class Projection(Value):
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
         own = isinstance(way, str) and way.isidentifier()
         self.way = way if own else _checks.known("way", way, WAYS)
-        #: What is kept, of an own system.
+        #: The invariant that is kept, of a system of the user's own.
         self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else _checks.numbers("target", target)
 

@@ -76,17 +76,17 @@ class Plan(NamedTuple):
 
 
 class Arrays(NamedTuple):
-    """What a run begins with and what it fills, for the core.
+    """The arrays of a run for the core: those it starts from and those it fills.
 
     Attributes:
-        v: rows of the v slot, of one number for each member or one for all.
+        v: rows of the v slot, with one number for each member or one for all.
         y: rows of y, likewise.
-        carried: whether the v slot holds what the method carries, and no velocities.
-        saved_v: the kept velocities (of the matrix form: v slots), shape (kept, *block, *batch).
-        saved_y: the kept coordinates.
-        recorded: what is recorded, shape (kept, numbers, *batch); None if nothing is.
-        tally: for each member what a control or projection added up; None without one.
-        carry: the last v slots; None if the method carries nothing but v.
+        carried: whether the v slot holds the carry of the method instead of velocities.
+        saved_v: the saved velocities (in the matrix form: v slots), shape (saved, *block, *batch).
+        saved_y: the saved coordinates.
+        recorded: recorded quantities, shape (saved, numbers, *batch); None if there are none.
+        tally: for each member the sum that a control or projection accumulates; None without one.
+        carry: the last v slots; None if the method carries v.
         first_bad: for each member the first step that was not finite, −1 for none; read and written.
     """
 
@@ -102,7 +102,7 @@ class Arrays(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did.
+    """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
 
     ``diverged`` is False if it is known that no member has such a step.
     """

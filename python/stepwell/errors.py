@@ -31,9 +31,9 @@ class NotFiniteError(ArgumentError):
 
 
 class TraceError(ArgumentError):
-    """A function of a user's own equations does what cannot be traced; the message names its line and what to write instead."""
+    """A user's own equations do something that cannot be traced; the message names the line and what to write instead."""
 
-    #: Whether it may be that the state had another shape than the function is for.
+    #: Whether the cause may be a state of another shape than the function expects.
     of_shape = False
 
 

@@ -260,7 +260,7 @@ def integrate(
 
 
 def velocities(system: System, v: Any) -> Any:
-    """What is given as v; a system without velocities needs none."""
+    """The velocities that were given; a system without velocities needs none."""
     if v is None and system.v_shape == (0,):
         return 0.0
     if v is None:

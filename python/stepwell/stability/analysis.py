@@ -255,7 +255,7 @@ def analyse(
 
 
 def given_state(at: Any, v: Any, y: Any) -> Any:
-    """What is meant by ``at``, or by ``v`` and ``y`` in its place."""
+    """The state given as ``at``, or as ``v`` and ``y``."""
     if v is None and y is None:
         return at
     if y is None:
@@ -275,7 +275,7 @@ def state(argument: str, system: System, at: Any, or_what: str = "of blocks") ->
 
 
 def velocities(system: System, v: Any) -> Any:
-    """What is given as v; a system that has no velocities needs none."""
+    """The velocities that were given; a system without velocities needs none."""
     if v is not None:
         return v
     if system.v_shape != (0,):

@@ -111,7 +111,7 @@ def finish(
 
 
 def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
-    """What a method carries in the place of v, where each member may have a step of its own."""
+    """The carry of a method, where each member may have its own step."""
 
     def spread(block: Array, shape: Shape) -> Array:
         own = block.shape[len(shape) :]

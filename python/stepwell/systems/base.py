@@ -41,8 +41,8 @@ class System(Value, ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
-        complex_step: whether the reference is right on numbers with an infinitesimal imaginary part, which is the quickest way to
-            its derivatives; those of others come from their tape.
+        complex_step: whether the reference is correct for numbers with an infinitesimal imaginary part, which is the fastest way
+            to its derivatives; those of other systems come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
@@ -221,7 +221,7 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
     for name, value in given.items():
         if value is None:
             continue
-        if type(value) is np.ndarray:  # as most are: each case below takes its time
+        if type(value) is np.ndarray:  # the most frequent case, first because the others take longer
             entries.append((name, rows(value, batch)))
             continue
         match value:

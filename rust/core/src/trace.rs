@@ -64,7 +64,8 @@ pub struct Tapes {
     pub start: Option<Stage>,
     /// Turns what the method carries into velocities.
     pub finish: Option<Stage>,
-    /// A step that tells the velocities before it behind the next state, for a run that keeps all of them; none if the state has them.
+    /// A step that also returns the velocities before it, after the next state, for a run that saves all of them; None if the state has
+    /// them already.
     pub shown: Option<Stage>,
     /// The recorded numbers, behind v and y.
     pub record: Option<Stage>,

@@ -98,8 +98,8 @@ struct ArraysOf<'py> {
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept. Whether somebody diverged, now or
-/// before.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills the arrays of saved states. Returns whether
+/// some member diverged, now or before.
 #[pyfunction]
 fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
     let rows = model.rows(py)?;
@@ -133,12 +133,12 @@ fn filled<'a, D: Dimension>(array: &'a mut Option<PyReadwriteArray<'_, f64, D>>)
     array.as_mut().map_or(Ok(&mut []), |array| Ok(array.as_slice_mut()?))
 }
 
-/// The times of the states that a run keeps.
+/// The times of the saved states of a run.
 #[pyfunction]
 fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
     let clock = Clock { t0: plan.t0, h: plan.dt };
     let numbers = t.as_slice_mut()?;
-    // Whole numbers up to 2⁵³ are exact, so that they can be counted as what they are multiplied as, several at once.
+    // Whole numbers up to 2⁵³ are exact as floats, so the step numbers can be counted as floats, several at once.
     let every = plan.every.unwrap_or(plan.steps) as f64;
     let ahead: [f64; 16] = std::array::from_fn(|i| i as f64 * every);
     for (i, chunk) in numbers.chunks_mut(ahead.len()).enumerate() {

@@ -48,7 +48,7 @@ impl Runner {
         Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
-    /// In a shape that was chosen before; interpreted if there is none.
+    /// With a shape that was chosen before; interpreted if there is none.
     pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner {
         let interpreter = Interpreter::new(body, lanes, level);
         Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }

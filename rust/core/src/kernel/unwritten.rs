@@ -29,7 +29,7 @@ pub fn choose_long(_: &Body, _: Level, _: usize) -> Option<Shape> {
     None
 }
 
-/// The shape for several steps of rows of so many numbers.
+/// The shape for several steps in one call, over rows of a given length.
 pub fn choose_trail(_: &Body, _: Level, _: usize) -> Option<Shape> {
     None
 }

@@ -123,9 +123,9 @@ impl Body {
         }
     }
 
-    /// The body of so many steps, one after the other, which shows the states between: behind the numbers of the last state stand the
-    /// velocities before each step, and behind these the coordinates, so many numbers as `sizes` says. Where the body makes more than the
-    /// next state, which has `state` numbers, those are the velocities before a step, and what stands in their place is carried.
+    /// The body of several steps, one after the other, which also returns the states between: after the numbers of the last state come the
+    /// velocities before each step, and then the coordinates before each step; `sizes` has the lengths of both. A state has `state`
+    /// numbers. If the body of a step has further results, these are the velocities before the step, and the v slot holds the carry.
     #[must_use]
     pub fn trail(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
         let mut trail = Body::default();
@@ -438,8 +438,8 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> 
 }
 
 impl Tape {
-    /// Takes over what another tape holds; gives the place of each of its values. What was decided there, such as which products were
-    /// fused, stays.
+    /// Adds the operations of another tape, and returns the place of each of its values. Decisions that were made there, such as which
+    /// products are fused, remain.
     pub fn take_over(&mut self, other: &Tape) -> Vec<Id> {
         let mut place: Vec<Id> = Vec::with_capacity(other.ops().len());
         for op in other.ops() {
