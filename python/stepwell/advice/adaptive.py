@@ -26,6 +26,10 @@ from .trials import Trial
 #: each of the so many worst.
 FIRST_SAMPLES, REFINED_SAMPLES, REFINED_MARKS = 128, 32, 4
 
+#: Each such time costs a step. Of large systems, where a run may make few evaluations, there are fewer: these steps may make at most
+#: this share of them.
+CONFIRMING_SHARE = 1 / 8
+
 #: Steps are counted for each frame. Of more frames than this, they are counted for so many pieces first, and then frame by frame
 #: in the so many pieces with the most steps.
 MAX_PIECES, WORST_PIECES = 2000, 20
@@ -72,8 +76,10 @@ class AdaptiveTrials:
         if key not in self._confirmed:
             trial = self.look(method, tolerance)
             if trial.error <= self.allowed:
-                error, _ = self._errors(method, tolerance, self.marks)
-                ends = np.concatenate([[0.0], self.marks, self.marks[-1:]])
+                times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.evaluations))
+                marks = self.marks[:: math.ceil(len(self.marks) / times)]
+                error, _ = self._errors(method, tolerance, marks)
+                ends = np.concatenate([[0.0], marks, self.marks[-1:]])
                 around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
                 closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
                 trial = trial._replace(error=max(trial.error, float(error.max()), float(closer.max())))
