@@ -26,8 +26,8 @@ from .trials import Trial
 #: each of the so many worst.
 FIRST_SAMPLES, REFINED_SAMPLES, REFINED_MARKS = 128, 32, 4
 
-#: Each such time costs a step. Of large systems, where a run may make few evaluations, there are fewer: these steps may make at most
-#: this share of them.
+#: Each such time costs a step. Of large systems, where a run may make few evaluations, there are fewer: these steps may make at
+#: most this share of them.
 CONFIRMING_SHARE = 1 / 8
 
 #: Steps are counted for each frame. Of more frames than this, they are counted for so many pieces first, and then frame by frame

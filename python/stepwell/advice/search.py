@@ -45,8 +45,12 @@ MINIMUM_HALVINGS = 8
 #: predicts, if a run makes more than the share LONG_RUN_SHARE of the evaluations that it may make.
 REGULAR_ERROR, ORDER_SPREAD, ORDER_DEFICIT, REGULAR_START, LONG_RUN_SHARE = 0.02, 1.0, 1.3, 0.75, 1 / 256
 
-#: Where a run makes more than this share of the evaluations that it may make, the search only halves the last doubling.
-HALVED_RUN_SHARE = 1 / 12
+#: Where a run makes more than this share of the evaluations that it may make, the search only halves the last doubling: so many
+#: times, and once where that cannot make it the cheapest.
+HALVED_RUN_SHARE, HALVINGS = 1 / 12, 3
+
+#: When something was found, a run that costs more may make at most this share of the evaluations that a run may make.
+LATER_RUN_SHARE = 1 / 4
 
 #: The number of steps that the order predicts is wrong by up to this factor.
 PREDICTION_FACTOR = 3.0
@@ -145,7 +149,11 @@ class Search:
                 continue
             # Three octaves back if that might be the cheapest of all, for a dip may hide there.
             # One that cannot be, or whose runs are very long, is halved, as if errors were even.
-            least = self.halved(candidate, k) if cost > 4.0 * best or self.very_long(candidate, k) else self.finest(candidate, k, 8)
+            least = (
+                self.halved(candidate, k, best)
+                if cost > 4.0 * best or self.very_long(candidate, k)
+                else self.finest(candidate, k, 8)
+            )
             if least is None and self.confirmed(candidate, k):
                 least = k  # what is finer would take too long to look for
             if least is None:
@@ -181,7 +189,8 @@ class Search:
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
             made, ceiling = trial.steps * candidate.method.evaluations, ceilings.get(candidate.name, math.inf)
-            if not candidate.possible(2 * k) or made * least > self.most or trial.steps / self.spans * least > ceiling:
+            most = self.most if cost * least <= best else min(self.most, LATER_RUN_SHARE * self.longest)
+            if not candidate.possible(2 * k) or made * least > most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
             elif cost * least > MAX_COST_RATIO * best and not (trial.unstable and candidate.by == "tolerance"):
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
@@ -288,14 +297,17 @@ class Search:
         """Whether a run takes so long that only few more like it can be made."""
         return candidate.look(k).steps * candidate.method.evaluations > HALVED_RUN_SHARE * self.longest
 
-    def halved(self, candidate: Candidate, k: int) -> int | None:
+    def halved(self, candidate: Candidate, k: int, best: float) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""
-        least = k if k == candidate.first else self.between(candidate, k // 2, k)
+        hopeless = self.very_long(candidate, k) and self.cost(candidate, k) > 2.0 * best
+        least = k if k == candidate.first else self.between(candidate, k // 2, k, 1 if hopeless else HALVINGS)
+        if hopeless and self.confirmed(candidate, least):
+            return least
         return next((n for n in rungs(least, k) if self.confirmed(candidate, n)), None) or self.finest(candidate, k, 1)
 
-    def between(self, candidate: Candidate, low: int, high: int) -> int:
-        """A k above ``low``, which is not good enough, up to ``high``, which is: halved thrice."""
-        for _ in range(3):
+    def between(self, candidate: Candidate, low: int, high: int, halvings: int = HALVINGS) -> int:
+        """A k above ``low``, which is not good enough, up to ``high``, which is."""
+        for _ in range(halvings):
             middle = (low + high) // 2
             if middle in (low, high):
                 break

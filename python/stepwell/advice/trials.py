@@ -41,10 +41,10 @@ MIN_TIMED_STEPS, MAX_TIMED_STEPS, LARGE = 64, 512, 128
 #: Below this an error is taken to be in the asymptotic range, where it falls by the method's order; above, nothing is predicted.
 ASYMPTOTIC_ERROR = 0.3
 
-#: A long run is made in so many pieces. Where the error at the end of one is above LOST, or above both ASYMPTOTIC_ERROR and LOST_RATIO
-#: times what is allowed, the rest is left out: no more can be learned from it. The ratio is more than the search looks at
-#: (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If an error near LOST is allowed, it must be above twice that.
-PIECES, LOST, LOST_RATIO = 24, 1.0, 16.0
+#: A long run is made in so many pieces. Where the error at the end of one is above LOST, or above both ASYMPTOTIC_ERROR and
+#: LOST_RATIO times what is allowed, the rest is left out: no more can be learned from it. The ratio is more than the search looks
+#: at (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If an error near LOST is allowed, it must be above twice that.
+PIECES, LOST, LOST_RATIO = 12, 1.0, 16.0
 
 
 class Trial(NamedTuple):

@@ -14,8 +14,8 @@ Exact = Callable[[Array], tuple[Array, Array]]
 #: Intervals of the table at first, and at most.
 FIRST_INTERVALS, MAX_INTERVALS = 200, 20_000
 
-#: Chebyshev nodes of the interpolation in an interval, and the points between some of them at which it is checked: four, since the
-#: error of a polynomial through such nodes is alike between all of them, and a time that is asked for costs a step of the run.
+#: Chebyshev nodes of the interpolation in an interval, and points between some of them at which it is checked. Four will do, for
+#: the error of a polynomial through such nodes is alike between all of them; each time that is asked for costs a step of the run.
 NODES = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 14))
 CHECK_POINTS = (0.5 * (NODES[1:] + NODES[:-1]))[[0, 4, 8, 12]]
 
