@@ -136,7 +136,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: charts.Peer("SciPy", charts.peers.ByScipy("RK45")),
         lambda: charts.Peer("SciPy", charts.peers.ByScipy("DOP853")),
         lambda: charts.Peer("REBOUND", charts.peers.ByRebound("bs")),
-        lambda: charts.Peer("heyoka", charts.peers.by_heyoka),
+        lambda: charts.Peer("heyoka", charts.peers.ByHeyoka()),
     ],
     "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],

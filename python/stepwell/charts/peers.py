@@ -166,7 +166,7 @@ def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
         UnsupportedError: if heyoka is not installed.
     """
     _need("heyoka", "heyoka")
-    return Peer("heyoka", by_heyoka, settings)
+    return Peer("heyoka", ByHeyoka(), settings)
 
 
 @lru_cache(maxsize=1)
@@ -175,15 +175,21 @@ def _series(scene: Scene, tolerance: float) -> Any:
     return hy.taylor_adaptive(_expressions(hy, scene), np.zeros(scene.v.size + scene.y.size), tol=tolerance)
 
 
-def by_heyoka(scene: Scene, times: Array, tolerance: float) -> Solved:
+class ByHeyoka(Value):
     """Solves a scene by heyoka."""
-    series = _series(scene, tolerance)
-    series.time = 0.0
-    series.state[:] = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
-    begin = time.perf_counter()
-    found = series.propagate_grid(np.concatenate([[0.0], times]))
-    seconds = time.perf_counter() - begin
-    return Solved(*_blocks(scene, found[-1][1:]), int(found[3]) * series.order, seconds)
+
+    def __repr__(self) -> str:
+        return "ByHeyoka()"
+
+    def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
+        """The states at these times."""
+        series = _series(scene, tolerance)
+        series.time = 0.0
+        series.state[:] = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
+        begin = time.perf_counter()
+        found = series.propagate_grid(np.concatenate([[0.0], times]))
+        seconds = time.perf_counter() - begin
+        return Solved(*_blocks(scene, found[-1][1:]), int(found[3]) * series.order, seconds)
 
 
 #: REBOUND's integrators that are offered, and whether a setting is a tolerance.
