@@ -19,6 +19,7 @@ def error_of(scene: Scene, method: str, dt: float, steps: int) -> float:
     """The largest state error of a run."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)
+        warnings.simplefilter("ignore", sw.AccuracyWarning)
         return float(scene.state_error(scene.run(method, dt, steps=steps, every=1)).max())
 
 
@@ -68,6 +69,7 @@ def test_the_margin_is_where_it_blows_up(name: str) -> None:
         for share in (0.999, 1.001):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DivergenceWarning)
+                warnings.simplefilter("ignore", sw.AccuracyWarning)
                 run = scene.run(row.method, share * row.limit, steps=20_000, every=20)
             sizes.append(float(scene.amplitude(run).max()))
         # Near the limit the axes of the ellipse are in the ratio √((2+Φ)/(2−Φ)) < 45; outside e⁷ and more.

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
-from ..errors import ToleranceWarning
+from ..errors import AccuracyWarning, ToleranceWarning
 from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
@@ -107,6 +107,7 @@ class AdaptiveTrials:
         scene, most = self.scene, max(1, int(self.most / method.evaluations))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             run = integrate(scene.system, method, v=scene.v, y=scene.y, tolerance=tolerance, at=at, max_steps=most)
         assert run.paces is not None
         self.work += int(run.paces.evaluations)
@@ -133,6 +134,7 @@ class AdaptiveTrials:
         for end in ends:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ToleranceWarning)
+                warnings.simplefilter("ignore", AccuracyWarning)
                 run = integrate(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
             leg = Leg(end, run.resume, int(run.paces.evaluations) // method.evaluations)

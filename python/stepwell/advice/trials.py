@@ -234,6 +234,7 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
     ends = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         for method in methods:
             end = scene.horizon / 1024
             while tried(method, scene.v, scene.y, end) < fewest and end < 1000 * scene.horizon:
@@ -253,6 +254,7 @@ def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[fl
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         sizes, found = {}, {}
         begun = time.perf_counter()
         for method in methods:
