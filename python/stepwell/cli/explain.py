@@ -25,6 +25,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
     parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
     parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
+    parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
+    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods")
+    parser.add_argument("--record", action="append", default=[], metavar="NAME", help="a quantity to list, too, such as energy")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json, .html or .txt")
     show.json_option(parser)
 
@@ -41,6 +44,9 @@ def command(args: argparse.Namespace) -> None:
         control=None if args.attempt else control,
         fused=args.fused,
         attempt=args.attempt,
+        form=args.form,
+        start=args.start,
+        record=args.record,
     )
     written = show.Written()
     if args.output is not None:
