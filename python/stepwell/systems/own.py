@@ -61,6 +61,11 @@ class OwnSystem(System):
         #: For states of shapes that were met before.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
 
+    @property
+    def kind_name(self) -> str:
+        """The name of the function."""
+        return self.definition.name
+
     def said(self) -> list[str]:
         """The parameters."""
         return shown(**self.parameters_given)
