@@ -22,7 +22,9 @@ from .inputs import Input, Sampled, Sinusoid
 #: What the function is given as, among the names of parameters; none of these can be called so.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_bounds")
+FOUND_LATER = ("_core", "_bounds", "_met")
+#: Of how many shapes of states it is remembered what they are of.
+MOST_MET = 256
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
 LONGEST_GUESS = 32
 
@@ -58,8 +60,9 @@ class OwnSystem(System):
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
         self._core: Any = None
-        #: For states of shapes that were met before.
+        #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
+        self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
 
     @property
     def kind_name(self) -> str:
@@ -78,14 +81,14 @@ class OwnSystem(System):
         return {name: value for name, value in vars(self).items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self._held() | {"_core": None, "_bounds": {}}
+        return self._held() | {"_core": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = copy.copy(self)
         again.parameters_given = copy.deepcopy(self.parameters_given, memo)
         if self.control is not None:
             again.control = copy.deepcopy(self.control, memo)
-        again._bounds = {}
+        again._bounds, again._met = {}, {}
         return again
 
     def own_axes(self, name: str) -> int:
@@ -97,14 +100,20 @@ class OwnSystem(System):
 
     def sized(self, *states: Any) -> OwnSystem:
         """The same system for the states v and y of these shapes; None is what was not given."""
-        given = dict(zip(("v", "y"), states, strict=False))
-        shapes = {name: _checks.shape_of(name, state) for name, state in given.items() if state is not None}
+        given = zip(("v", "y"), states, strict=False)
+        shapes = {name: _checks.shape_of(name, state) for name, state in given if state is not None}
         if self.equations is not None and self._fits(shapes):
             return self
+        met = shapes.get("v"), shapes.get("y")
+        if (known := self._met.get(met)) is not None:
+            return known
         refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
             try:
-                return self._bound(v_shape, y_shape)
+                if len(self._met) >= MOST_MET:
+                    self._met.clear()
+                self._met[met] = self._bound(v_shape, y_shape)
+                return self._met[met]
             except TraceError as error:
                 refused.append(error)
         if not refused:
@@ -147,7 +156,7 @@ class OwnSystem(System):
             return known
         definition = self.definition
         bound = copy.copy(self)
-        bound._bounds = {}
+        bound._bounds, bound._met = {}, {}
         bound.v_shape, bound.y_shape = v_shape, y_shape
         shapes = {
             name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
@@ -269,7 +278,7 @@ class OwnSystem(System):
         known = self._known()
         assert known.equations is not None
         kept = copy.copy(known)
-        kept._bounds = {}
+        kept._bounds, kept._met = {}, {}
         kept._free = known
         kept.batch = _checks.batch_shape({"system": known.batch, "control": control.batch})
         pushed = isinstance(control, Control)
