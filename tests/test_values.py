@@ -96,7 +96,12 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.EnergyControl(0.1, target=1.0),
     ],
     "Control": [lambda: sw.Control("energy", 0.1), lambda: sw.Control("norm", [0.1, 0.2], "printed", target=1.0)],
-    "Projection": [sw.Projection, lambda: sw.Projection("norm"), lambda: sw.Projection("nacozy"), lambda: sw.Projection(target=[1.0, 2.0])],
+    "Projection": [
+        sw.Projection,
+        lambda: sw.Projection("norm"),
+        lambda: sw.Projection("nacozy"),
+        lambda: sw.Projection(target=[1.0, 2.0]),
+    ],
     "Run": [
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
