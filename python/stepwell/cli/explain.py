@@ -9,7 +9,7 @@ from .. import _checks, systems
 from ..control import AnyControl
 from ..errors import ArgumentError, StepwellError, UnknownNameError
 from ..explanation import explain
-from ..scenes import scene, scenes
+from ..scenes import FILE, scene, scenes
 from ..systems import System
 from . import show
 
@@ -19,7 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "system",
         metavar="SYSTEM",
-        help="a scene, see stepwell scenes, under its control; or a system by its class, such as Pendulum",
+        help="a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum",
     )
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
@@ -71,7 +71,7 @@ def system_and_control(name: str) -> tuple[System, AnyControl | None]:
         except (StepwellError, TypeError):
             raise ArgumentError(f"system: {name} needs arguments; name a scene, or use stepwell.explain in Python") from None
     known = [each.name for each in scenes()]
-    if name not in known:
+    if name not in known and not FILE.fullmatch(name):
         classes = [each for each in systems.__all__ if isinstance(getattr(systems, each), type) and each != "System"]
         raise UnknownNameError(
             f"system: there is no {_checks.short(name)}; expected a scene, {', '.join(known)}, or a system, "
