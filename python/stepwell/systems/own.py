@@ -234,8 +234,14 @@ class OwnSystem(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """The invariants, each one number."""
-        return dict.fromkeys(self.definition.invariants, ())
+        """The invariants, each one number; what is made of a parameter that changes with the time is none."""
+        given = self.parameters_given
+        constant = (
+            name
+            for name, each in self.definition.invariants.items()
+            if all(isinstance(given[parameter], np.ndarray) for parameter in each.parameters)
+        )
+        return dict.fromkeys(constant, ())
 
     def energy(self, v: Array, y: Array) -> Array:
         """The invariant that is called ``energy``."""
