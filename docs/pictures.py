@@ -55,7 +55,7 @@ def write_best(panel: sw.charts.Panel) -> None:
 
 
 def tape() -> Figure:
-    """Text, tape, readers: what becomes of a step."""
+    """The tape of a step between its source and its readers."""
     from matplotlib.figure import Figure
     from matplotlib.patches import FancyBboxPatch
 
@@ -82,17 +82,17 @@ def tape() -> Figure:
             "", end, start, arrowprops={"arrowstyle": "-|>", "color": "#333333", "linewidth": 1.6, "mutation_scale": 18}
         )
 
-    for x, head in ((2, "Text, once in each language"), (41, "Tape: one step, straight"), (67, "Readers")):
+    for x, head in ((2, "Source, once in each language"), (41, "Tape of one step"), (67, "Readers")):
         axes.text(x, 44.5, head, fontsize=15, va="top")
-    box(2, 29, 30, 12, "A method, over blocks", "v = v + s.dv(t, v, y)\ny = y + s.dy(t, v, y)", "#f2f2f2")
-    box(2, 15, 30, 12, "A system, over numbers", "dv = -(stiffness * y)\ndy = speed * v", "#f2f2f2")
+    box(2, 29, 30, 12, "A method, over blocks: False Euler", "v = v + s.dv(t, v, y)\ny = y + s.dy(t, v, y)", "#f2f2f2")
+    box(2, 15, 30, 12, "A system, over numbers: the oscillator", "dv = -(stiffness * y)\ndy = speed * v", "#f2f2f2")
     box(
         2,
         1,
         30,
         12,
-        "What is around them",
-        "control, projection, inputs,\nrecorded quantities,\nthe choice of the next step",
+        "Wrapped around them",
+        "control, projection, inputs,\nrecorded quantities,\nstep-size control",
         "#f2f2f2",
         mono=False,
     )
@@ -105,14 +105,15 @@ def tape() -> Figure:
     readers = (
         ("Kernel writer", "machine code at run time (AVX2, AVX-512)"),
         ("Interpreter", "the same bits, on any machine"),
-        ("Comparer", "core and reference: the same graph?"),
+        ("Comparer", "proves that core and reference are equal"),
+        ("Fuser", "fused multiply-adds, on request"),
         ("Counter", "operations of a step, by kind"),
-        ("Printer", "a listing to read"),
+        ("Printer", "listings and formulas"),
     )
     for i, (title, text) in enumerate(readers):
-        low = 33.8 - 8.2 * i
-        box(67, low, 31, 7.2, title, text, mono=False)
-        arrow((61.3, low + 3.6), (66.7, low + 3.6))
+        low = 34.9 - 6.78 * i
+        box(67, low, 31, 6.1, title, text, mono=False)
+        arrow((61.3, low + 3.05), (66.7, low + 3.05))
     return figure
 
 

@@ -13,6 +13,16 @@ PHRASES = {
     r"(step|one|those) beside the path": "extra step",
     r"abreast": "interleaved, vectors of a block",
     r"a lone \w+": "a single member",
+    r"nobody|somebody|anybody|everybody|whoever": "the member, the caller, the thread, the value",
+    r"who (diverged|tells|asks|is not finite)": "which members diverged",
+    r"look(s|ing)? at": "check, read, evaluate",
+    r"(two|one|last|next|first|more) looks?|looks (between|in between)": "check",
+    r"held against": "compared with",
+    r"(what|that) comes of": "result",
+    r"is its own affair": "is computed by",
+    r"in the place of": "in place of",
+    r"unless told otherwise": "by default",
+    r"pumps energy": "adds energy",
 }
 
 #: Identifiers of the Python package and the Rust core: the expression, and what it is called now.
@@ -29,6 +39,12 @@ NAMES = {
     r"(fn|def) (sit|tend|seat|beat)": "set_state, assign_member, update_lane",
     r"Seat|seats?": "Assignment",
     r"along::": "forces::",
+    r"Crew|crew": "Workers, workers",
+    r"Leave": "BusyGuard",
+    r"heed": "set_stop_flag",
+    r"(SHORT_)?LOOK|LOOKS_BETWEEN|PATIENCE|patience": "DIVERGENCE_CHECK_INTERVAL, steps_between_checks",
+    r"WORTH_A?\w+|ALONE|TO_BEGIN|TEAM|STRAIGHT": "what the constant bounds: MIN_NUMBER_STEPS_FOR_THREADS, MAX_TAPE_OPERATIONS",
+    r"(MOST_CODE|SINGLE_MAP|OF_A_NUMBER|OF_A_PARAMETER)": "MAX_CODE_OPERATIONS, BYTES_PER_NUMBER",
 }
 
 #: Where one may stand all the same: the end of a path, and the expression.

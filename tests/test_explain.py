@@ -564,7 +564,7 @@ def test_text_and_html() -> None:
     assert text.startswith(
         "Verlet: a step of Oscillator(omega=array(2,), form='canonical'), 2 members, with fused multiply-adds\n"
     )
-    assert "y_prev: what stands in the place of v between steps" in text
+    assert "y_prev: what is carried in place of v between steps" in text
     assert "fma(a, b, c) = a·b + c, rounded once" in text
     assert '<td style="text-align:left">y_prev&#x27;</td>' in html
     assert html.count("<table>") == html.count("</table>") == 2

@@ -225,6 +225,16 @@ def test_collisions_after_a_pickle() -> None:
     assert pickle.loads(pickle.dumps(run)).collisions == run.collisions
 
 
+def test_a_chart_of_a_scene_without_a_formula_can_be_pickled() -> None:
+    # Its reference solution is an interpolation, which only this kind of chart holds.
+    chart = charts.work_precision("energy_control", ["false_euler"], [400])
+    for again in (pickle.loads(pickle.dumps(chart)), copy.deepcopy(chart)):
+        assert again == chart
+        t = np.linspace(0.0, 0.9 * chart.scene.horizon, 7)
+        for block, other in zip(chart.scene.exact(t), again.scene.exact(t), strict=True):
+            np.testing.assert_array_equal(block, other)
+
+
 def test_a_run_under_a_bar_can_be_pickled() -> None:
     """The bar is gone by then, and what finds collisions must not hold it."""
     pytest.importorskip("rich")

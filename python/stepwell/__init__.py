@@ -1,9 +1,9 @@
 """Simple integration algorithms at the machine's speed.
 
-``integrate`` steps one trajectory or a hundred thousand, ``World`` is the real-time loop, ``methods`` and ``method`` answer what
-there is to know of a method, ``analyse``, ``stability_limit`` and ``criteria`` what it does to a system, ``explain`` what
-a step computes; ``jacobian``, ``equilibria`` and ``lyapunov`` tell what a system does near its states; ``scenes`` and ``charts``
-show what each method costs, how wrong it is and where it blows up, and ``advise`` says which to take.
+``integrate`` steps one trajectory or a hundred thousand; ``World`` is the real-time loop. ``methods`` and ``method`` describe
+the methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``jacobian``,
+``equilibria`` and ``lyapunov`` describe a system near its states. ``scenes`` and ``charts`` show the cost and error of each
+method and where it becomes unstable; ``advise`` recommends one.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def isa_levels() -> list[str]:
     return _core.isa_levels()
 
 
-#: What is imported when it is first used, so that importing stepwell stays quick, and where it is.
+#: Attributes that are imported on first use, so that importing stepwell stays fast, and their modules.
 _LATER = {
     "advice": "advice",
     "Scene": "scenes.Scene",

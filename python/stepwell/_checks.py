@@ -27,13 +27,13 @@ LAST_STEP = 2**53
 
 _FLOAT64 = np.dtype(np.float64)
 
-#: The truths of up to so many numbers are looked at as bytes, which is quicker than to ask NumPy and costs a copy.
+#: Up to so many booleans are checked as bytes, which costs a copy but is faster than a call of NumPy.
 _FEW_TRUTHS = 1 << 16
 
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
 MOST_AXES = 24
 
-#: So much of a path stands in a message.
+#: So many characters of a path are shown in a message.
 PATH = 1000
 
 
@@ -54,9 +54,9 @@ def known(argument: str, name: object, names: Iterable[str]) -> str:
 
 
 def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
-    """Return ``value`` as float64, if it is real, finite unless told otherwise, and positive if asked."""
+    """Return ``value`` as float64 if it is real, and by the options finite and positive."""
     if type(value) is float and isfinite(value) and (not positive or value > 0.0):
-        return np.array(value)  # what is given most often: no more to look at
+        return np.array(value)  # the most frequent case: nothing more to check
     if (
         type(value) is np.ndarray
         and value.dtype is _FLOAT64
@@ -64,7 +64,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         and (not finite or all_true(np.isfinite(value)))
         and (not positive or all_true(value > 0.0))
     ):
-        return value  # likewise; what is wrong with one that is not so is said below
+        return value  # likewise; the checks below say what is wrong with any other
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, RecursionError) as error:
@@ -80,7 +80,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
             array = array.astype(np.float64)
     if not array.flags.aligned:
         array = array.copy()
-    # One look at all; where it is wrong is asked only if it is.
+    # One check of the whole array; the wrong element is searched only if it fails.
     if finite and not np.isfinite(array).all():
         wrong = ~np.isfinite(array)
         raise NotFiniteError(f"{argument}: expected finite numbers{_in(unit)}, got {array[wrong][0]}{_where(wrong)}")
@@ -90,7 +90,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
 
 
 def all_true(truths: Any) -> bool:
-    """Whether all of an array of truths, or the one, are so."""
+    """Whether all booleans of an array, or a single one, are true."""
     return b"\0" not in truths.tobytes() if truths.size <= _FEW_TRUTHS else bool(truths.all())
 
 
@@ -240,7 +240,7 @@ def member(array: Array, index: Shape) -> Array:
     return np.asarray(array)
 
 
-#: Bytes below which nobody asks whether they are there: to ask takes as long as to fill some hundred kilobytes.
+#: Less memory than this, in bytes, is not checked: a check takes as long as filling some hundred kilobytes.
 _FEW_BYTES = 1 << 24
 
 
@@ -291,7 +291,7 @@ def _bounds() -> Iterator[tuple[float, str]]:
             fields = _fields(f"{folder}/memory.stat")
         except OSError:
             fields = {}
-        # What is kept of files that nobody reads just now is given up when memory is asked for.
+        # The page cache of inactive files is released when memory is needed.
         used -= fields.get("total_inactive_file", fields.get("inactive_file", 0))
         yield float(most - used), "memory limit of the control group"
 

@@ -208,8 +208,8 @@ def compiled(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     there are) tell of the machine code; or it is "level" (none at this level), "pages" (the system lets no page be executed)
     or "writer".
 
-    ``split`` holds the operations: "run", "member", "step" and "body", each what ``Tape.operations`` gives and the places of what
-    comes of it. What comes of the first three are, in order, the values "uniform", "row" and "of the step" of the body; "held"
+    ``split`` holds the operations: "run", "member", "step" and "body", each the result of ``Tape.operations`` and the indices of
+    its results. The results of the first three are, in order, the values "uniform", "row" and "of the step" of the body; "held"
     are numbered with the last. Their own leaves are "uniform", the number of a pair in ``given``, and "row", of the step the
     time and of the member the number of a parameter in ``params``. ``entries`` has a pair for each value of the step: "value",
     or "sample" or "row" with the number of a table, of which the value is the number of a sample.

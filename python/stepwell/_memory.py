@@ -1,9 +1,9 @@
-"""Memory of large results: fresh pages cost more than to fill them, so what is given back is lent again.
+"""Memory of large results: a fresh page costs more than filling it, so released memory is reused.
 
-A run that keeps every step writes some megabytes in a few milliseconds. The system clears each new page before it is written,
-a small page (4 KiB) at a time unless it may give large ones (2 MiB), and takes all back when the arrays are gone. So large arrays
-begin at the edge of a large page; and when the last array over such memory is gone, the memory stays for the next result, up to
-``MOST_KEPT`` bytes in all.
+A run that saves every step writes some megabytes in a few milliseconds. The operating system clears each new page before it is
+written, a small page (4 KiB) at a time unless it can give large ones (2 MiB), and takes all pages back when the arrays are
+gone. So large arrays begin at the boundary of a large page; and when the last array over such memory is gone, the memory is kept
+for the next result, up to ``MOST_KEPT`` bytes in all.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from ._checks import Array, Shape
 
 #: Arrays of fewer bytes are NumPy's own: the allocator keeps memory of such sizes by itself.
 LEAST_LENT = 1 << 20
-#: What is kept in all, in bytes, while nobody uses it.
+#: The most bytes that are kept in all while no array uses them.
 MOST_KEPT = 1 << 26
 #: Size of a large page, in numbers.
 _LARGE_PAGE = (1 << 21) // 8
 
-#: What nobody uses, by identity, the newest last. Arrays may be given back at any moment, between any two operations on it.
+#: Memory that no array uses, by identity, the newest last. Memory may be released between any two operations on this.
 _kept: dict[int, Array] = {}
 
 
 def _keep(memory: Array, kept: dict[int, Array] = _kept, most: int = MOST_KEPT) -> None:
-    """Keep what is given back. The last of it comes when the interpreter ends, and finds no names of this file any more."""
+    """Keep released memory. When the interpreter ends, the last memory is released after the names of this file are gone."""
     if memory.nbytes > most:
         return
     kept[id(memory)] = memory
@@ -39,7 +39,7 @@ def _keep(memory: Array, kept: dict[int, Array] = _kept, most: int = MOST_KEPT) 
 
 
 class _Loan:
-    """Memory that is lent: the base of all arrays over it, which keep it alive."""
+    """Memory in use: the base of all arrays over it, which keep it alive."""
 
     __slots__ = ("__array_interface__", "_memory")
 
@@ -52,7 +52,7 @@ class _Loan:
 
 
 def _memory(numbers: int) -> Array:
-    """Room for so many numbers: what was used before and is not much larger, or else new."""
+    """Memory for a given number of floats: kept memory that is not much larger, or else new memory."""
     for memory in list(_kept.values()):
         if numbers <= memory.size <= numbers + numbers // 8 and _kept.pop(id(memory), None) is memory:
             return memory

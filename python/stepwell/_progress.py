@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 def bar(title: str) -> Iterator[Callable[[float], object]]:
     """Show a bar; yields the function that takes the share that is done."""
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    # On stderr and gone at the end, so that what a program prints stays as it is.
+    # On stderr and removed at the end, so that the output of a program is not changed.
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(title, total=1.0)
         yield lambda share: progress.update(task, completed=share)

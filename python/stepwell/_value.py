@@ -25,7 +25,7 @@ class Value:
         return same(self._held(), other._held())
 
     def __hash__(self) -> int:
-        # Arrays cannot be hashed; words and whole numbers tell many objects apart.
+        # Arrays cannot be hashed; words and whole numbers distinguish many objects.
         return hash((type(self), *(each for each in self._held().values() if isinstance(each, (str, int)))))
 
 

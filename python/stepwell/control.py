@@ -1,4 +1,4 @@
-"""Control terms: what keeps a quantity that should be constant from drifting (§12, Appendix D)."""
+"""Control terms, which keep a quantity that should be constant from drifting (§12, Appendix D)."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ FORMS = ("limited", "printed")
 class EnergyControl(Value):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
 
-    As the document prints it (Appendix D), the push is h·C·ΔE in a step, and overflows where h·C·K passes 1, K being the kinetic
-    energy, which has no bound at close encounters. The limited form decays ΔE by backward Euler instead, and scales
-    velocities by a factor between ½ and 2: it is the same to first order and stays finite.
+    In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
+    kinetic energy, which is not bounded at close encounters. The limited form integrates the decay of ΔE by backward Euler
+    instead, and scales velocities by a factor between ½ and 2: it is the same to first order and stays finite.
 
     Args:
         gain: C, in 1 per energy and unit of time; broadcasts over the batch.
         form: ``"limited"`` or ``"printed"``.
-        relative: in place of C, the number h·C·K at the start, without a unit: the share of ΔE that a step takes away is twice
-            that. Broadcasts.
+        relative: in place of C, the dimensionless h·C·K at the start: a step removes twice that fraction of ΔE. Broadcasts.
         target: the energy to keep; that of the start if None. Broadcasts.
 
     Raises:
@@ -55,7 +54,7 @@ class EnergyControl(Value):
         return f"EnergyControl({strength}, form={self.form!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> EnergyControl:
-        """The same control with its gain and its target in numbers, from the energies at the start.
+        """The same control with numbers for its gain and its target, from the energies at the start.
 
         Warns:
             ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
@@ -78,16 +77,16 @@ class EnergyControl(Value):
         return aimed
 
     def around(self, s: Any, h: float) -> reference.Controlled:
-        """The NumPy reference, round that of a system, both scaled to the step h."""
+        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
         return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
-        """What describes it to the core, beside what describes the system."""
+        """Its parameters for the core, in addition to those of the system."""
         numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
         return {"control": "energy", "control.form": self.form} | numbers
 
     def member(self, one: Callable[[Array], Array]) -> EnergyControl:
-        """That of one member."""
+        """The same for a single member."""
         alone = copy.copy(self)
         alone.gain, alone.target = one(np.asarray(self.gain)), one(np.asarray(self.target))
         return alone
@@ -97,13 +96,13 @@ class Control(Value):
     """Keeps an invariant I of a system near a target, by a push −gain·(I − target)·∇I/|∇I|² on both rates in every stage.
 
     The error of the invariant then decays as exp(−gain·t) (Baumgarte 1972). ∇I is derived from the operations of the invariant.
-    Where it is zero, nothing is pushed.
+    Where it is zero, there is no push.
 
     Args:
         invariant: its name; see ``Definition.invariant``.
         gain: in 1 per unit of time, zero or more; broadcasts over the batch.
-        form: ``"limited"`` takes in a step what backward Euler takes, gain/(1 + h·gain), which never overshoots; ``"printed"``
-            takes gain itself, and overshoots where h·gain is above 1.
+        form: ``"limited"`` uses gain/(1 + h·gain), as backward Euler would, which never overshoots; ``"printed"`` uses gain
+            itself, and overshoots where h·gain is above 1.
         target: the value to keep; that of the start if None. Broadcasts.
 
     Raises:
@@ -145,7 +144,7 @@ class Control(Value):
         return aimed
 
     def given(self) -> dict[str, Any]:
-        """What describes it, beside what describes the system."""
+        """Its parameters, in addition to those of the system."""
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
@@ -153,11 +152,11 @@ WAYS = ("scaling", "nacozy")
 
 
 class Projection(Value):
-    """Sets the state back onto the energy, or onto another invariant, after every step.
+    """Projects the state back to the target energy, or to that of another invariant, after every step.
 
-    ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the least change of the state that
-    does it to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971). So does the name of an
-    invariant of an own system, for that invariant.
+    ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
+    that suffices to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971). The name of an
+    invariant of a system of your own does the same for that invariant.
 
     Args:
         way: ``"scaling"``, ``"nacozy"``, or the name of an invariant.
@@ -170,7 +169,7 @@ class Projection(Value):
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:
         own = isinstance(way, str) and way.isidentifier()
         self.way = way if own else _checks.known("way", way, WAYS)
-        #: What is kept, of an own system.
+        #: The invariant that is kept, of a system of the user's own.
         self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else _checks.numbers("target", target)
 
@@ -183,27 +182,27 @@ class Projection(Value):
         return f"Projection({self.way!r})"
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> Projection:
-        """The same projection with its target in numbers."""
+        """The same projection with a number for its target."""
         aimed = copy.copy(self)
         if aimed.target is None:
             aimed.target = np.asarray(energy)
         return aimed
 
     def around(self, s: Any, h: float) -> reference.Projected:
-        """The NumPy reference, round that of a system, both scaled to the step h."""
+        """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
         return reference.Projected(s, h, self._known_way, np.asarray(self.target))
 
     def given(self) -> dict[str, Any]:
-        """What describes it to the core, beside what describes the system."""
+        """Its parameters for the core, in addition to those of the system."""
         return {"control": "projection", "control.way": self._known_way, "control.target": np.asarray(self.target)}
 
     @property
     def _known_way(self) -> str:
-        """An invariant is kept along its gradient."""
+        """How the core projects: onto an invariant along its gradient."""
         return self.way if self.way in WAYS else "nacozy"
 
     def member(self, one: Callable[[Array], Array]) -> Projection:
-        """That of one member."""
+        """The same for a single member."""
         alone = copy.copy(self)
         alone.target = one(np.asarray(self.target))
         return alone

@@ -1,7 +1,7 @@
 """Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
 
-A slot is what stands in the place of a block between steps: v for most methods, something else for those with a carry. Everything
-above this file speaks of states, everything below of slots.
+A slot is the array that holds a block between steps: v for most methods, the carry for those that have one. Everything
+above this file works with states, everything below with slots.
 """
 
 from __future__ import annotations
@@ -76,17 +76,17 @@ class Plan(NamedTuple):
 
 
 class Arrays(NamedTuple):
-    """What a run begins with and what it fills, for the core.
+    """The arrays of a run for the core: those it starts from and those it fills.
 
     Attributes:
-        v: rows of the v slot, of one number for each member or one for all.
+        v: rows of the v slot, with one number for each member or one for all.
         y: rows of y, likewise.
-        carried: whether the v slot holds what the method carries, and no velocities.
-        saved_v: the kept velocities (of the matrix form: v slots), shape (kept, *block, *batch).
-        saved_y: the kept coordinates.
-        recorded: what is recorded, shape (kept, numbers, *batch); None if nothing is.
-        tally: for each member what a control or projection added up; None without one.
-        carry: the last v slots; None if the method carries nothing but v.
+        carried: whether the v slot holds the carry of the method instead of velocities.
+        saved_v: the saved velocities (in the matrix form: v slots), shape (saved, *block, *batch).
+        saved_y: the saved coordinates.
+        recorded: recorded quantities, shape (saved, numbers, *batch); None if there are none.
+        tally: for each member the sum that a control or projection accumulates; None without one.
+        carry: the last v slots; None if the method carries v.
         first_bad: for each member the first step that was not finite, −1 for none; read and written.
     """
 
@@ -102,7 +102,7 @@ class Arrays(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Kept states, last slots, the first step of each member that was not finite, what was recorded, and what a control did.
+    """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
 
     ``diverged`` is False if it is known that no member has such a step.
     """
@@ -425,7 +425,7 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
 #: As the core's ``HUGE``.
 _HUGE = 2.0**960
 
-#: Steps of a piece at whose end it is asked whether one of its velocities may have overflowed.
+#: Steps between two checks of whether a velocity may have overflowed.
 _PIECE = 1024
 
 
@@ -440,7 +440,7 @@ def _seen(
 ) -> Whole:
     """The first bad steps of a run in matrix form, whose velocities the core does not know.
 
-    Members that come near the end of the number range are stepped again from the last look before that, by the reference.
+    Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
     most = _HUGE * min(plan.dt, 1.0)
 
@@ -450,7 +450,7 @@ def _seen(
     near = np.logical_or.reduce(is_near(out.v, out.y), axis=0) | (out.first_bad > before)
     if not near.any():
         return out.first_bad
-    # Who is not finite in what is carried needs no more looks.
+    # Members whose carry is not finite need no further checks.
     last = plan.steps if (near & (out.first_bad < 0)).any() else int(out.first_bad.max()) - plan.first
     for done in range(0, last, _PIECE):
         piece = plan._replace(first=plan.first + done, steps=min(_PIECE, last - done), every=None, progress=None)

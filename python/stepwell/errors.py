@@ -1,4 +1,4 @@
-"""Everything that stepwell raises or warns of, in one tree.
+"""All errors and warnings of stepwell, in one hierarchy.
 
 A message says what was given, what was expected, and the argument's name.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 
 class StepwellError(Exception):
-    """The root: catching it catches every error that stepwell raises by intention."""
+    """The base class of every error that stepwell raises intentionally."""
 
 
 class ArgumentError(StepwellError, ValueError):
@@ -23,7 +23,7 @@ class ShapeError(ArgumentError):
 
 
 class DTypeError(ArgumentError, TypeError):
-    """A value is of a kind that is no number, or an array of a kind that cannot be stepped in place."""
+    """A value is not a number, or an array has a dtype that cannot be stepped in place."""
 
 
 class NotFiniteError(ArgumentError):
@@ -31,36 +31,36 @@ class NotFiniteError(ArgumentError):
 
 
 class TraceError(ArgumentError):
-    """A function of a user's own equations does what cannot be traced; the message names its line and what to write instead."""
+    """A user's own equations do something that cannot be traced; the message names the line and what to write instead."""
 
-    #: Whether it may be that the state had another shape than the function is for.
+    #: Whether the cause may be a state of another shape than the function expects.
     of_shape = False
 
 
 class TooLargeError(ArgumentError, MemoryError):
-    """What was asked for does not fit in memory."""
+    """The results of a call would not fit in memory."""
 
 
 class UnsupportedError(StepwellError, ValueError):
-    """A method cannot do what a system asks for."""
+    """A method cannot step a system, or an option is not supported for it."""
 
 
 class BusyError(StepwellError, RuntimeError):
-    """A ``World`` was asked to step by one thread while another one steps it."""
+    """A thread called ``World.step`` while another thread steps the same world."""
 
 
 class FixedError(StepwellError, AttributeError):
-    """What stands once and for all was assigned; the message says how to have another."""
+    """A fixed attribute was assigned; the message says what to do instead."""
 
 
 class DivergenceWarning(UserWarning):
-    """Some members left the range of finite numbers. Their rows say when; their neighbours are not touched."""
+    """Some members left the range of finite numbers. ``Run.first_bad_step`` says when; the others are not affected."""
 
 
 class ToleranceWarning(UserWarning):
-    """Some members stopped before the last asked time: out of steps, or their steps became too small to move the time.
+    """Some members stopped before the last output time: out of steps, or their steps became too short to change the time.
 
-    Or an absolute tolerance is so large that the motion is lost in it.
+    It is also given if an absolute tolerance is so large that the motion is lost in it.
     """
 
 
@@ -69,4 +69,4 @@ class ControlWarning(UserWarning):
 
 
 class AccuracyWarning(UserWarning):
-    """A run stayed finite, and yet it can be seen that its numbers mean nothing."""
+    """A run stayed finite, but its numbers are known to be meaningless."""

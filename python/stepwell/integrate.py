@@ -34,17 +34,17 @@ from .systems.base import a_system
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
 
-#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, what the method carries,
-#: what is reported), and so many bytes for each saved time (its step number and the time).
+#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final
+#: state), and so many bytes for each saved time (its step number and the time).
 NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
-#: The most steps of a member of a run with a tolerance, unless told otherwise.
+#: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
 MOST_STEPS = 1_000_000
 
-#: A warning names the bodies that collided if running the member again takes at most so many steps × numbers, which is a moment.
-#: Otherwise ``Run.collisions`` tells them when asked.
+#: A warning names the bodies that collided if repeating the run of the member takes at most so many steps × numbers, which is a
+#: moment. Otherwise they are found by ``Run.collisions``.
 MAX_RERUN = 10_000_000
 
-#: An absolute tolerance above this share of the largest length of a block so far is warned of.
+#: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
 MAX_ABSOLUTE_SHARE = 0.01
 
 
@@ -77,47 +77,47 @@ def integrate(
 ) -> Run:
     """Step a system, or a batch of it.
 
-    Every parameter of the system and both blocks broadcast; batch axes come last. One diverged member never touches its
-    neighbours. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
-    in company, in one piece or in several.
+    Every parameter of the system and both blocks broadcast; batch axes come last. A member that diverges does not affect the
+    others. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
+    in a batch, in one piece or in several.
 
     Args:
         system: what to step.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero; that of before if None and the run goes on. With a tolerance, the step to try
-            first; if None, a hundredth of the time in which the start changes, and where it is at rest a millionth of the unit of
-            time.
-        steps: how many steps, one or more.
-        tolerance: in place of ``steps``: every member chooses its own steps so that the estimated error of each stays below this,
-            in each block relative to the longest that the block has been so far, so that the units of v and y do not matter; or a
-            tuple (relative, absolute): below relative·length + absolute, the absolute part in the units of the state. Each is a
-            number or an array that broadcasts over the batch; a list is refused, for it might be meant as either. A run that goes
-            on by ``carry`` has its tolerance already. Methods that can say so by ``error_order``: merson, fehlberg, fehlberg_5,
-            dop853.
-        at: with a tolerance, the times at which to keep the state, ascending, from t0 on. Steps do not depend on them: a state
-            within a step is made by one further step from its start.
-        max_steps: with a tolerance, the most steps of a member, rejected ones counted; a million if None.
-        every: keep the state every so many steps, with the first and the last; None keeps the last alone.
-        record: quantities to record of every saved state, ``run.recorded``: "energy", and what else the system names in its
-            ``quantities``; nothing if None. Bodies find their energy beside the force of the next step, at little cost.
-        t0: time of step 0. Step k is at t0 + k·dt, computed so and never accumulated.
+        dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
+            to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
+            time from rest.
+        steps: number of steps, one or more.
+        tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
+            each stays below this. The error of a block is relative to the largest length (norm) of the block so far, so that the
+            units of v and y do not matter. A tuple (relative, absolute) allows relative·length + absolute instead, the absolute
+            part in the units of the state. Each is a number or an array that broadcasts over the batch; a list is refused, since
+            it could mean either. A run that continues by ``carry`` has its tolerance already. For methods with an
+            ``error_order``: merson, fehlberg, fehlberg_5, dop853.
+        at: with a tolerance, the times at which to save the state, ascending, from t0 on. Steps do not depend on them: a state
+            within a step is computed by one extra step from its start.
+        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        every: save the state every so many steps, and at the first and the last; None saves the last alone.
+        record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
+            ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
+        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
-        start: how a method with a choice starts; see ``method(…).starts``.
-        carry: what a method carries in the place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, where the
-            run stands.
-        carried_by: the method that carried it, from ``run.resume``. Another is then refused, since it would take it for something
-            else.
+        start: how to start a method that has several ways; see ``method(…).starts``.
+        carry: what a method carries in place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, the state of
+            the run.
+        carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
+            meaning.
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
-        control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
+        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
-        fused: compute each step with fused multiply-adds, a·b + c rounded once: the second exact arithmetic. The bits are others
-            than without, and the same on every machine and with either backend. For steps of up to some 4000 operations.
-        threads: how many threads share the members, or the pairs of many bodies; None for as many as pay.
+        fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
+            same on every machine and with either backend. For steps of up to some 4000 operations.
+        threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
         progress: show a progress bar (needs rich).
 
@@ -261,7 +261,7 @@ def integrate(
 
 
 def velocities(system: System, v: Any) -> Any:
-    """What is given as v; a system without velocities needs none."""
+    """The velocities that were given; a system without velocities needs none."""
     if v is None and system.v_shape == (0,):
         return 0.0
     if v is None:

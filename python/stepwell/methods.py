@@ -1,4 +1,4 @@
-"""Methods: everything there is to ask of one, read from its record in the core."""
+"""The methods and their metadata, read from the records in the core."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ class Steps(Protocol):
         """One step."""
 
     def start(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """What the method carries in the place of v."""
+        """The carry, in place of v."""
 
     def finish(self, s: Scaled, choice: int, t: float, v: Array, y: Array, /) -> Array:
-        """The velocity from what the method carries."""
+        """The velocity from the carry."""
 
 
 class Method:
-    """A method and what is known of it: what its record in the core says."""
+    """A method with its metadata, read from its record in the core."""
 
-    #: What you type.
+    #: The name by which it is chosen.
     name: str
     #: The document's name.
     title: str
     #: Standard names of the same method.
     other_names: tuple[str, ...]
-    #: Methods that it is easily taken for.
+    #: Methods with which it is easily confused.
     false_friends: tuple[str, ...]
     #: Order of convergence.
     order: int
-    #: Rate evaluations per step.
+    #: Function evaluations per step (of both rates: rate evaluations).
     evaluations: int
-    #: What kind of method it is.
+    #: The family of methods to which it belongs.
     family: str
     #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
     limit: float
-    #: Times within a step at which rates are asked for, as fractions of the step.
+    #: Times within a step at which rates are evaluated, as fractions of the step.
     nodes: tuple[float, ...]
-    #: Whether it asks for a second-order system whose forces do not depend on the velocity.
+    #: Whether it needs a second-order system whose forces do not depend on the velocity.
     needs_acceleration: bool
-    #: What it carries between steps in the place of v, or None.
+    #: What it carries between steps in place of v, or None.
     carry: str | None
     #: Ways to start it, the default first.
     starts: tuple[str, ...]
@@ -56,9 +56,9 @@ class Method:
     error_order: int | None
     #: Section of the document.
     section: str
-    #: Where it comes from.
+    #: Publication.
     reference: str
-    #: What it does.
+    #: Description.
     about: str
 
     def __init__(self, record: dict[str, Any]) -> None:
@@ -67,7 +67,7 @@ class Method:
         self.__doc__ = self._text()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """There is one of each: a copy is the same, and what is read from a file is that of the name."""
+        """There is one object for each name: a copy or an unpickled method is that object."""
         return method, (self.name,)
 
     @property
@@ -86,7 +86,7 @@ class Method:
     def _text(self) -> str:
         limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
         lines = [
-            f"{self.title}: order {self.order}, {self.evaluations} rate evaluation(s) per step.",
+            f"{self.title}: order {self.order}, {self.evaluations} function evaluation(s) per step.",
             "",
             self.about,
             "",
@@ -123,10 +123,10 @@ def methods() -> tuple[Method, ...]:
 
 
 def choice(methods: Any) -> list[Method]:
-    """The methods that are meant by an argument ``methods``, each once; all if None.
+    """The methods named by an argument ``methods``, each once; all if None.
 
     Raises:
-        ArgumentError: if they are no list of methods, or none.
+        ArgumentError: if it is not a list of methods, or is empty.
     """
     chosen = list(_catalogue().values()) if methods is None else _checks.several("methods", methods, "names")
     if not chosen:

@@ -23,11 +23,11 @@ class Status(IntEnum):
     OK = 0
     #: It left the range of finite numbers.
     DIVERGED = 1
-    #: With a tolerance: it was out of ``max_steps``.
+    #: With a tolerance: it used up ``max_steps``.
     BUDGET = 2
-    #: With a tolerance: the step that its error asks for no longer moves the time.
+    #: With a tolerance: the step that the tolerance requires is too short to change the time.
     UNDERFLOW = 3
-    #: With a tolerance: nothing finite came of any step, however small.
+    #: With a tolerance: no step, however short, gave a finite state.
     NOT_FINITE = 4
 
 
@@ -49,14 +49,14 @@ class Collision(NamedTuple):
 
 @by_value
 class Paces(NamedTuple):
-    """What a run with a tolerance did, per member, shape (*batch).
+    """The adaptive steps of a run with a tolerance, per member, shape (*batch).
 
     Attributes:
-        t: where the member stands: the start of the step in which the last asked time is, or where it stopped.
-        h: the step that would be tried next.
-        accepted: steps that the state went on with, since the first piece of the run.
-        rejected: steps whose error was above the tolerance, likewise.
-        evaluations: function (rate) evaluations of both, and of the steps that were made for the asked times, likewise.
+        t: the start of the step that contains the last output time, or the time at which the member stopped.
+        h: the length of the next step to try.
+        accepted: number of accepted steps, since the first piece of the run.
+        rejected: number of steps whose error was above the tolerance, likewise.
+        evaluations: function (rate) evaluations of both, and of the extra steps for the output times, likewise.
     """
 
     t: Array
@@ -68,14 +68,14 @@ class Paces(NamedTuple):
 
 @by_value
 class AdaptiveState(NamedTuple):
-    """Where the members of a run with a tolerance stand, for ``integrate`` to go on from; its ``carry``.
+    """The state from which ``integrate`` continues a run with a tolerance; its ``carry``.
 
     Attributes:
-        v: velocities at the time of each, shape (*block, *batch).
+        v: velocities of each member at its own time, shape (*block, *batch).
         y: coordinates, likewise.
-        pace: all that the choice of the next step depends on, shape (numbers, *batch).
-        last: the last time that was asked for.
-        method: name of the method, whose pace it is.
+        pace: the state of the step-size controller, shape (numbers, *batch).
+        last: the last output time.
+        method: name of the method to which the pace belongs.
     """
 
     v: Array
@@ -86,27 +86,28 @@ class AdaptiveState(NamedTuple):
 
 
 class Run(Value):
-    """A run, with the states that were asked for saved along the first axis.
+    """A run, with its saved states along the first axis.
 
     Attributes:
         t: times of the saved states, shape (saved,).
         v: velocities, shape (saved, *block, *batch).
         y: coordinates, likewise.
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
-        first_bad_step: per member, the number of the first step that was not finite, or that a tolerance did not allow, or −1.
-        carry: what the method carries in the place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
-        system: what was stepped.
-        method: how.
+        first_bad_step: per member, the number of the first step after which the state was not finite, or at which a run with a
+            tolerance stopped; −1 if there is none, shape (*batch).
+        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
+        system: the system that was stepped, with its control.
+        method: the method.
         dt: the step.
         t0: time of step 0.
         start_step: number of the first step.
-        steps: how many steps were made.
+        steps: number of steps.
         start: how the method was started, or None.
-        recorded: what was asked for by ``record=``, by name, shapes (saved, *shape of it, *batch).
-        paces: what a run with a tolerance did, or None; ``dt`` and ``steps`` mean nothing then.
+        recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
+        paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
-        work: the energy that a control or a projection gave to each member in this run, or None, shape (*batch). Of a control it
-            is the sum over the steps of ((1 − g)² − 1)·K, what its push −g·v alone would change, averaged over the evaluations.
+        work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
+            it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
     """
 
     def __init__(
@@ -145,21 +146,21 @@ class Run(Value):
         self.start_step = start_step
         self.steps = steps
         self.start = start
-        #: Who was nearest to whom when the member of that index diverged at that step; see ``collisions``.
+        #: Finds the two nearest bodies when the member of that index diverged at that step; see ``collisions``.
         self.collision = collision
         self.recorded = recorded or {}
         self.work = work
         self.paces = paces
-        #: Where the members of a run with a tolerance stand, at ``paces.t``; None of other runs.
+        #: The state of a run with a tolerance at ``paces.t``; None for other runs.
         self.stand = stand
         self.fused = fused
 
     def _held(self) -> dict[str, Any]:
-        """Everything but how to find out who collided, which follows from it."""
+        """All attributes but the function that finds collisions, which follows from the others."""
         return {name: each for name, each in vars(self).items() if name != "collision"}
 
     def quantity(self, name: str) -> Array:
-        """A quantity that could have been recorded, of every saved state, shape (saved, *shape of it, *batch).
+        """A quantity that can be recorded, computed now for every saved state, shape (saved, *shape of it, *batch).
 
         Raises:
             UnknownNameError: if the system has none of that name.
@@ -190,10 +191,13 @@ class Run(Value):
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
-        """For bodies that attract each other: who was nearest to whom when a member diverged, one for each such member.
+        """For bodies that attract each other: the two nearest bodies when a member diverged, one pair for each such member.
 
-        Found by running these members again up to that step, which takes as long as they took. Members that had diverged before
-        this run are left out.
+        They are found by repeating the run of these members up to that step, which takes as long as it took before. Members that
+        had diverged before this run are left out.
+
+        Raises:
+            UnsupportedError: if the system has no bodies.
         """
         if self.collision is None:
             raise UnsupportedError(f"collisions: {self.system!r} has no bodies that collide")
@@ -202,11 +206,11 @@ class Run(Value):
 
     @property
     def resume(self) -> dict[str, Any]:
-        """Arguments with which ``integrate`` goes on from here as if it had never stopped, to the bit.
+        """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
 
-        System, method and form are yours to give again; what Verlet or leapfrog carries is for the same method only. So are, of a
-        run with a tolerance, ``max_steps``, and ``at``, which goes on behind the last time. ``dt`` is that of this run; another
-        is refused, since step k is at t0 + k·dt. Members that diverged go on as they are and are not named again.
+        Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
+        last one. A carry of Verlet or leapfrog is for the same method only. ``dt`` is that of this run; another
+        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
         """
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:

@@ -22,33 +22,33 @@ class World:
     """A loop over the user's own arrays: everything is checked and prepared once, then ``step`` works in place.
 
     Args:
-        system: what to step. Its numbers are taken now: an array of parameters that is changed later changes nothing here.
+        system: the system to step. Its parameters are copied: changing an array of parameters later has no effect.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block, a writeable C-contiguous float64 array of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
         dt: the step, in units of time, above zero.
         t0: time of step 0.
         start_step: number of the first step.
-        start: how a method with a choice starts.
-        control: what keeps the energy: an ``EnergyControl`` or a ``Projection``.
-        carry: what the method carries in the place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
+        start: how to start a method that has several ways; see ``method(…).starts``.
+        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
+        carry: what the method carries in place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
             the same step.
-        carried_by: the method that carried it, and
-        dt_before: the step so far, from the ``resume`` of a run or a world: others are then refused.
+        carried_by: the method of that carry, from the ``resume`` of a run or a world. Any other method is then refused.
+        dt_before: the step so far, likewise. Another ``dt`` is then refused.
         fused: compute each step with fused multiply-adds; see ``integrate``.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
 
-    ``step(n)`` steps in place and allocates nothing: it is meant for the few microseconds of a frame, and keeps the GIL for
-    them. A method that carries something else than v (Verlet, leapfrog) keeps it inside; if you change ``v`` or ``y`` between
-    steps, it starts anew from what you wrote. Ctrl-C leaves the world at the last step that was made whole, or the
-    one before (leapfrog of many bodies, whose velocity there would take long to find).
-    Nothing looks for divergence here: ``numpy.isfinite`` on your arrays does.
+    ``step(n)`` makes n steps in place and allocates nothing: it is meant for the few microseconds of a frame, and holds the GIL
+    for them. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between
+    steps, the method starts again from the new values. Ctrl-C leaves the world at the last complete step, or at the
+    one before (leapfrog of many bodies, whose velocity there would take long to compute).
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays.
 
-    System, method and step are fixed; ``World(…, **world.resume)`` makes another world that goes on from where this one stands.
-    ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make the same one once more, with arrays of its own.
+    System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
+    ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
 
     Example:
         >>> v, y = np.zeros(3), np.ones(3)
@@ -127,12 +127,12 @@ class World:
 
     @property
     def system(self) -> System:
-        """What is stepped, with what controls it; its numbers are those of when the world was made, and are read-only."""
+        """The system with its control; its parameters are read-only copies, made with the world."""
         return self._system
 
     @property
     def method(self) -> Method:
-        """How."""
+        """The method."""
         return self._method
 
     @property
@@ -142,9 +142,9 @@ class World:
 
     @property
     def resume(self) -> dict[str, Any]:
-        """Arguments with which another ``World``, or ``integrate``, goes on from here to the bit; the arrays are copies.
+        """Arguments with which another ``World``, or ``integrate``, continues from here to the bit; the arrays are copies.
 
-        System, method and dt are yours to give again. With another method leave ``carry`` and ``start`` out; with another dt give
+        Give system, method and dt again. With another method leave ``carry`` and ``start`` out. With another dt give
         ``t0=world.t`` and ``start_step=0``, since time is t0 + k·dt, and leave ``carry`` out.
         """
         state: dict[str, Any] = {"v": self._v.copy(), "y": self._y.copy(), "t0": self._t0, "start_step": self.step_number}
@@ -192,7 +192,7 @@ def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> 
 
 
 def _frozen(what: Any) -> Any:
-    """The same, with all its arrays read-only: what is written there would be seen by nobody."""
+    """The same object with all its arrays read-only: writing to them would have no effect."""
     if isinstance(what, np.ndarray):
         what.flags.writeable = False
     elif isinstance(what, (list, tuple)):

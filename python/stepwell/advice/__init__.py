@@ -1,8 +1,8 @@
-"""Advice: which method and which step are the cheapest that are good enough for a scene, and how far they are from blowing up.
+"""Advice: the cheapest method and step that are accurate enough for a scene, and how far they are from instability.
 
-``motion`` knows the true motion, ``trials`` and ``adaptive`` run the scene with fixed steps and with adaptive steps,
-``candidates`` makes both alike for ``search``, which finds the fewest steps that are good enough; ``predict`` asks the
-eigenvalues, ``result`` tells it.
+``motion`` holds the reference solution, ``trials`` and ``adaptive`` run the scene with fixed and with adaptive steps,
+``candidates`` gives both the same interface for ``search``, which finds the fewest steps that are accurate enough; ``predict``
+uses eigenvalues, ``result`` presents what was found.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
 
 COSTS = ("time", "evaluations")
 
-#: More seconds than this are no budget: the age of the universe is half of it.
+#: A larger budget in seconds is refused: the age of the universe is half of it.
 MOST_SECONDS = 1e18
 
-#: A frame may be this many horizons long, for its end is reached.
+#: The longest frame, in horizons: a run must reach its end.
 LONGEST_FRAME = 100.0
 
-#: Of a state of more numbers no run is long enough that could be tried.
+#: The most numbers of a state: with more, no useful run would be short enough to be tried.
 MAX_NUMBERS = 100_000
 
 #: A scene by its name, made once: some take long to compute their true motion.
@@ -54,23 +54,23 @@ def advise(
     cost: str = "time",
     fixed: bool = False,
 ) -> Advice:
-    """The cheapest method and step that are good enough for a scene.
+    """Find the cheapest method and step that are accurate enough for a scene.
 
-    For each method the fewest steps are sought with which the state error stays below the tolerance over the scene's horizon,
-    from coarse to fine; and for each that can estimate its error, the largest tolerance with which it may choose its steps
-    itself. What is advised has been run, and its error is that of the run. A scene without an exact solution is judged as far
-    as its true motion can be known.
+    For each method the search finds the fewest steps with which the state error stays below the tolerance over the scene's
+    horizon, from coarse to fine. For each method that estimates its error, it also finds the largest tolerance for adaptive
+    steps. Every advised step was run, and its error is that of the run. A scene without an exact solution is judged as long
+    as a reference solution can be trusted.
 
     Args:
         scene: a ``Scene``, or the name of one.
-        frame: the frame, in the scene's units of time, into which a whole number of steps must fit; None if any step will do.
-        tolerance: the largest ``Scene.state_error`` that is allowed, above zero; at 1 a state is as wrong as it is large.
-        budget: seconds of computing that may be used in a frame; if None, the frame itself, with the second as the unit of time.
-            Without a frame, seconds in a unit of time, or no bound. Where frames take different times, the longest must keep it.
+        frame: the frame, in the scene's units of time, into which a whole number of steps must fit; None if the step is free.
+        tolerance: the largest allowed ``Scene.state_error``, above zero; at 1 the error is as large as the solution.
+        budget: computing time in seconds that a frame may use; if None, the frame itself, with the second as the unit of time.
+            Without a frame, seconds per unit of time, or no bound. If the cost of frames differs, the most expensive must fit.
         methods: names, or what ``stepwell.method`` returns; all if None.
-        cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which repeat. Where frames cost
-            differently, their mean counts.
-        fixed: leave out adaptive steps, which a ``World`` cannot make.
+        cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which are repeatable. If the
+            cost of frames differs, their mean counts.
+        fixed: leave out adaptive steps, which a ``World`` cannot take.
 
     Returns:
         An ``Advice``; print it.
@@ -145,7 +145,7 @@ def advise(
 
 
 def _refusal(scene: Scene, candidate: Candidate) -> str | None:
-    """Why the method cannot do the scene with its control, or None: a step tells."""
+    """Why the method cannot step the scene with its control, or None; found by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps do not go with a control"
     dt = TIMED_STEP * scene.dt

@@ -1,6 +1,6 @@
 """Trial runs of a scene with adaptive steps: how wrong a method is with a tolerance, and how many steps it tries.
 
-Steps do not depend on when the state is asked for, so its error can be measured at any time of it, and the run stays the same.
+Steps do not depend on the output times, so the error can be measured at any times without changing the run.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class AdaptiveTrials:
 
     Args:
         motion: what runs are compared with.
-        allowed: the state error that is allowed; of a run with a larger one no more is asked than that it is larger.
-        most: rate evaluations that a run may make.
+        allowed: the largest allowed state error; of a larger one only the fact that it is larger matters.
+        most: the most function evaluations of a run.
     """
 
     def __init__(self, motion: Motion, allowed: float, most: float) -> None:
@@ -56,7 +56,7 @@ class AdaptiveTrials:
         self._trials: dict[tuple[str, float], Trial] = {}
         self._confirmed: dict[tuple[str, float], Trial] = {}
         self._worst: dict[tuple[str, float], int] = {}
-        #: Runs, and rate evaluations of all.
+        #: Number of runs, and their function evaluations in total.
         self.made, self.work = 0, 0.0
 
     def look(self, method: Method, tolerance: float) -> Trial:
@@ -91,7 +91,7 @@ class AdaptiveTrials:
         return self.scene.state_error(run), run
 
     def _run(self, method: Method, tolerance: float) -> Trial:
-        """The run that is judged, as wrong as it is where it is asked for its state."""
+        """The run that is judged, with its error at the output times."""
         key = (method.name, tolerance)
         if key not in self._runs:
             errors, run = self._errors(method, tolerance, self.asked)

@@ -30,9 +30,9 @@ class Candidate(Protocol):
     """A method, and how its steps are chosen.
 
     Attributes:
-        method: which.
+        method: the method.
         by: ``"step"`` or ``"tolerance"``.
-        name: the method's, and that it goes by tolerance: ``"merson, tolerance"``.
+        name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``.
         first: the least k.
         share: of the error that is allowed, what the run may have.
         seen: the runs that were made, by k.
@@ -49,7 +49,7 @@ class Candidate(Protocol):
         """The run with that k."""
 
     def confirm(self, k: int) -> Trial:
-        """The same, looked at closely."""
+        """The same, measured more closely."""
 
     def possible(self, k: int) -> bool:
         """Whether there is such a run."""
@@ -101,7 +101,7 @@ class Adaptive:
         self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))
 
     def tolerance(self, k: int) -> float:
-        """The tolerance of that k, in two digits, so that what is told is what was run."""
+        """The tolerance of that k, in two digits, so that the tolerance shown is the one that was run."""
         return float(f"{(UNIT_TOLERANCE_K / k) ** self.power:.1e}")
 
     def look(self, k: int) -> Trial:

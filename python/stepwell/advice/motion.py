@@ -75,7 +75,7 @@ class Grid(NamedTuple):
 
     @property
     def asked(self) -> Array:
-        """Times at which a run with a tolerance is asked for its state: the frames, or a few even ones."""
+        """Output times of a run with a tolerance: the ends of frames, or a few equidistant times."""
         if self.framed:
             return self.span * np.arange(1.0, self.spans + 1)
         return np.linspace(0.0, self.span, SAVED_TIMES + 1)[1:]
@@ -92,7 +92,7 @@ class Motion(NamedTuple):
     """What runs are compared with.
 
     Attributes:
-        scene: with an ``exact`` that is quick, known over the horizon and to the end of the last span.
+        scene: with an ``exact`` that is fast, known over the horizon and to the end of the last span.
         grid: the steps that can be chosen.
         marks: times within the horizon at which errors are looked for, ascending from 0.
         cut: whether the scene's horizon is longer, and its true motion not known so far.

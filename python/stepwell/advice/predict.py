@@ -1,4 +1,4 @@
-"""What the eigenvalues of a step tell without a run: the error over the horizon, and the step at which a method blows up."""
+"""Predictions from the eigenvalues of a step, without a run: the error over the horizon, and the stability limit."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .trials import Trials
 #: Times at which a prediction is compared with the exact modes.
 SAMPLES = 10_000
 
-#: Modes that are nearer to each other than this lets one tell give no prediction.
+#: Modes that are too close to each other to be distinguished by this give no prediction.
 MAX_CONDITION = 1e8
 
 #: States of the true motion at which a system that is not linear is taken for one; not one with more numbers than this, for
 #: eigenvalues take long.
 LINEARIZED_STATES, MAX_NUMBERS = 400, 128
 
-#: The search for the observed limit goes by a ladder of this many rungs in a factor of two: 2.2 % apart.
+#: The observed limit is searched on a geometric grid of this many steps in a factor of two: 2.2 % apart.
 RUNGS_PER_OCTAVE = 32
 
 
@@ -138,7 +138,7 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
 
     Args:
         trials: runs of the scene.
-        method: which.
+        method: the method.
         stable: a number of steps over the horizon with which the method is stable.
     """
     horizon = trials.scene.horizon

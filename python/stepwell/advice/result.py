@@ -1,4 +1,4 @@
-"""What advice holds, and how it is told."""
+"""The result of ``advise``, as data and as text."""
 
 from __future__ import annotations
 
@@ -30,36 +30,36 @@ COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "n
 
 @dataclass(frozen=True)
 class Row:
-    """A method with the largest step, or tolerance, found that is good enough; its run was made.
+    """A method with the largest step, or tolerance, that was found to be accurate enough in a run.
 
     Attributes:
-        method: which.
-        substeps: steps in a frame; None if any step will do, or steps are chosen to a tolerance.
-        steps: steps over the horizon; with a tolerance all that were tried.
-        dt: the step, in units of time; with a tolerance the mean of all that were tried.
-        error: the largest state error of the run, confirmed.
-        predicted: what was expected of it without the run, or None where prediction makes no sense.
+        method: the method.
+        substeps: steps in a frame; None without a frame and for adaptive steps.
+        steps: steps over the horizon; for adaptive steps all attempts.
+        dt: the step, in units of time; for adaptive steps the mean of all attempts.
+        error: the largest state error of the run.
+        predicted: the error predicted without that run, or None where no prediction is possible.
         predicted_by: ``"modes"``, the eigenvalues and modes of the step; ``"order"``, a run with longer steps and the order.
         frequency_error: Ψ/Φ − 1 of the mode that drifts most, or None.
         damping_error: damping that the method adds to that mode, in 1 per unit of time; below zero it grows. Or None.
-        evaluations_per_frame: function (rate) evaluations in a frame, in the mean; None without a frame.
-        evaluations_per_time: function (rate) evaluations in a unit of time.
+        evaluations_per_frame: mean number of function (rate) evaluations in a frame; None without a frame.
+        evaluations_per_time: function (rate) evaluations per unit of time.
         ns_per_step: measured nanoseconds per step of one member of a batch, on one thread. Not repeatable.
-        seconds_per_frame: measured, in a frame, in the mean; None without a frame.
-        seconds_per_time: measured, in a unit of time.
-        objects: how many such objects the budget suffices for, in the frame that takes longest; None without a budget.
-        limit: the step beyond which something grows, by the eigenvalues: 0 for never stable, infinite for none, None if they
-            do not say, and with a tolerance.
-        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation along the true motion, as if that stood still;
-            ``"none"``, with a tolerance.
-        mode: what grows beyond the limit, in words, or None.
+        seconds_per_frame: measured mean computing time of a frame; None without a frame.
+        seconds_per_time: measured computing time per unit of time.
+        objects: the number of such objects that fit into the budget, in the most expensive frame; None without a budget.
+        limit: the step beyond which a mode grows, by the eigenvalues: 0 for never stable, infinite for no limit, None if they
+            do not decide, and for adaptive steps.
+        limit_by: ``"linear"``, exact; ``"frozen"``, the fastest oscillation of the system linearised along the true motion;
+            ``"none"``, for adaptive steps.
+        mode: the kind of growth beyond the limit, in words, or None.
         mode_frequency: its frequency in the exact solution, in rad per unit of time, or None.
         observed_limit: the largest step whose run over the horizon does not grow; infinite if none that was tried does.
-        robust: from this many steps (in a frame, or over the horizon) on, or from this tolerance down, all that were tried are
-            good enough too; None if errors are above the tolerance up to twice as many.
-        tolerance: to which the steps are chosen, as ``integrate`` takes it; None for fixed steps.
-        rejected_steps: of the steps, those that were rejected.
-        worst_evaluations: rate evaluations in the frame that has the most; None without a frame.
+        robust: from this many steps (in a frame, or over the horizon) on, or from this tolerance down, all runs that were tried
+            are accurate enough; None if errors are above the tolerance up to twice as many steps.
+        tolerance: the tolerance of adaptive steps, as ``integrate`` takes it; None for fixed steps.
+        rejected_steps: the number of rejected steps among the steps.
+        worst_evaluations: function (rate) evaluations in the most expensive frame; None without a frame.
     """
 
     method: Method
@@ -89,19 +89,19 @@ class Row:
 
     @property
     def by(self) -> str:
-        """``"step"`` or ``"tolerance"``, what the steps are chosen by."""
+        """``"step"`` for fixed steps, ``"tolerance"`` for adaptive ones."""
         return "step" if self.tolerance is None else "tolerance"
 
     @property
     def name(self) -> str:
-        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
+        """The method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``."""
         return named(self.method.name, self.by)
 
     @property
     def margin(self) -> float:
-        """How many times as long a step may be before the method blows up: by the exact limit, or else by the observed one.
+        """The exact stability limit, or else the observed one, divided by the step: how many times as long a step may be.
 
-        Infinite with a tolerance, which never takes such a step.
+        Infinite for adaptive steps, which are shortened instead.
         """
         exact = self.limit_by == "linear" and self.limit
         return (self.limit if exact and self.limit else self.observed_limit) / self.dt
@@ -139,7 +139,7 @@ class Rejected:
 
     @property
     def name(self) -> str:
-        """The method's name, and that it goes by tolerance: ``"merson, tolerance"``."""
+        """The method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``."""
         return named(self.method, self.by)
 
 
@@ -225,7 +225,7 @@ class Advice:
 
     @property
     def asked(self) -> Array:
-        """Times at which the runs with a tolerance gave their state: the frames, or ten even ones, in units of time."""
+        """Output times of the runs with a tolerance: the ends of frames, or ten equidistant times, in units of time."""
         return grid_of(self.scene.horizon, self.frame).asked
 
     def run(self, row: Row | None = None) -> Run:
@@ -235,8 +235,8 @@ class Advice:
             row: of ``ranked``; the best if None.
 
         Returns:
-            A ``Run`` that keeps every step, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` tells how
-            wrong it is.
+            A ``Run`` that saves every step, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` gives its
+            errors.
 
         Raises:
             ArgumentError: if there is no row.
@@ -267,7 +267,7 @@ class Advice:
         ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
         worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
-        lines.append(f"Cost {per}: {evaluations:.4g} rate evaluations{worst}; {ns:.3g} ns measured in a batch on one thread.")
+        lines.append(f"Cost {per}: {evaluations:.4g} function evaluations{worst}; {ns:.3g} ns measured in a batch on one thread.")
         if best.objects is not None:
             lines.append(
                 f"The budget of {self.budget:.3g} s {per} suffices for {best.objects} such objects{', also then' * bool(worst)}."
@@ -280,7 +280,7 @@ class Advice:
     def _cut(self) -> list[str]:
         if not self.cut:
             return []
-        return [f"It is judged up to t = {self.scene.horizon:.4g} only: beyond, the true motion is not known well enough."]
+        return [f"Errors are judged up to t = {self.scene.horizon:.4g} only: beyond, the true motion is not known well enough."]
 
     def _uneven(self, row: Row) -> str:
         unit = "steps a frame" if self.frame is not None else "steps"
@@ -376,7 +376,7 @@ class Advice:
 
 
 def named(method: str, by: str) -> str:
-    """The method's name, and that it goes by tolerance."""
+    """The method's name, followed by "tolerance" for adaptive steps."""
     return method if by == "step" else f"{method}, tolerance"
 
 

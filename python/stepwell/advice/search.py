@@ -64,7 +64,7 @@ class Found(NamedTuple):
         trial: the confirming run.
         robust: from here on every k that was tried, up to twice as large, is good enough too; k itself as a rule, and None if
             there is no such k.
-        expected: error that the order tells from a run with longer steps, or None.
+        expected: error that is extrapolated by the order from a run with longer steps, or None.
     """
 
     k: int
@@ -98,8 +98,8 @@ class Search:
         tolerance: the error that is allowed.
         spans: the cost is that of one of so many parts of a run.
         prices: what a step costs, by the candidate's name.
-        longest: rate evaluations that a run may make.
-        spent: tells how many all runs have made so far.
+        longest: the most function evaluations of a run.
+        spent: returns how many all runs have made so far.
     """
 
     def __init__(
@@ -326,7 +326,7 @@ class Search:
         return next((rung for rung in above if rung > bad[-1]), None)
 
     def expected(self, candidate: Candidate, k: int) -> float | None:
-        """The error that the order tells from the finest doubling below k whose error falls."""
+        """The error extrapolated by the order from the finest doubling below k whose error falls."""
         rung = candidate.first
         while 2 * rung < k:
             rung *= 2

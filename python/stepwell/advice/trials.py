@@ -126,7 +126,7 @@ class Trials:
         return self._dense[key]
 
     def unstable(self, method: Method, dt: float, steps: int) -> bool:
-        """Whether the run grew and is wrong altogether. The true motion is asked for only if it grew."""
+        """Whether the run grew and has no correct digit. The true motion is computed only if it grew."""
         key = (method.name, steps, dt)
         if key in self._done and not self._done[key].stopped:
             return self._done[key].unstable

@@ -28,10 +28,10 @@ from .style import Drawn
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Methods, unless told otherwise: one that pumps energy in, one that keeps it, and two more accurate ones.
+#: Default methods: one that adds energy, one that keeps it, and two more accurate ones.
 METHODS = ("standard_euler", "false_euler", "standard_heun", "rk4")
 
-#: Gains h·C·K at the start, unless told otherwise: six decades.
+#: Default gains h·C·K at the start: six decades.
 RELATIVE = tuple(float(gain) for gain in 10.0 ** np.linspace(-4.0, 2.0, 25))
 
 #: Ways of projection, the limit of a control with an infinite gain.
@@ -40,7 +40,7 @@ WAYS: tuple[str, ...] = controls.WAYS
 #: States of a run, evenly spaced, that are saved to measure energy and coordinates.
 SAVED_STATES = 1000
 
-#: In how many places an exact solution is asked for its scale.
+#: Number of times at which the exact solution is evaluated for its scale.
 SCALE_SAMPLES = 1001
 
 Whole = np.ndarray[Any, np.dtype[np.int64]]
@@ -49,10 +49,10 @@ Exact = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Held(Value):
-    """One method under one kind of control, over the gains. What diverged has infinite errors.
+    """One method under one kind of control, over the gains. Runs that diverged have infinite errors.
 
     Attributes:
-        method: which.
+        method: the method.
         kind: ``"none"``, a form of ``EnergyControl`` or a way of ``Projection``.
         dt: the step, in units of time.
         steps: how many steps were made.
@@ -75,7 +75,7 @@ class Held(Value):
 
     @property
     def diverged(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Where it left the finite numbers."""
+        """The gains at which a run diverged."""
         return self.first_bad_step >= 0
 
 
@@ -84,12 +84,12 @@ class ControlSweep(Drawn, Value):
     """Errors of energy and state against the gain of a control.
 
     Attributes:
-        title: of what.
-        system: what was stepped.
-        horizon: over what time.
-        evaluations: rate evaluations of each run.
-        lines: one for each method and kind that go together.
-        refused: why others do not, by method and kind.
+        title: title of the picture.
+        system: the system.
+        horizon: the time of each run.
+        evaluations: function (rate) evaluations of each run.
+        lines: one for each method and kind that can be combined.
+        refused: why others cannot, by method and kind.
         exact: whether the exact state at the end is known.
     """
 
@@ -181,8 +181,8 @@ def control(
 ) -> ControlSweep:
     """Run bodies by several methods without control, under control with many gains, and projected; measure energy and state.
 
-    All methods ask for the same number of rates, so one with k rates a step makes a k-th of the steps, each k times as long.
-    All gains of a method and a form are one batch.
+    All methods make the same number of function evaluations, so a method with k evaluations a step makes a k-th of the steps,
+    each k times as long. All gains of a method and a form are one batch.
 
     Args:
         scene: a scene of bodies or its name, or an ``NBody`` system for which ``v``, ``y``, ``horizon`` and ``evaluations``
@@ -190,18 +190,18 @@ def control(
         methods: names, or what ``stepwell.method`` returns.
         v: velocities at the start, shape (bodies, dim); those of the scene if None.
         y: coordinates at the start, likewise.
-        horizon: how long to run, in units of time; the scene's if None.
-        evaluations: how many times each run asks for rates; if None, once in each of the scene's steps.
+        horizon: the time of each run, in units of time; the scene's if None.
+        evaluations: function (rate) evaluations of each run; if None, one for each of the scene's steps.
         exact: the exact solution as a function of times of shape (n,), which returns blocks v and y of shape (n, bodies, dim),
             or the two blocks at the end; the scene's if None.
         relative: gains h·C·K at the start, shape (gains,), without a unit.
         forms: forms of ``EnergyControl``.
         ways: ways of ``Projection``.
-        title: what the picture says above; if None, the scene's title or the system.
-        progress: is called with the share that is done.
+        title: title of the picture; if None, the scene's title or the system.
+        progress: is called with the fraction that is done.
 
     Returns:
-        A ``ControlSweep``. What cannot be controlled is in its ``refused``, with the reason.
+        A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.
 
     Raises:
         ArgumentError: what was given and what was expected.

@@ -44,12 +44,12 @@ def draw(chart: ControlSweep) -> Figure:
         _panel(right, chart, "state_error" if chart.exact else "largest")
         right.set_ylabel("error of the last state, relative" if chart.exact else "largest coordinate")
         figure.text(0.012, 0.945, f"{chart.title}: energy and state under control", size=20, weight="bold")
-        what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {chart.evaluations} rate evaluations each"
+        what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {chart.evaluations} function evaluations per run"
         figure.text(0.012, 0.905, textwrap.shorten(what, 150), size=13.5, color=GREY)
         _legend(figure, chart, methods)
         note = (
-            "Left edge: without control. Right edge: projected after every step. Above the frame: gains at which a run left the "
-            "finite numbers. K: kinetic energy."
+            "Left edge: without control. Right edge: projected after every step. Above the frame: gains at which a run diverged. "
+            "K: kinetic energy."
         )
         figure.text(0.012, 0.022, note, size=12, color=GREY)
     return figure

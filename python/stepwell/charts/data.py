@@ -1,4 +1,4 @@
-"""What a chart holds, and how it is written down."""
+"""The data of a chart, and how they are written to files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Timing(Value):
 
     @classmethod
     def unknown(cls) -> Timing:
-        """What was not measured."""
+        """A time that was not measured."""
         return cls(math.nan, math.nan, math.nan)
 
 
@@ -56,18 +56,18 @@ class Point(Value):
     """One method with one step, or one tolerance.
 
     Attributes:
-        steps: how many steps were made over the horizon; with a tolerance all that were tried. None if a peer does not tell.
-        dt: the step, in units of time; with a tolerance the mean of all that were tried.
-        cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not tell.
-        state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the times that are asked for.
+        steps: number of steps over the horizon; for adaptive steps all attempts. None if a peer does not report it.
+        dt: the step, in units of time; for adaptive steps the mean of all attempts.
+        cost: function (rate) evaluations per unit of simulated time; NaN if a peer does not report them.
+        state_error: the largest of ``Scene.state_error`` over the run; with a tolerance at the output times.
         energy_error: the largest of ``Scene.energy_error`` over the run, likewise; NaN if the system has no energy.
         unstable: the state left the finite numbers, or is wrong altogether (an error above 1) and grew: its largest
             amplitude in the second half of the run is more than a tenth above that in the first half, and above the
             exact one. With a tolerance: the run stopped early.
         end_error: the state error at the end of the run.
-        phase_error: how far the end is ahead of the exact motion, in periods, behind is negative; None of a scene without a
-            period, and of a state without a digit right.
-        tolerance: with which the steps were chosen, or None.
+        phase_error: by how many periods the end is ahead of the exact motion (negative: behind); None for a scene without a
+            period, and for a state without a correct digit.
+        tolerance: the tolerance of adaptive steps, or None.
     """
 
     steps: int | None
@@ -87,23 +87,23 @@ class Point(Value):
 
     @property
     def usable(self) -> bool:
-        """Whether it is stable and at least the size of the solution is right: an error of 1 or less."""
+        """Whether it is stable and its error is at most 1."""
         return not self.unstable and self.state_error <= 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Curve(Value):
-    """One method on the whole ladder of steps, or of tolerances; or a peer.
+    """One method with all steps, or all tolerances; or a peer.
 
     Attributes:
-        method: which.
+        method: the method.
         points: from the largest step, or tolerance, to the smallest.
-        largest_stable_step: below it the method is stable over the horizon, to 0.1 %; infinite if no step of the ladder
-            is unstable, 0 if all are. With a tolerance infinite.
-        step_time: measured, of a step of one member of a batch.
-        single_time: measured, of a step of a single run.
-        by: ``"step"`` or ``"tolerance"``, what goes down the ladder.
-        times: of a peer, measured per unit of simulated time at each point, in a single run.
+        largest_stable_step: below it the method is stable over the horizon, to 0.1 %; infinite if none of the steps
+            is unstable, 0 if all are, and infinite with tolerances.
+        step_time: measured time of a step of one member of a batch.
+        single_time: measured time of a step of a single run.
+        by: ``"step"`` or ``"tolerance"``, by which the points differ.
+        times: for a peer, the measured time per unit of simulated time at each point, in a single run.
         fused: whether it was computed with fused multiply-adds.
     """
 
@@ -118,7 +118,7 @@ class Curve(Value):
 
     @property
     def name(self) -> str:
-        """The method's name, and that it goes by tolerance or is fused: ``"merson, tolerance"``, ``"rk4, fused"``."""
+        """The method's name, followed by "tolerance" or "fused" where that is so: ``"merson, tolerance"``, ``"rk4, fused"``."""
         return f"{self.method.name}{self._kind}"
 
     @property
@@ -160,14 +160,14 @@ class WorkPrecision(Drawn, Value):
     """Error against cost of several methods on one scene.
 
     Attributes:
-        scene: which; if it has no exact solution of its own, with that of a tight run, up to where that is known.
-        curves: one for each method that can do the scene, then one for each that can go by tolerance, then the peers'.
+        scene: the scene; if it has no exact solution, with that of a tight run, up to the time where that is known.
+        curves: one for each method that can step the scene, then one for each with adaptive steps, then those of the peers.
         refused: why the others cannot, by name.
         members: members of the batch whose time was measured, on one thread.
         repeats: how often each method was timed.
         isa: the CPU level at which it was measured.
-        floor: errors below this mean nothing, for the true motion is not known better.
-        cut: whether the scene's horizon is longer, and its true motion not known so far.
+        floor: the accuracy of the reference solution; errors below this are not meaningful.
+        cut: whether the scene's horizon is longer than the time for which its true motion is known.
     """
 
     scene: Scene
@@ -190,7 +190,7 @@ class WorkPrecision(Drawn, Value):
 
         Args:
             path: where to.
-            error: which one is shown: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
+            error: the error to show: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
             time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
 
         Raises:

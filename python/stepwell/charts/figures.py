@@ -34,7 +34,7 @@ class Samples(Value):
     """The samples of one method from v₀ = 0 and y₀ = 1; arrays are of shape (steps + 1,).
 
     Attributes:
-        method: which.
+        method: the method.
         t: times in units of 1/ω₀: k·Φ.
         v: velocities, divided by ω₀.
         y: coordinates.

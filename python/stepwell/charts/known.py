@@ -1,13 +1,14 @@
-"""The true motion of a scene as charts ask for it: thousands of times over, and only as far as it is known."""
+"""The exact solution of a scene for charts, which evaluate it thousands of times, up to the time until which it is known."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .._checks import Array
+from .._value import Value
 from ..errors import ArgumentError
 from ..scenes import Scene
 from ..scenes.truth import MAX_DIFFERENCE, with_truth
@@ -49,22 +50,35 @@ def dense(exact: Exact, until: float) -> Exact:
     wanted = exact(between)
     nodes = FIRST_NODES
     while True:
-        found = _interpolant(exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
+        found = Interpolant(*exact(np.linspace(0.0, until, nodes + 1)), until / nodes)
         apart = max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found(between), wanted, strict=True) if b.size)
         if apart <= MAX_INTERPOLATION_ERROR or nodes >= MAX_NODES:
             return found
         nodes *= 2
 
 
-def _interpolant(blocks: tuple[Array, Array], spacing: float) -> Exact:
-    last = len(blocks[0]) - 1
+@dataclass(frozen=True, eq=False)
+class Interpolant(Value):
+    """Polynomials through equidistant states; a class, since a local function cannot be pickled with its chart.
 
-    def states(t: Array) -> tuple[Array, Array]:
-        place = np.asarray(t, dtype=np.float64) / spacing
+    Attributes:
+        v: velocities at the nodes, shape (nodes, *block).
+        y: coordinates there, likewise.
+        spacing: the time from one node to the next; the first is at 0.
+    """
+
+    v: Array
+    y: Array
+    spacing: float
+
+    def __call__(self, t: Array) -> tuple[Array, Array]:
+        """Both blocks at times of shape (n,), of shape (n, *block)."""
+        last = len(self.v) - 1
+        place = np.asarray(t, dtype=np.float64) / self.spacing
         first = np.clip(np.floor(place).astype(np.int64) - (INTERPOLATION_POINTS // 2 - 1), 0, last + 1 - INTERPOLATION_POINTS)
         u = place - first
         found = []
-        for block in blocks:
+        for block in (self.v, self.y):
             value = np.zeros((len(u), *block.shape[1:]))
             for j in range(INTERPOLATION_POINTS):
                 others = [k for k in range(INTERPOLATION_POINTS) if k != j]
@@ -72,5 +86,3 @@ def _interpolant(blocks: tuple[Array, Array], spacing: float) -> Exact:
                 value += share.reshape(-1, *(1,) * (block.ndim - 1)) * block[first + j]
             found.append(value)
         return found[0], found[1]
-
-    return states

@@ -25,13 +25,13 @@ from .zplane import largest, within
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Points of a map over each of its axes, unless told otherwise.
+#: Points of a map over each of its axes, by default.
 SIZE = 512
 
 #: Rounding of a step, in parts of the state.
 ROUNDING = 1000.0 * 2.0**-53
 
-#: Rows of the map that the summary tells, evenly spread from the least damping to the most.
+#: Rows of the map in the summary, evenly spread from the least damping to the most.
 SUMMARY_ROWS = 5
 
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
@@ -42,15 +42,15 @@ class StabilityMap(Value):
     """The radius r₁ of one method over angle per step and damping ratio.
 
     Attributes:
-        method: which.
+        method: the method.
         phi: Φ = ω₀·dt in radians, shape (columns,).
-        damping: damping ratios D, without a unit, shape (rows,); 0 alone for the undamped oscillator.
+        damping: damping ratios D, dimensionless, shape (rows,); 0 alone for the undamped oscillator.
         radius: r₁, the largest magnitude of an eigenvalue, shape (rows, columns).
         stable: whether the samples stay bounded, by the eigenvalues, of the same shape.
-        nonnormal: how far the transition matrix is from a multiple of the identity, as its largest eigenvalue would have
-            it: the Frobenius norm of P − z₁I, of the same shape. What is stable may grow so much before it decays.
+        nonnormal: the distance of the transition matrix from z₁ times the identity: the Frobenius norm of P − z₁I, of the same
+            shape. A stable oscillator may grow about so much before it decays.
         imaginary: the imaginary part of z₁, of the same shape; 0 where both eigenvalues are real.
-        damped: whether the oscillator has a damping term, which some methods cannot do.
+        damped: whether the oscillator has a damping term, which some methods do not support.
     """
 
     method: Method
@@ -69,10 +69,10 @@ class StabilityMap(Value):
         return Oscillator(omega, self.damping[:, np.newaxis] if self.damped else None)
 
     def observe(self, steps: int = 4000) -> Observation:
-        """Run every point by the batch engine, and compare what it does with what the eigenvalues say.
+        """Run every point by the batch engine, and compare the motion with the prediction of the eigenvalues.
 
-        Each point starts from the two unit vectors of its slots, of which every start is a sum, and after N steps the larger
-        of the two states is looked at. Between bounded and growing stands a threshold that no stable point can reach:
+        Each point starts from the two unit vectors of its slots, of which every start is a linear combination, and after N steps
+        the larger of the two states is compared with a threshold that no stable point can reach:
         for two eigenvalues Pᴺ = z₁ᴺ·I + (z₁ᴺ − z₂ᴺ)/(z₁ − z₂)·(P − z₁I), where the fraction is a sum of N products of N − 1
         eigenvalues and so at most N·r₁ᴺ⁻¹, also where both are equal. With r₁ ≤ 1 no state is longer than 1 + N·K, where K is
         the largest norm of P − z₁I of the stable points; the threshold is T = 2·(1 + N·K), and the 2 is for
@@ -212,22 +212,22 @@ def stability_map(
     damping: tuple[float, float] | None = (0.0, 2.0),
     size: int | tuple[int, int] = SIZE,
 ) -> StabilityMap:
-    """The largest eigenvalue of a method on the damped oscillator, over angle per step and damping ratio (§3, §4).
+    """Map the largest eigenvalue of a method on the damped oscillator over angle per step and damping ratio (§3, §4).
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
-        phi: from where to where Φ = ω₀·dt goes, in radians, from 0 to 100; the first point is one spacing above the lower end.
+        phi: the range (lower, upper) of Φ = ω₀·dt in radians, within 0 … 100; the first point is one spacing above the lower end.
             If None, from 0 to 4, or past the method's limit.
-        damping: from where to where the damping ratio D goes, without a unit, both ends included; None for the undamped
-            oscillator over Φ alone, which every method can do.
-        size: how many points over each axis, or a pair: over Φ, over D.
+        damping: the range (lower, upper) of the damping ratio D, dimensionless, both ends included; None for the undamped
+            oscillator over Φ alone, which every method can step.
+        size: number of points over each axis, or a pair: over Φ, over D.
 
     Returns:
         A ``StabilityMap``.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do a damped oscillator.
+        UnsupportedError: if the method cannot step a damped oscillator.
     """
     how = find_method(method)
     low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")

@@ -27,8 +27,8 @@ SAMPLES = 1000
 #: and above the exact solution's. What is large but bounded, as near a stability limit, is as large in both halves.
 MIN_GROWTH = 1.1
 
-#: A run with a tolerance is asked for its state at this many times, evenly spread, the last at the horizon. Each forces the end
-#: of a step, so they are few; its errors are those at these times.
+#: Number of output times of a run with a tolerance, evenly spread, the last at the horizon. Each costs an extra step,
+#: so they are few; the errors of the run are those at these times.
 SAVED_TIMES = 10
 
 #: Extra steps for a saved state within a step: one that ends at it, and the step that passes it once more.
@@ -105,7 +105,7 @@ def asked(scene: Scene) -> Array:
 def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool = False) -> Point:
     """Run the scene with a tolerance and measure its errors.
 
-    Steps that were rejected are counted, and those that a state at the end takes, which is one of all that are looked at.
+    Its cost includes rejected steps, and the extra steps for the state at the end, but not those for the other output times.
     """
     times = asked(scene)
     with warnings.catch_warnings():
@@ -157,7 +157,7 @@ def _of_peer(scene: Scene, times: Array, solved: Solved, by: str, setting: float
         first_bad_step=np.asarray(-1),
         carry=None,
         system=scene.system,
-        method=None,  # type: ignore[arg-type]  # nobody's; only its states are looked at
+        method=None,  # type: ignore[arg-type]  # of no method; only its states are used
         dt=setting,
         t0=0.0,
         start_step=0,

@@ -74,7 +74,7 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
 
     Args:
         scenes: scenes, or their names.
-        progress: is called with the share that is done.
+        progress: is called with the fraction that is done.
         **options: of ``work_precision``: ``methods``, ``steps``, ``tolerances``, ``peers``.
 
     Raises:

@@ -49,7 +49,7 @@ def draw(panel: Panel, error: str) -> Figure:
             axes.text(0.0, 1.02, note, transform=axes.transAxes, size=11, color=GREY)
         figure.text(0.012, 1.0 - 0.42 / height, "What an error costs, scene by scene", size=20, weight="bold")
         bottom = (foot - 0.42) / height
-        figure.text(0.52, bottom, "rate evaluations per unit of simulated time", ha="center", size=14)
+        figure.text(0.52, bottom, "function evaluations per unit of simulated time", ha="center", size=14)
         figure.text(0.012, 0.5, textwrap.fill(ERRORS[error], 60), rotation=90, va="center", size=14)
         handles = [Line2D([], [], **style) for style in entries.values()] + [Line2D([], [], **FRONT)]
         labels = [*entries, "the cheapest of all for its error"]

@@ -1,7 +1,7 @@
 """Other programs on the axes of a work-precision chart.
 
-A peer is a function, or a ``Peer`` made of one, that is given a scene, times and a setting (a tolerance or a step), and returns
-the states at these times with its rate evaluations and seconds. Those of SciPy, heyoka and REBOUND are here; each
+A peer is a function of a scene, times and a setting (a tolerance or a step), or a ``Peer`` made of one. It returns
+the states at these times with its function (rate) evaluations and seconds. Peers for SciPy, heyoka and REBOUND are here; each
 package is imported when its function is called, and need not be installed otherwise.
 """
 
@@ -23,19 +23,19 @@ from ..errors import DTypeError, ShapeError, UnsupportedError
 from ..scenes import Scene
 from ..systems import NBody
 
-#: Tolerances of a peer, and of methods that choose their steps: two in each factor of ten.
+#: Tolerances of a peer, and of methods with adaptive steps: two in each factor of ten.
 TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
 
 
 @dataclass(frozen=True, eq=False)
 class Solved(Value):
-    """What a peer found.
+    """The result of a peer.
 
     Attributes:
-        v: velocity blocks at the times that were asked for, shape (times, *block).
+        v: velocity blocks at the output times, shape (times, *block).
         y: coordinate blocks, likewise.
-        evaluations: rate evaluations that it took, or None if it does not tell; it is then charted by its time alone.
-        seconds: that it took, without what is prepared once.
+        evaluations: function (rate) evaluations, or None if not reported; it is then charted by its time alone.
+        seconds: computing time, without preparations that are made once.
     """
 
     v: Array
@@ -111,14 +111,14 @@ def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
 
 
 def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
-    """SciPy's ``solve_ivp`` with ``rtol`` = ``atol`` = the tolerance; rates in NumPy, a call of Python for each.
+    """SciPy's ``solve_ivp`` with ``rtol`` = ``atol`` = the tolerance; rates in NumPy, with a Python call for each.
 
-    The states between its steps are interpolated, by polynomials of less order than its steps, so that errors of
+    The states between its steps are interpolated by polynomials of lower order than its steps, so the errors of
     DOP853 and RK45 include those of the interpolation, except at the end.
 
     Args:
         method: ``"RK45"``, ``"DOP853"``, or another of its explicit methods.
-        settings: tolerances; it takes none below 100 times the rounding of a float.
+        settings: tolerances; SciPy accepts none below 100 times the rounding of a float.
 
     Raises:
         UnsupportedError: if SciPy is not installed.
@@ -159,7 +159,7 @@ class ByScipy(Value):
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
     """Taylor series by heyoka, compiled for the scene; bodies, and linear systems without inputs.
 
-    A step with a series of order p is counted as p rate evaluations. States between steps are by the series. What is compiled
+    A step with a series of order p is counted as p function evaluations. States between steps are by the series. What is compiled
     before the run is not timed.
 
     Raises:
@@ -199,7 +199,7 @@ REBOUND = {"ias15": True, "bs": True, "leapfrog": False}
 def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) -> Peer:
     """REBOUND; bodies under Newton's law only.
 
-    Its rate evaluations are counted in a run of their own, which is not timed.
+    Its function evaluations are counted in a run of their own, which is not timed.
 
     Args:
         integrator: ``"ias15"`` or ``"bs"`` by tolerance (of ias15 its ``epsilon``, which is not an error but a power of one), or

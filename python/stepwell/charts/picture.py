@@ -89,7 +89,7 @@ def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> None
 
     for axes in (counted, measured, above_counted, above_measured):
         axes.minorticks_off()
-    counted.set_xlabel("rate evaluations per unit of simulated time")
+    counted.set_xlabel("function evaluations per unit of simulated time")
     counted.set_ylabel(ERRORS[error])
     measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
     measured.tick_params(labelleft=False)

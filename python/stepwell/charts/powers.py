@@ -1,4 +1,4 @@
-"""Powers against steps: what n steps of a linear system cost and how wrong they are, made one by one or by a power of P (§4)."""
+"""Powers against steps: cost and error of n steps of a linear system, made one by one or by a power of P (§4)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Forms that are compared, in the order of the legend.
 FORMS = ("direct", "matrix", "power")
 
-#: Numbers of steps, unless told otherwise.
+#: Numbers of steps, by default.
 STEPS = tuple(10**k for k in range(8))
 
 #: Each run is repeated so often, and the median taken.
@@ -48,8 +48,8 @@ class Powers(Drawn, Value):
     """Cost and error of n steps in each form.
 
     Attributes:
-        system: what was stepped.
-        method: how.
+        system: the system.
+        method: the method.
         dt: the step, in units of time.
         steps: numbers of steps, shape (n,).
         seconds: measured median of the repeats, by form, each of shape (n,).
@@ -130,14 +130,14 @@ def powers(
         y: coordinate block at the start.
         dt: the step, in units of time, above zero.
         steps: numbers of steps.
-        progress: is called with the share that is done.
+        progress: is called with the fraction that is done.
 
     Returns:
         A ``Powers``.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the system is not linear, or the method cannot do it.
+        UnsupportedError: if the system is not linear, or the method cannot step it.
     """
     how = find_method(method)
     system = Oscillator() if system is None else a_system(system)
@@ -206,7 +206,7 @@ class _Exact:
         return self.found[n]
 
     def length(self, n: int) -> float:
-        """The length of the exact coordinates and velocities, or what stands in their place."""
+        """The length of the exact coordinates and velocities, or of their replacement."""
         return _length(self.state(n))
 
     def distance(self, n: int, run: Run) -> float:

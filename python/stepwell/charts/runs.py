@@ -1,4 +1,4 @@
-"""The picture of one run: where it went, and how wrong it was in energy and in state."""
+"""The picture of one run: its trajectory, and its errors in energy and in state."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class RunPicture(Drawn, Value):
     """A run of a scene, with its errors at the saved states; arrays are of shape (saved,).
 
     Attributes:
-        scene: what was run.
-        run: what came of it.
+        scene: the scene.
+        run: the run.
         energy_error: of each saved state, relative to ``energy_scale``; infinite where it is not finite, NaN where the true one
             is not known; None for a system without an energy. Without an exact solution it is the change since the first state.
         energy_scale: what the energy error is relative to, in words.
@@ -54,7 +54,7 @@ class RunPicture(Drawn, Value):
 
     @property
     def title(self) -> str:
-        """What, and by which method."""
+        """The scene and the method."""
         return f"{self.scene.title} by {self.run.method.title}"
 
     @property
@@ -67,7 +67,7 @@ class RunPicture(Drawn, Value):
 
     @cached_property
     def exact(self) -> tuple[Array, Array, Array] | None:
-        """Times, v and y of the exact solution over the run, as far as it is known, or None."""
+        """Times, v and y of the exact solution over the run, for as long as it is known, or None."""
         first, last = float(self.run.t[0]), min(float(self.run.t[-1]), self.scene.until)
         if self.scene.exact is None or last <= first:
             return None
@@ -83,7 +83,7 @@ class RunPicture(Drawn, Value):
         return draw(self)
 
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
-        """Write an animation of the run; the saved states are its frames, none is made up between them.
+        """Write an animation of the run; its frames are the saved states, without interpolation.
 
         Args:
             path: the file, ending in .gif, .mp4 or .html.
@@ -147,7 +147,7 @@ class RunPicture(Drawn, Value):
 
 
 def run_picture(scene: Scene | str, run: Run) -> RunPicture:
-    """Look at a run of a scene: where it went, and how wrong it was.
+    """Make a picture of a run of a scene, with its errors.
 
     Args:
         scene: the ``Scene`` that was run, or its name.

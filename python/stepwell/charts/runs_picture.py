@@ -261,7 +261,7 @@ def errors(energy: Axes, state: Axes, chart: RunPicture) -> None:
             missing = (
                 "no energy of its own"
                 if axes is energy
-                else "no exact solution, so no state error:\na right energy alone does not tell\nwhether the orbit is right"
+                else "no exact solution, so no state error:\na correct energy alone does not\nmake an orbit correct"
             )
             axes.text(0.5, 0.5, missing, transform=axes.transAxes, ha="center", va="center", color=GREY, linespacing=1.4)
             axes.set(yticks=[])

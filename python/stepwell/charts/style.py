@@ -1,4 +1,4 @@
-"""How a method looks in every picture: the same marker and colour everywhere, told apart in grey by marker and line."""
+"""The look of a method in every picture: the same marker and colour everywhere; in grey, marker and line distinguish it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ COLOURS = (
     "#e07a9b",
 )
 PEERS = "1234+|"
-#: The line tells the order: the more accurate, the more solid.
+#: The line shows the order: the higher, the more solid.
 LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
 GREY = "#666666"
 

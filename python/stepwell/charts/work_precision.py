@@ -1,4 +1,4 @@
-"""The work-precision chart: what each method costs on a scene, how wrong it is, and where it falls off."""
+"""The work-precision chart: cost and error of each method on a scene, and the step at which it becomes unstable."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from .known import chartable
 from .peers import TOLERANCES, Peer, Solved
 from .peers import peer as find_peer
 
-#: The ladder goes from this many times the scene's step to this small a part of it.
+#: The longest and the shortest step of the ladder (a geometric grid of steps), as multiples of the scene's step.
 LARGEST, SMALLEST = 16.0, 1 / 3000
 
-#: And by so many rungs beyond, where even the method of the widest limit is unstable.
+#: So many longer steps are added, at which even the method with the largest stability limit is unstable.
 EXTRA_RUNGS = 2
 
-#: But no run of the ladder has more steps than this, for it would take minutes.
+#: The most steps of a run of the ladder; more would take minutes.
 MAX_STEPS = 2_000_000
 
-#: It is less for blocks of more numbers than this, by the square of the ratio, as the number of pairs of bodies grows.
+#: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
 SMALL_BLOCK = 16
 
-#: Rungs of the ladder per factor of ten.
+#: Steps of the ladder per factor of ten.
 RUNGS_PER_DECADE = 10
 
 
@@ -47,27 +47,27 @@ def work_precision(
 ) -> WorkPrecision:
     """Run a scene by many methods with many steps and tolerances, and measure errors, stability and cost.
 
-    Each point is a run over the scene's horizon; its errors are the largest of the run, that at the end, that of the phase at
-    the end and that of the energy. Cost is counted, in function (rate) evaluations per unit of simulated time, and measured, of a
-    single run and on a batch of equal members, on one thread. Everything but the times is repeatable to the bit.
+    Each point is a run over the scene's horizon. Its errors are the largest of the run, that at the end, the phase error at
+    the end and the energy error. Cost is counted in function (rate) evaluations per unit of simulated time. It is also measured,
+    for a single run and for a batch of equal members, on one thread. Everything but the times is repeatable to the bit.
 
-    A scene without an exact solution is compared with a run to a tight tolerance, as far as a less tight one agrees with
-    it; the horizon is cut there. A scene's control is left out, for the true motion has none.
+    A scene without an exact solution is compared with a run to a tight tolerance, as long as a less tight one agrees with
+    it; the horizon ends there. A scene's control is left out, since the true motion has none.
 
     Args:
         scene: a ``Scene``, or the name of one.
         methods: names, or what ``stepwell.method`` returns; all if None.
         steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 24
             times the scene's down to a 3000th of it, or to two million steps.
-        tolerances: of the methods that estimate their error, which get a second curve, "merson, tolerance"; if None, 1e-2 to
-            1e-12, two in each factor of ten; none if empty. Such a run saves its state at ten times.
+        tolerances: for a second curve, "merson, tolerance", of each method that estimates its error; if None, 1e-2 to
+            1e-12, two in each factor of ten; no such curves if empty. Such a run saves its state at ten times.
         peers: other programs, such as ``peers.scipy("DOP853")``; see ``stepwell.charts.peers``.
         fused: compute with fused multiply-adds; ``"both"`` for a curve of each, "rk4" and "rk4, fused". A scene whose step is too
             long to be fused is refused.
-        progress: is called with the share that is done.
+        progress: is called with the fraction that is done.
 
     Returns:
-        A ``WorkPrecision``. Methods that cannot do the system are in its ``refused``, with the reason.
+        A ``WorkPrecision``. Methods that cannot step the system are in its ``refused``, with the reason.
 
     Raises:
         ArgumentError: what was given and what was expected.

@@ -1,4 +1,4 @@
-"""Stability charts: where the eigenvalues of every method go as the step grows (§4), exactly and by the series of Appendix A."""
+"""Stability charts: the eigenvalues of every method as the step grows (§4), exactly and by the series of Appendix A."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from .files import write_csv, write_json
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The default ladder has so many angles in each unit of Φ: round values are rungs.
+#: The default grid has so many angles in each unit of Φ, so that round values are among them.
 RUNGS = 200
 
-#: Φ is at most this, in rad: it is far past every limit, and a picture says nothing of angles as far apart.
+#: The largest Φ, in rad: it is far past every limit, and a picture of a wider range would show nothing.
 MAX_PHI = 100.0
 
 #: It goes past the largest limit by at least this factor.
 LIMIT_MARGIN = 1.1
 
-#: The pictures that there are.
+#: The kinds of pictures.
 KINDS = ("loci", "curves")
 
 
@@ -43,12 +43,12 @@ class Locus(Value):
     """One method on the undamped oscillator at n angles per step; arrays are of shape (n,) unless said otherwise.
 
     Attributes:
-        method: which.
+        method: the method.
         phi: Φ = ω₀·dt, the true angle per step, in radians.
         eigenvalues: z₁ and z₂ of the transition matrix, shape (2, n): the larger first, of a pair the one that turns forwards.
         r1_squared: r₁², the squared magnitude of z₁.
         ratio: Ψ/Φ, the angle per step of z₁ divided by the true one. Where both are real, Ψ is 0 or π.
-        kind: what the samples do, in the document's words.
+        kind: the behaviour of the samples, in the document's words.
         stable: whether they stay bounded.
         r1_squared_series: r₁² by 1 and the first two terms that follow.
         ratio_series: Ψ/Φ likewise.

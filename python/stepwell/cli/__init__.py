@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="stepwell",
-        description="Simple integration algorithms: what each method costs, how wrong it is and where it blows up.",
+        description="Simple integration algorithms: the cost of each method, its error, and where it becomes unstable.",
     )
     parser.add_argument("--version", action="version", version=f"stepwell {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")

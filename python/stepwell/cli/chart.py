@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(args: argparse.Namespace) -> None:
     """Measure, draw, write, summarise."""
-    # All names are looked up, and what is needed is there, before any work.
+    # All names and requirements are checked before any work.
     chosen = [scene(name) for name in args.scenes]
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
     if not args.json:
@@ -88,7 +88,7 @@ def _summary(chart: WorkPrecision, files: list[str]) -> None:
         for curve, row in zip(chart.curves, chart.summary(), strict=True)
     ]
     show.table(
-        f"{chart.scene.title}: rate evaluations per unit of time that an error takes",
+        f"{chart.scene.title}: function evaluations per unit of time for an error",
         (
             "method",
             "order>",

@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
     default = ",".join(f"{phi:g}" for phi in PHI)
     parser.add_argument(
-        "--phi", default=default, metavar="A,B,…", help=f"Φ = ω₀·dt at which errors are told (default: {default})"
+        "--phi", default=default, metavar="A,B,…", help=f"Φ = ω₀·dt at which errors are shown (default: {default})"
     )
     parser.add_argument("--markdown", action="store_true", help="print one table in Markdown")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json or .md")

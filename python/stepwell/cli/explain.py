@@ -1,4 +1,4 @@
-"""Explain a step: every operation by name, how often it is computed, and the machine code that it becomes."""
+"""Explain a step: every operation by name, how often it is computed, and its machine code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write a step as source code of C, JavaScript, Python or Rust, to be taken along into an engine."""
+"""Write a step as source code of C, JavaScript, Python or Rust, for use in an engine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .explain import system_and_control
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What the command takes."""
+    """The arguments of the command."""
     parser.add_argument(
         "system",
         metavar="SYSTEM",
@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(args: argparse.Namespace) -> None:
-    """Look up, export, write, tell."""
+    """Export the step, write it, and report that."""
     system, control = system_and_control(args.system)
     language = LANGUAGES[_checks.known("language", args.language, tuple(LANGUAGES))]
     if args.output is not None:

@@ -1,4 +1,4 @@
-"""List the methods, or say all that is known of one."""
+"""List the methods, or describe one."""
 
 from __future__ import annotations
 

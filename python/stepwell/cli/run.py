@@ -1,4 +1,4 @@
-"""Run a scene by a method, say where it ended and how wrong it was, and write numbers, a picture or an animation."""
+"""Run a scene by a method, show its end and its errors, and write numbers, a picture or an animation."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ..errors import ArgumentError, UnsupportedError
 from ..methods import method
 from . import show
 
-#: What is drawn unless told otherwise: the pictures of all methods, and the map of each. Powers are drawn if asked for.
+#: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.
 USUAL = (*KINDS, "map")
 CHARTS = (*USUAL, "powers")
 
@@ -30,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(args: argparse.Namespace) -> None:
     """Analyse, draw, write, tell."""
-    # All names are looked up, and what is needed is there, before any work.
+    # All names and requirements are checked before any work.
     methods = [method(name) for name in args.methods] or None
     asked = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
     kinds = [_checks.known("--charts", name, CHARTS) for name in dict.fromkeys(asked)]

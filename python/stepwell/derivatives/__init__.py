@@ -2,7 +2,7 @@
 
 ``modes`` differentiates forwards and backwards, ``rules`` has a derivative for each operation and each function, ``listing``
 reads a tape back, ``evaluate`` runs one over NumPy arrays, ``traced`` does all of it for a system's rates and for a step of a
-method. What users ask with them is in ``stepwell.dynamics``.
+method. Their uses are in ``stepwell.dynamics``.
 """
 
 from .evaluate import Evaluation

@@ -1,6 +1,6 @@
 """A tape run over NumPy arrays, line by line, for many members at once.
 
-The lines become the text of a Python function, which Python compiles once: what remains of a step is NumPy's own operations.
+The lines become the text of a Python function, which Python compiles once; a step then consists of NumPy's operations alone.
 They are those of the tape, none fused and none reordered, so the bits are those of the core and the same on every machine.
 """
 
@@ -28,9 +28,9 @@ class Evaluation:
     """Values of a tape, to be computed for many members at once.
 
     Args:
-        tape: where they stand.
-        roots: the values that are asked for.
-        numbers: of each parameter, by its number on the tape, what it is for every member.
+        tape: the tape with the values.
+        roots: the values to compute.
+        numbers: the values of each parameter for all members, by its number on the tape.
         tables: the sampled inputs.
     """
 
@@ -50,7 +50,7 @@ class Evaluation:
 def _compiled(operations: Sequence[tuple[str, Sequence[int], int]], roots: Sequence[int]) -> Any:
     """A function of state, time, step, parameters and tables that returns the roots' values.
 
-    A value's name is free for another after its last use, and with it its memory.
+    A value's name is reused after its last use, which releases its memory.
     """
     last = list(range(len(operations)))
     for line, (_, of, _) in enumerate(operations):
@@ -75,7 +75,7 @@ def _compiled(operations: Sequence[tuple[str, Sequence[int], int]], roots: Seque
         names.append(own)
         text.append(f"    {own} = {made}")
     text.append(f"    return [{', '.join(names[root] for root in roots)}]")
-    exec("\n".join(text), known)  # a text of numbered names and operations only
+    exec("\n".join(text), known)  # the text has numbered names and operations only
     return known["run"]
 
 
@@ -100,5 +100,5 @@ def _expression(name: str, a: list[str], given: int, known: dict[str, Any]) -> s
 
 
 def _constant(value: float) -> Any:
-    """A constant: a Python float is quickest, but one that is zero or not finite could then meet another and raise."""
+    """A constant: a Python float is fastest, but Python raises an error in operations of two such that are zero or not finite."""
     return value if math.isfinite(value) and value else np.float64(value)

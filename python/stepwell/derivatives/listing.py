@@ -11,7 +11,7 @@ from ..reference.fused import Operation
 from ..reference.marks import Mark, Marks
 from .rules import MIN_ROUNDING_CONSTANT, NO_RULE, no_derivative, number
 
-#: How each operation is written again. On a tape equal operations stand once, so what comes is the symbol that was there.
+#: How to write each operation again. Equal operations are on a tape only once, so the result is the symbol that was there.
 AGAIN: dict[str, Callable[..., Any]] = {
     "add": lambda a, b, _: a + b,
     "subtract": lambda a, b, _: a - b,
@@ -41,7 +41,7 @@ class Listing:
         roots: the lines of the values.
         marks: of each line that is a marked function, its mark.
         place: of each symbol's number, its line.
-        passed: of each line, whether a derivative passes it: not the insides of marked functions, nor what only decides a choice.
+        passed: of each line, whether derivatives go through it: not inside marked functions, nor where it only decides a choice.
     """
 
     def __init__(self, tape: Tape, roots: Sequence[Symbol], marks: Marks) -> None:
@@ -111,14 +111,14 @@ class Listing:
         return operands[0].add_bits(operands[1])  # type: ignore[no-any-return]
 
     def reads(self, line: int) -> tuple[tuple[Any, ...], Mark | None]:
-        """What a derivative of a line goes on to: the arguments of a marked function, or else the operands."""
+        """The lines from which the derivative of a line is computed: the arguments of a marked function, or else the operands."""
         mark = self.marks.get(line)
         if mark is not None:
             return mark.arguments, mark
         return tuple(self.symbols[each] for each in self.operations[line].of), None
 
     def check(self, line: int) -> None:
-        """Raise if the operation of a line, which is no marked function, has no derivative though what it reads changes."""
+        """Raise if a line that is no marked function has an operation without a derivative, and an operand that changes."""
         name = self.operations[line].name
         if name in NO_RULE:
             raise no_derivative(name)
@@ -133,7 +133,7 @@ class Listing:
             )
 
     def _offset(self, line: int) -> tuple[int, float] | None:
-        """Of a line that adds a constant to another, that line and the constant; None of others."""
+        """For a line that adds a constant to another line: that line and the constant; else None."""
         name, of, _ = self.operations[line]
         if name not in ("add", "subtract"):
             return None

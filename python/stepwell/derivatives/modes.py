@@ -1,10 +1,10 @@
 """Derivatives as further operations on the same tape: forwards along directions, backwards from one value, or whole Jacobians.
 
-Derivatives are exact but for rounding: there is no difference quotient anywhere. What is zero for sure is not on the tape, and
-equal operations are merged by it. Their derivatives in turn are had by the same functions.
+Derivatives are exact up to rounding: no difference quotients are used. Derivatives known to be zero are not on the tape, and the
+tape merges equal operations. The same functions give derivatives of derivatives.
 
-Of a choice, only the derivative of what is chosen comes through, also where that of the other way is not finite: forwards by the
-same choice, backwards by choosing zero (``_Guard``) wherever what is passed on belongs to a way that was not taken.
+The derivative of a choice is that of the chosen value, even if that of the other one is not finite: forwards by the same choice,
+backwards by choosing zero (``_Guard``) for the value that was not chosen.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ def directional(
     """The derivatives of values in one direction (forward mode; a Jacobian times a vector).
 
     Args:
-        tape: where the values stand, and where their derivatives are written.
+        tape: the tape of the values; their derivatives are written to it.
         roots: the values.
-        along: what changes and how fast: pairs of a symbol of the tape and the symbol of its change.
+        along: the direction: pairs of a symbol of the tape and the symbol of its change.
         marks: the marked functions, as ``reference.marks.recording`` collects them; those that are being recorded if None.
 
     Returns:
@@ -53,7 +53,7 @@ def gradient(tape: Tape, root: Symbol, wrt: Sequence[Symbol], marks: Marks | Non
     """The derivatives of one value with respect to several (reverse mode): a few times the operations of the value.
 
     Args:
-        tape: where the value stands, and where its derivatives are written.
+        tape: the tape of the value; its derivatives are written to it.
         root: the value.
         wrt: what it is differentiated with respect to: any symbols of the tape; each is then taken as a number of its own.
         marks: the marked functions, as ``reference.marks.recording`` collects them; those that are being recorded if None.
@@ -72,10 +72,10 @@ def gradient(tape: Tape, root: Symbol, wrt: Sequence[Symbol], marks: Marks | Non
 def jacobian(tape: Tape, roots: Sequence[Symbol], wrt: Sequence[Symbol], marks: Marks | None = None) -> list[list[Symbol]]:
     """The derivatives of several values with respect to several numbers: forwards or backwards, whichever takes fewer operations.
 
-    Which that is, is told by how many pairs of a line and a number (or a line and a value) depend on each other.
+    That is decided by the number of pairs of a line and a number (or a line and a value) that depend on each other.
 
     Args:
-        tape: where the values stand, and where the derivatives are written.
+        tape: the tape of the values; the derivatives are written to it.
         roots: the values.
         wrt: what they are differentiated with respect to: any symbols of the tape; each is then taken as a number of its own.
         marks: the marked functions, as ``reference.marks.recording`` collects them; those that are being recorded if None.
@@ -115,7 +115,7 @@ def _times(factor: Any, change: Any) -> Any:
 
 
 def _factors(listing: Listing, line: int, wanted: list[bool]) -> tuple[Any, ...]:
-    """What changes of what a line reads are multiplied by."""
+    """The factors by which changes of the operands of a line are multiplied."""
     reads, mark = listing.reads(line)
     if mark is not None:
         return of_function(mark, listing.symbols[line], wanted)
@@ -151,21 +151,21 @@ def _forward(listing: Listing, seeds: dict[int, dict[int, Symbol]]) -> list[dict
 
 
 class _Guard:
-    """When a value counts at all: always (``truth`` is None), or where a mask is true."""
+    """Where the derivative of a value is needed: everywhere (``truth`` is None), or where a mask is true."""
 
     def __init__(self, truth: Any = None) -> None:
         self.truth = truth
 
     def also(self, truth: Any) -> _Guard:
-        """Where this one counts and the mask is true."""
+        """Where this one holds and the mask is true."""
         return _Guard(truth if self.truth is None else self.truth & truth)
 
     def other(self, guard: _Guard) -> _Guard:
-        """Where this or another counts."""
+        """Where this or another holds."""
         return _Guard(None if self.truth is None or guard.truth is None else self.truth | guard.truth)
 
     def held(self, value: Any) -> Any:
-        """The value where it counts, else 0."""
+        """The value where it is needed, else 0."""
         return value if self.truth is None else self.truth.choose(value, 0.0)
 
 
@@ -201,7 +201,7 @@ def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
 
 
 def _changing(listing: Listing, numbers: list[int]) -> list[bool]:
-    """Of each line, whether it depends on one of the symbols of these numbers; of a mask, nothing asks."""
+    """Of each line, whether it depends on one of the symbols of these numbers; masks do not matter."""
     return [bool(each) for each in _depends(listing, dict.fromkeys(numbers, 1))]
 
 
@@ -220,7 +220,7 @@ def _depends(listing: Listing, bits: dict[int, int]) -> list[int]:
 
 
 def _backwards_is_shorter(listing: Listing, numbers: list[int]) -> bool:
-    """Whether fewer products are passed from values back to what they read than from numbers on to what is made of them."""
+    """Whether the reverse mode takes fewer products than the forward mode."""
     bits: dict[int, int] = {}
     for j, each in enumerate(numbers):
         bits[each] = bits.get(each, 0) | (1 << j)

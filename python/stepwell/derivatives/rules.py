@@ -1,8 +1,8 @@
 """Derivatives of the operations of a tape, and of the functions that are marked on it.
 
 A rule gives, for each operand, the factor by which a change of it is multiplied: a symbol, 1.0 or -1.0, or None for no change.
-What rounds to whole numbers or works on bits has no rule: a derivative through it would be wrong, or zero where nobody meant it.
-Functions that are made of such operations are marked (``reference/marks.py``) and have rules of their own, in terms of functions.
+Operations that round to whole numbers or work on bits have no rule: a derivative through them would be wrong, or zero by mistake.
+Functions that consist of such operations are marked (``reference/marks.py``) and have rules of their own, in terms of functions.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from ..reference import marks
 
 LN2, LN10 = 0.6931471805599453, 2.302585092994046
 
-#: Adding a constant of at least this and taking it away again is meant to round: x + 1.5·2⁵² is x rounded to a whole number.
+#: Adding a constant of at least this size and subtracting it again rounds: x + 1.5·2⁵² − 1.5·2⁵² is x as a whole number.
 MIN_ROUNDING_CONSTANT = 2.0**32
 
-#: Comparisons: what they say is constant but where it jumps.
+#: Comparisons: their results are constant except at jumps.
 COMPARISONS = ("less", "at most", "equal")
 
 #: Operations without a derivative, and what to do about it.
@@ -46,7 +46,7 @@ Partial = Callable[..., Factor]
 
 
 def operation(name: str, operands: list[Any], value: Any) -> tuple[Factor, ...]:
-    """The factors of an operation of the tape, one for each operand. A choice is not here: it is made, and not multiplied.
+    """The factors of an operation of the tape, one for each operand. A choice is not among them: it has no factors.
 
     Raises:
         UnsupportedError: if it has no derivative.
@@ -71,7 +71,7 @@ def operation(name: str, operands: list[Any], value: Any) -> tuple[Factor, ...]:
 
 
 def no_derivative(name: str) -> UnsupportedError:
-    """What is said of an operation that has no derivative."""
+    """The error for an operation without a derivative."""
     if name == "sample":
         return UnsupportedError("derivative: a sampled input changes by jumps, so it has none by its time")
     if name.startswith(("multiply", "subtract ")):
@@ -93,7 +93,7 @@ def number(bits: int) -> float:
 
 
 def function(name: str, near: Callable[..., Any] | None = None) -> Callable[..., Any]:
-    """The marked function of that name: the one in the same file as another, or that of ``reference.functions``, or any.
+    """The marked function of that name: the one in the same file as another, else that of ``reference.functions``, else any.
 
     Raises:
         UnsupportedError: if there is none.
@@ -165,8 +165,8 @@ def _by_exponent(call: Any, y: Any, x: Any, p: Any) -> Any:
     return y.equals(0.0).choose(0.0, y * call("log")(x))
 
 
-#: Of each function, for each argument the factor, from a way to other functions by name, the value, and the arguments; None where
-#: the function does not change with the argument but by jumps.
+#: For each argument of each function, how to compute its factor from a lookup of functions by name, the value and the arguments;
+#: None where the function is constant in that argument except at jumps.
 PARTIALS: dict[str, tuple[Partial | None, ...]] = {
     "sin": (lambda f, y, x: f("cos")(x),),
     "cos": (lambda f, y, x: -f("sin")(x),),

@@ -20,11 +20,11 @@ from ..systems import System
 from .evaluate import Evaluation
 from .modes import directional, jacobian
 
-#: How many systems' derivatives are kept: a search for a limit asks for the same ones over and over.
+#: The most systems whose derivatives are kept: a search for a limit needs the same ones many times.
 MAX_KEPT = 8
 
-#: Up to so many lines of a tape times numbers of a state each element of a matrix has lines of its own, of which none are for
-#: what is zero for sure. Longer ones are differentiated along one change, and NumPy does it for all changes at once.
+#: The most lines of a tape times numbers of a state up to which each element of a matrix has lines of its own, and those known to
+#: be zero have none. Longer tapes are differentiated in one direction, which NumPy evaluates for all directions at once.
 MAX_WHOLE = 20_000
 
 
@@ -33,7 +33,7 @@ class Traced:
 
     Attributes:
         system: whose state it is.
-        tape: where everything stands.
+        tape: the tape of all values.
         marks: the functions on it.
         state: the symbols of a member's numbers, v first.
         roots: the values.
@@ -71,7 +71,7 @@ class Traced:
     def tangent(self) -> Evaluation:
         """The values, and their derivatives along a change of the state whose numbers come behind the state's own.
 
-        Behind those is room for what a control adds up, so the changes are the states from ``room`` on.
+        The sum that a control accumulates has a place behind those, so the changes begin at number ``room``.
         """
         changes = [self.tape.state(self.room + i) for i in range(self.length)]
         pairs = zip(self.state, changes, strict=True)
@@ -103,7 +103,7 @@ def _wide(system: System, dv: Any, dy: Any) -> tuple[Any, Any]:
 
 
 class _Kept(NamedTuple):
-    """A derivative and what it is of; ``whole`` if it has a line for each element of the matrix, else it is along one change."""
+    """A derivative, and of what; ``whole`` if it has a line for each element of the matrix, else it is in one direction."""
 
     system: System
     what: str
@@ -117,9 +117,9 @@ _last: deque[_Kept] = deque(maxlen=MAX_KEPT)
 
 
 def _kept(system: System, what: str, method: Method | None) -> _Kept:
-    """The derivative, traced anew unless this very system was asked for shortly before.
+    """The derivative, traced anew unless that of this very system object was needed shortly before.
 
-    An equal one is not enough: a user's function may have been traced anew in between, with other numbers around it.
+    An equal system is not enough: a user's function may depend on other numbers than when it was traced.
     """
     for each in tuple(_last):
         if each.system is system and each.what == what and each.method is method:
@@ -141,7 +141,7 @@ def matrix(
         what: "rates", the "step" of a method from slot to slot, or its "finish" from slots to states.
         method: of a step.
         members: the shape to which states, parameters, times and steps broadcast.
-        v: the velocities, or what stands in their place, shape (*block, *batch).
+        v: the velocities, or what the method carries in place of them, shape (*block, *batch).
         y: the coordinates.
         t: the time, a number or of the shape of the members.
         h: the step, likewise.
@@ -153,7 +153,7 @@ def matrix(
     n = prod(system.v_shape) + prod(system.y_shape)
     blocks = ((v, system.v_shape), (y, system.y_shape))
     rows = [row for block, shape in blocks for row in block.reshape(prod(shape), *block.shape[len(shape) :])]
-    nothing = np.zeros(())  # what a control has added up has no part in it
+    nothing = np.zeros(())  # the sum of a control has no influence
     if kept.whole:
         values = np.empty((n * n + n, *members))
         for k, value in enumerate(kept.evaluation([*rows, nothing], t, h)):
@@ -167,6 +167,6 @@ def matrix(
 
 
 def together(system: System, v: Array, y: Array, **more: Any) -> Shape:
-    """The shape to which states, parameters and whatever else broadcast."""
+    """The shape to which states, parameters and other values broadcast."""
     batches = {"v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     return _checks.batch_shape({"system": system.batch} | batches | {name: np.shape(each) for name, each in more.items()})

@@ -17,8 +17,7 @@ from ..stability.eigen import Complex
 from ..systems import System
 from ..systems.base import a_system
 
-#: A state of more numbers than this has its Jacobian by the complex step if the system allows it: the tape of its derivatives
-#: would be long.
+#: For states of more numbers than this the complex step is used if the system allows it: a tape of derivatives would be long.
 MAX_TRACED_NUMBERS = 64
 
 
@@ -50,7 +49,7 @@ class Jacobian(Value):
 
     @property
     def vv(self) -> Array:
-        """∂v̇/∂v: damping, and what turns with the velocity."""
+        """∂v̇/∂v: damping and gyroscopic terms."""
         return self._block(0, 0)
 
     @property
@@ -70,7 +69,7 @@ class Jacobian(Value):
 
     @property
     def eigenvalues(self) -> Complex:
-        """The rates λ at which small disturbances grow and turn, shape (n, *members), the largest real part first."""
+        """The rates λ at which small disturbances grow and rotate, shape (n, *members), the largest real part first."""
         return by_growth(self.matrix)
 
     def __repr__(self) -> str:
@@ -80,17 +79,17 @@ class Jacobian(Value):
 
 
 def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobian:
-    """The derivative of a system's rates at a state, exact but for rounding.
+    """The derivative of a system's rates at a state, exact up to rounding.
 
-    The rates are traced and their tape is differentiated, operation by operation; nothing is approximated by differences. It does
-    for a user's own equations what it does for built-in ones. States of more than 64 numbers of a built-in system take the
-    complex step instead, which is as exact.
+    The rates are traced and their tape is differentiated, operation by operation; nothing is approximated by differences. This
+    holds for your own equations as for built-in systems. A built-in system of more than 64 numbers takes the complex step, which
+    is equally exact.
 
     Args:
         system: whose rates; parameters may be arrays.
         y: the coordinates, shape (*block, *batch), or one number for all.
         v: the velocities, likewise; a system that has none needs none.
-        t: the time, which matters where the rates depend on it otherwise than by adding an input.
+        t: the time; it has no influence if the rates depend on time only through added inputs.
 
     Returns:
         A ``Jacobian``: ``matrix`` of shape (n, n, *members), and its blocks ``vv``, ``vy``, ``yv`` and ``yy``.

@@ -1,4 +1,4 @@
-"""``lyapunov``: how fast neighbouring motions part, by the derivative of every step."""
+"""``lyapunov``: how fast neighbouring motions separate, by the derivative of every step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..stability.analysis import velocities
 from ..systems import System
 from ..systems.base import a_system
 
-#: Steps between two orthonormalisations, unless told otherwise: vectors may not become so parallel that rounding decides.
+#: Steps between two orthonormalisations by default: few enough that vectors do not become parallel up to rounding.
 EVERY = 10
 
 
@@ -36,8 +36,8 @@ class Lyapunov(Value):
         dt: the step.
         t: times up to which ``history`` averages, shape (orthonormalisations,).
         exponents: mean growth per unit of time, the largest first, shape (k, *batch).
-        history: the same averages up to each of these times, in the order in which vectors were kept orthogonal, shape
-            (orthonormalisations, k, *batch). What they still change by at the end is a measure of how far they have converged.
+        history: the same averages up to each of these times, in the order of the orthonormalised vectors, shape
+            (orthonormalisations, k, *batch). Their changes towards the end show how far they have converged.
         v: the velocities at the end, shape (*block, *batch), or what the method carries in their place.
         y: the coordinates at the end.
     """
@@ -55,14 +55,14 @@ class Lyapunov(Value):
 
     @property
     def sum(self) -> Array:
-        """The sum of the exponents, shape (*batch): of all of them, the mean rate at which volumes of states grow."""
+        """The sum of the exponents, shape (*batch): of all of them, the mean rate at which volumes in state space grow."""
         return _total(self.exponents)
 
     @property
     def dimension(self) -> Array:
         """The Kaplan-Yorke dimension, shape (*batch); NaN unless all exponents were asked for.
 
-        So many exponents as have a sum above zero, and of the next the share that makes it zero.
+        The number of largest exponents whose sum is above zero, plus the fraction of the next that makes the sum zero.
         """
         k, n = len(self.exponents), sum(maps.size(self.system))
         members = self.exponents.shape[1:]
@@ -99,11 +99,10 @@ def lyapunov(
 ) -> Lyapunov:
     """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances of it grow.
 
-    Disturbances are stepped by the exact derivative of each step of the method, so the exponents are those of the sequence that
-    the method makes, and those of the motion up to the method's error. Every so many steps they are made orthogonal again, and
-    their growth is noted (Benettin et al. 1980). The states are to the bit those of ``integrate``. Steps are made by NumPy, for
-    all members at once: a step costs about a microsecond for each operation of it and of its derivative, whatever the number of
-    members up to a thousand.
+    Disturbances are stepped by the exact derivative of each step of the method, so the exponents are those of the sequence of
+    the method, and those of the motion up to the method's error. At intervals they are orthonormalised, and their growth is noted
+    (Benettin et al. 1980). The states are those of ``integrate``, to the bit. NumPy makes a step for all members at once: it
+    costs about a microsecond for each operation of the step and of its derivative, for any number of members up to a thousand.
 
     Args:
         system: what to step; parameters may be arrays.
@@ -113,13 +112,13 @@ def lyapunov(
         steps: over how many steps growth is averaged, one or more.
         v: velocities at the start, as y; a system that has none needs none.
         exponents: how many, the largest ones; or "all".
-        transient: so many steps are made before, in which the motion finds its attractor and disturbances their directions.
-        every: steps from one orthonormalisation to the next. Between two, the largest exponent must not make vectors parallel
-            to rounding: (largest − smallest)·every·dt is to stay below some 30.
+        transient: number of steps before those, in which the motion approaches its attractor and disturbances their directions.
+        every: steps from one orthonormalisation to the next. In between, vectors must not become parallel up to rounding:
+            (largest − smallest)·every·dt must stay below some 30.
         t0: time of the first step.
 
     Returns:
-        ``Lyapunov``: ``exponents`` of shape (k, *batch), and how they came about.
+        ``Lyapunov``: ``exponents`` of shape (k, *batch), and their history.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -173,7 +172,7 @@ def lyapunov(
 
 
 class _Motion:
-    """The states and their disturbances, on the way."""
+    """States and their disturbances, while they are stepped."""
 
     def __init__(
         self, system: System, method: Method, dt: float, t0: float, k: int, v: Array, y: Array, members: tuple[int, ...]
@@ -190,7 +189,7 @@ class _Motion:
         self.vectors = np.array(np.broadcast_to(start.reshape(self.n, k, *(1,) * len(members)), (self.n, k, *members)))
 
     def advance(self, steps: int) -> None:
-        """So many steps of states and disturbances."""
+        """Make a number of steps of states and disturbances."""
         nothing = np.zeros(())
         changes: list[Any] = list(self.vectors)
         for _ in range(steps):
@@ -201,13 +200,13 @@ class _Motion:
         self.vectors = np.stack([np.broadcast_to(each, shape[1:]) for each in changes])
 
     def growth(self, steps: int) -> Array:
-        """So many steps, and the logarithms of what each vector has grown by, shape (k, *members)."""
+        """Make a number of steps; returns the logarithm of the growth of each vector, shape (k, *members)."""
         self.advance(steps)
         self.vectors, lengths = _orthonormal(self.vectors)
         return _log(lengths)
 
     def go(self, steps: int, every: int) -> None:
-        """So many steps whose growth does not count."""
+        """Make a number of steps whose growth is ignored."""
         for first in range(0, steps, every):
             self.growth(min(every, steps - first))
 
@@ -221,7 +220,7 @@ def _how_many(exponents: Any, n: int) -> int:
 
 
 def _generic(n: int, k: int) -> Array:
-    """So many vectors of n numbers of which no motion is likely to be orthogonal to one, the same everywhere."""
+    """Vectors of n numbers to which no motion is likely to be orthogonal, the same on every machine."""
     i, j = 1.0 + np.arange(n)[:, np.newaxis], np.arange(k)
     return cos(1.7 * i + 2.3 * i * j)
 
@@ -235,10 +234,10 @@ def _total(values: Array) -> Array:
 
 
 def _orthonormal(vectors: Array) -> tuple[Array, Array]:
-    """Vectors made orthonormal one after the other, and what length each had beside those before it.
+    """Vectors made orthonormal one after the other, and the length of each orthogonal to those before it.
 
-    Gram and Schmidt's way, each twice, which is as good as Householder's; every sum in a written order. Shapes (n, k, *members)
-    and (k, *members). Lengths are taken of numbers that are scaled first, so that neither overflows.
+    Gram-Schmidt, each twice, which is as accurate as Householder's method; every sum in a fixed order. Shapes (n, k, *members)
+    and (k, *members). Numbers are scaled before their lengths are computed, so that nothing overflows.
     """
     done, lengths = np.empty_like(vectors), np.empty(vectors.shape[1:])
     with np.errstate(all="ignore"):
@@ -256,7 +255,7 @@ def _orthonormal(vectors: Array) -> tuple[Array, Array]:
 
 
 def _log(x: Array) -> Array:
-    """The logarithm, the same everywhere; of what is no normal number above zero it is not asked."""
+    """The logarithm of positive normal numbers, the same on every machine."""
     ordinary = (x >= np.finfo(np.float64).tiny) & np.isfinite(x)
     with np.errstate(all="ignore"):
         return np.asarray(np.where(ordinary, log(np.where(ordinary, x, 1.0)), np.where(x == 0.0, -np.inf, np.nan)))

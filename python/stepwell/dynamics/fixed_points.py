@@ -1,4 +1,4 @@
-"""``equilibria``: where a system stays, and whether it comes back there."""
+"""``equilibria``: the states at which a system rests, and their stability."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from ..systems import System
 from ..systems.base import a_system
 from .at_state import by_growth, linearised
 
-#: Newton's steps from one start, and halvings of one of them.
+#: The most Newton steps from one start, and the most halvings of one of them.
 MAX_ITERATIONS, MAX_HALVINGS = 100, 30
 
-#: A start has arrived when a whole Newton step changes the state by less than this part of its size.
+#: A start has converged when a whole Newton step changes the state by less than this fraction of its size.
 ARRIVED = 1e-12
 
-#: A start whose Newton step is between this and ``ARRIVED`` has arrived too if no part of it makes the rates smaller: rounding is
-#: all that is left.
+#: A start whose Newton step is between this and ``ARRIVED`` has converged too if no fraction of the step makes the rates smaller:
+#: only rounding is left.
 NEARLY_ARRIVED = 1e-7
 
-#: Two that are nearer than this part of their size are one: far more than rounding, far less than what users tell apart.
+#: Two equilibria nearer than this fraction of their size are one: far more than rounding, far less than users distinguish.
 SAME = 1e-8
 
-#: A singular value of the Jacobian below this part of the largest is zero: the equilibrium is one of a line or a surface of them,
-#: or a double root.
+#: A singular value of the Jacobian below this fraction of the largest counts as zero: the equilibrium is part of a line or
+#: surface of equilibria, or a double root.
 SINGULAR = 1e-10
 
-#: A real part is zero below this part of the fastest rate, beside what rounding makes.
+#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error.
 ZERO_RATE = 1e-9
 
 
@@ -49,14 +49,14 @@ class Equilibrium(Value):
     Attributes:
         v: its velocities, shape (*block).
         y: its coordinates, likewise.
-        residual: the largest rate that is left by rounding.
+        residual: the largest rate there, which rounding leaves.
         eigenvalues: λ of the Jacobian there, shape (n,), the largest real part first: small disturbances grow as e^(λt).
-        kind: what the motion nearby does, by the eigenvalues: "sink" (all disturbances die), "source" (all grow), "saddle" (some
-            grow, some do not), "centre" (all turn, and to first order neither grow nor die), or "not decided" (one neither grows
-            nor turns, or some turn while others die: higher orders decide).
-        isolated: whether there is no other in every neighbourhood; False where the Jacobian is singular.
-        analysis: what a step of the method does there, as ``analyse`` tells it; None if no method was given.
-        starts: numbers of the starts that led here.
+        kind: the motion nearby, by the eigenvalues: "sink" (all disturbances decay), "source" (all grow), "saddle" (some grow,
+            some do not), "centre" (all rotate, and to first order neither grow nor decay), or "not decided" (one neither grows
+            nor rotates, or some rotate while others decay: higher orders decide).
+        isolated: whether some neighbourhood has no other equilibrium; False where the Jacobian is singular.
+        analysis: the result of ``analyse`` for a step of the method there; None if no method was given.
+        starts: numbers of the starts from which it was reached.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Equilibrium(Value):
 
     @property
     def stable(self) -> bool | None:
-        """Whether small disturbances die; None where first order does not say so."""
+        """Whether small disturbances decay; None where first order does not decide it."""
         return {"sink": True, "source": False, "saddle": False}.get(self.kind)
 
     def __repr__(self) -> str:
@@ -89,12 +89,12 @@ class Equilibrium(Value):
 
 
 class Equilibria(Value):
-    """Equilibria that were found, in the order of the starts that led there; a sequence of ``Equilibrium``.
+    """Equilibria that were found, in the order of the starts; a sequence of ``Equilibrium``.
 
     Attributes:
-        system: whose.
-        found: each once.
-        lost: numbers of the starts that led nowhere.
+        system: the system.
+        found: each equilibrium once.
+        lost: numbers of the starts from which none was reached.
     """
 
     def __init__(self, system: System, found: tuple[Equilibrium, ...], lost: tuple[int, ...]) -> None:
@@ -119,20 +119,20 @@ class Equilibria(Value):
 def equilibria(
     system: System, *, near: Any, t: float = 0.0, method: str | Method | None = None, dt: float | None = None
 ) -> Equilibria:
-    """The equilibria to which Newton's method leads from given states, each once, with their stability.
+    """Find the equilibria that Newton's method reaches from given states, each once, with their stability.
 
     The Jacobian is exact, and a step that would make the rates larger is halved until it does not. Where it is singular, the
-    shortest step is taken. Rates that only vanish far away (bodies that part for ever) are not taken for an equilibrium.
+    shortest step is taken. Rates that vanish only at infinity (bodies that separate for ever) are no equilibrium.
 
     Args:
         system: of one member.
-        near: states (v, y) to start from, shapes (*block, *starts); v is None of a system that has no velocities.
-        t: the time at which inputs are held.
+        near: states (v, y) to start from, shapes (*block, *starts); v is None for a system without velocities.
+        t: the time; inputs keep their values at that time.
         method: a method to analyse at each equilibrium, or None.
         dt: its step, in units of time.
 
     Returns:
-        ``Equilibria``: a sequence. An equilibrium that no start leads to is not found, and nobody can say how many there are.
+        ``Equilibria``: a sequence. Equilibria that are reached from no start are not found; how many there are is unknown.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -163,7 +163,7 @@ def equilibria(
     for k in np.flatnonzero(arrived).tolist():
         at = states[:, k]
         for other, own in found:
-            # A coordinate that is 0 but for rounding is as large as those from which it came.
+            # The size of a coordinate that is 0 up to rounding is that of the coordinates at the start.
             size = np.maximum(np.maximum(sizes[:, k], sizes[:, own[0]]), np.minimum(begun[:, k], begun[:, own[0]]))
             if (np.abs(at - other) <= SAME * size).all():
                 own.append(k)
@@ -195,7 +195,7 @@ def _blocks(system: System, states: Array) -> tuple[Array, Array]:
 
 
 def _size(system: System, states: Array) -> Array:
-    """Of each number of states the largest magnitude in its block, shape (n, starts): blocks have units of their own."""
+    """For each number of the states the largest magnitude in its block, shape (n, starts): each block has its own units."""
     n_v = maps.size(system)[0]
     size = np.abs(states)
     for rows in (slice(0, n_v), slice(n_v, None)):
@@ -205,7 +205,7 @@ def _size(system: System, states: Array) -> Array:
 
 
 def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
-    """Where Newton's method leads from each column, and whether it arrived."""
+    """The states that Newton's method reaches from each column, and whether it converged."""
     states = states.copy()
     arrived = np.zeros(states.shape[1], dtype=np.bool_)
     alive = np.ones(states.shape[1], dtype=np.bool_)
@@ -234,7 +234,7 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
 
 
 def _solved(matrix: Array, rates: Array) -> Array:
-    """The shortest x with matrix·x = rates, or nearest to it, for each column."""
+    """The least-squares solution x of matrix·x = rates, the shortest of several, for each column."""
     of_rows, of_columns = _units(matrix)
     stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
     singular = np.linalg.svd(stacked, compute_uv=False)
@@ -246,9 +246,9 @@ def _solved(matrix: Array, rates: Array) -> Array:
 
 
 def _units(matrix: Array) -> tuple[Array, Array]:
-    """What rows, and then columns, are divided by so that the largest element of each is 1: units do not matter then.
+    """Divisors of the rows, and then of the columns, that make the largest element of each 1, so that units do not matter.
 
-    Forces that fade with the distance are small numbers beside the 1 of ẏ = v, and yet not zero.
+    Weak forces at a large distance are small numbers beside the 1 of ẏ = v, but they are not zero.
     """
     of_rows = np.abs(matrix).max(axis=1)
     of_rows = np.where(of_rows > 0.0, of_rows, 1.0)
@@ -257,7 +257,7 @@ def _units(matrix: Array) -> tuple[Array, Array]:
 
 
 def _damped(system: System, at: Array, change: Array, rates: Array, t: float) -> tuple[Array, Any]:
-    """The states after the longest of the step, its half, its quarter, … that makes the rates smaller; and whether one does."""
+    """The states after the longest of the step, its half, its quarter, … that makes the rates smaller; and whether any does."""
     before = np.abs(rates).max(axis=0)
     best, better, share = at.copy(), np.zeros(at.shape[1], dtype=np.bool_), 1.0
     for _ in range(MAX_HALVINGS):
@@ -290,7 +290,7 @@ def _equilibrium(
 
 
 def _kind(matrix: Array, values: Complex) -> str:
-    """What the motion nearby does."""
+    """The kind of the motion nearby."""
     size = np.abs(values).max()
     tolerance = ZERO_RATE * size
     if len(matrix) > 2:

@@ -2,11 +2,11 @@
 
 | file | what it is |
 |---|---|
-| ``definition.py`` | ``stepwell.system``, and what it makes of a function |
+| ``definition.py`` | ``stepwell.system``, and the definition that it returns |
 | ``trace.py`` | runs the function, with symbols or with the numbers of a batch |
-| ``values.py`` | what it is run with: scalars, arrays, comparisons |
-| ``arrays.py`` | what NumPy's functions mean to these |
-| ``namespace.py`` | what the names ``np`` and ``math`` mean within the function |
+| ``values.py`` | its arguments: scalars, arrays, comparisons |
+| ``arrays.py`` | NumPy's functions for these |
+| ``namespace.py`` | the names ``np`` and ``math`` within the function |
 
 The system itself is ``systems/own.py``, its rates in the reference are ``reference/systems/equations.py``.
 """

@@ -1,4 +1,4 @@
-"""What NumPy's functions mean to the values that a user's function is run with."""
+"""NumPy's functions for the values with which a user's function is run."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def elementwise_named(name: str, *given: Any) -> Any:
 
 
 def unknown(name: str) -> TraceError:
-    """There is no such function."""
+    """Raise the error for a function that does not exist."""
     import difflib  # a mistake may take its time
 
     known = sorted({*ELEMENTWISE, *FUNCTIONS, *(each.__name__ for each in MOVING)})
@@ -110,7 +110,7 @@ def _as_operand(x: Any) -> Any:
 
 
 def ufunc_of(ufunc: Any, method: str, given: Any, options: Any) -> Any:
-    """What an element-by-element function of NumPy makes of values."""
+    """The result of an element-by-element function of NumPy."""
     if options:
         raise TraceError(
             f"np.{ufunc.__name__}: {', '.join(options)}= is not known to own equations, and nothing can be written to"
@@ -121,7 +121,7 @@ def ufunc_of(ufunc: Any, method: str, given: Any, options: Any) -> Any:
 
 
 def function_of(function: Any, given: Any, options: Any) -> Any:
-    """What another function of NumPy makes of values."""
+    """The result of another function of NumPy."""
     name = getattr(function, "__name__", str(function))
     if function in MOVING:
         return _moved(function, given, options)
@@ -137,7 +137,7 @@ def function_of(function: Any, given: Any, options: Any) -> Any:
         raise TraceError(f"np.{name}: {error}") from None
 
 
-#: Of these functions those that make an array of a number.
+#: Those of these functions that turn a number into an array.
 _WIDENING = {np.atleast_1d, np.atleast_2d, np.broadcast_to, np.expand_dims, np.repeat, np.tile}
 
 
@@ -189,7 +189,7 @@ def _reduction(name: str) -> Callable[..., Any]:
 
 
 def where(condition: Any, a: Any = None, b: Any = None) -> Any:
-    """One of two values, element by element, as a comparison says."""
+    """One of two values, element by element, chosen by a comparison."""
     if a is None or b is None:
         raise TraceError("np.where: expected a condition and two values, of which one is taken")
     given = [objects(each) for each in (condition, a, b)]
@@ -205,7 +205,7 @@ def where(condition: Any, a: Any = None, b: Any = None) -> Any:
 
 
 def clip(a: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: Any = None) -> Any:
-    """The values, none below the least nor above the most; NaN stays NaN."""
+    """The values limited to a range; NaN stays NaN."""
     least, most = (a_min if min is None else min), (a_max if max is None else max)
     a = a if least is None else elementwise("maximum", functions.maximum, a, least)
     return a if most is None else elementwise("minimum", functions.minimum, a, most)
@@ -319,7 +319,7 @@ FUNCTIONS: dict[str, Any] = {
     "real": lambda a: a,
     "trace": lambda a: reduced("sum", operator.add, np.diagonal(a), None, False),
 } | {name: _reduction(name) for name in ("sum", "prod", "mean", "min", "max", "all", "any")}
-#: What NumPy takes a number for, too, and a function that is written for arrays must not.
+#: Functions that in NumPy also accept a number, and here arrays alone.
 _OF_ARRAYS = {"inner", "vdot", "outer", "diff", "cumsum", "size", "trace", "amin", "amax"}
 FUNCTIONS |= {"amin": FUNCTIONS["min"], "amax": FUNCTIONS["max"]}
 

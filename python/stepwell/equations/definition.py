@@ -18,9 +18,7 @@ from .invariants import Invariant, invariant
 
 
 class Definition:
-    """A kind of system, defined by a function: called with its parameters it gives a ``System``.
-
-    What ``stepwell.system`` returns.
+    """A kind of system, defined by a function; ``stepwell.system`` returns it. Called with parameters it gives a ``System``.
 
     Attributes:
         function: the function.
@@ -29,7 +27,7 @@ class Definition:
         shape: the declared shapes of the blocks v and y; None where the state tells.
         quick_sines: whether sine and cosine are those of the built-in systems.
         parameters: names and defaults.
-        invariants: what was declared constant, by name.
+        invariants: the declared invariants, by name.
     """
 
     def __init__(
@@ -49,14 +47,14 @@ class Definition:
         return self.order == 2 or self.blocks == 2
 
     def __call__(self, /, **given: Any) -> Any:
-        """The system with these parameters; what is not given has its default.
+        """The system with these parameters; others have their defaults.
 
         Args:
-            given: by name: a number, an array over the batch (behind the axes of its own, if the default has some), a
-                ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
+            given: by name: a number, an array over the batch (whose axes come after the parameter's own, if the default has
+                some), a ``Sinusoid``, a ``Sampled``, or a function of the time in NumPy style.
 
         Raises:
-            ArgumentError: if there is no such parameter, or it is no finite number.
+            ArgumentError: if there is no such parameter, or a value is not a finite number.
         """
         from ..systems.own import OwnSystem
 
@@ -67,14 +65,14 @@ class Definition:
         return OwnSystem(self, {**self.parameters, **given})
 
     def invariant(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Declare what is constant in the true motion; a decorator.
+        """Declare a quantity that is constant in the exact solution; a decorator.
 
-        It can then be recorded, charted, and kept by ``Control`` or ``Projection``, by the name of the function. Its gradient is
-        derived.
+        By the name of the function it can then be recorded, charted, and kept constant by ``Control`` or ``Projection``. Its
+        gradient is derived.
 
         Args:
-            function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` of a first-order system, that returns one number;
-                parameters are those of the system, by name. One that is called ``energy`` is what ``run.energy`` shows.
+            function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` for a first-order system, that returns one number;
+                parameters are those of the system, by name. ``run.energy`` is the invariant called ``energy``.
 
         Returns:
             The function.
@@ -98,7 +96,7 @@ class Definition:
         return f"<system {self.name}({', '.join(f'{name}={value!r}' for name, value in self.parameters.items())})>"
 
     def __deepcopy__(self, memo: Any) -> Definition:
-        return self  # nothing of it changes
+        return self  # it is immutable
 
     def __copy__(self) -> Definition:
         return self
@@ -126,7 +124,7 @@ def _found(module: str, name: str) -> Any:
 
 
 def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
-    """Names and defaults of what comes behind the time and the state."""
+    """Names and defaults of the arguments after the time and the state."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
     given = list(inspect.signature(function).parameters.values())
@@ -157,18 +155,18 @@ def system(
 def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False) -> Any:
     """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
 
-    The function is run with values that stand for numbers, and what it does with them is written down; so it is run once for a
-    system and never during a step. It is written for one member: batches come by themselves.
+    The function is run once for a system, with symbols in place of numbers, and its operations are recorded; it is not called
+    during a step. Write it for one member: parameters and states may be batches all the same.
 
     Args:
         function: ``f(t, v, y, *, parameters)`` that returns v̇, while ẏ is v; with ``order=1``, ``f(t, y, *, parameters)`` that
             returns ẏ, as SciPy's ``solve_ivp`` takes it; with ``blocks=2``, ``f(t, v, y, *, parameters)`` that returns the pair
             (v̇, ẏ). v̇ and ẏ have the shapes of v and y. Each parameter has a default. If that is an array, its axes are the
-            parameter's own, and those of a batch come behind them.
+            parameter's own, and batch axes come after them.
         order: 1 or 2.
-        blocks: 2 for a function that gives both rates.
+        blocks: 2 for a function that returns both rates.
         shape: the shape of the state of a member, with None for a length that is open; with ``blocks=2`` a pair of shapes. If it
-            is not given, the state that a run begins with tells: its first axes, as few as the function can do with.
+            is not given, it is taken from the initial state of a run: its first axes, as few as the function accepts.
 
         quick_sines: sine and cosine at half the operations, as the built-in systems have them: right to a unit in the last place
             of 1 for angles up to 10⁶ rad, where the others are right to a unit in their own last place.
@@ -178,7 +176,7 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
 
     Raises:
         ArgumentError: what is wrong with the function's arguments.
-        TraceError: when the system meets its first state: where the function does what cannot be traced, with the line.
+        TraceError: at the first use with a state, if the function does what cannot be traced; the message names the line.
 
     Example:
         >>> import numpy as np, stepwell as sw

@@ -1,4 +1,4 @@
-"""Invariants of own systems: what is constant in the true motion, with its gradient, which is derived from its tape."""
+"""Invariants of users' own systems: quantities that are constant in the exact solution; gradients come from their tapes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Invariant(NamedTuple):
-    """A quantity that is constant in the true motion.
+    """A quantity that is constant in the exact solution.
 
     Attributes:
         name: of the function.
@@ -81,7 +81,7 @@ class Traced:
 
     @cached_property
     def _of_gradient(self) -> Operations:
-        from ..derivatives import gradient  # takes its time, and only gradients need it
+        from ..derivatives import gradient  # slow to import, and only gradients need it
 
         along = gradient(self._tape, self._value, self._state, self._marks)
         square = along[0] * along[0]

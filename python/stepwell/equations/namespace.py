@@ -1,7 +1,8 @@
 """The names ``np`` and ``math`` within a user's function.
 
-NumPy hands most of its functions to values that know them better. ``np.array`` it does not, and ``math`` knows floats alone; so a
-user's function is run with these names meaning what its values need, and so are functions of the same module that it calls.
+Most of NumPy's functions let values of other types define the result. ``np.array`` does not, and ``math`` accepts floats alone.
+So in a user's function, and in functions of the same module that it calls, these names are bound to modules that accept its
+values.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .values import Operators, array
 
 
 def _holds(x: Any) -> bool:
-    """Whether there is a value in it that is not known."""
+    """Whether it contains a value that is not known yet."""
     if isinstance(x, Operators):
         return True
     if isinstance(x, np.ndarray):
@@ -38,7 +39,7 @@ def _asarray(given: Any, *rest: Any, **options: Any) -> Any:
 
 
 class _Module:
-    """A module some of whose names mean something else."""
+    """A module with some names replaced."""
 
     def __init__(self, module: ModuleType, names: dict[str, Any]) -> None:
         self._module, self._names = module, names
@@ -48,7 +49,7 @@ class _Module:
         return names[name] if name in names else getattr(object.__getattribute__(self, "_module"), name)
 
 
-#: Functions of ``math`` that NumPy calls otherwise.
+#: Functions of ``math`` that have another name in NumPy.
 OF_MATH = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power", "fabs": "abs"}
 
 
@@ -75,7 +76,7 @@ _MATH = _Module(
     math,
     {name: _of_math(name, getattr(math, name)) for name in dir(math) if name in ELEMENTWISE or name in OF_MATH},
 )
-#: What names of another meaning stand for.
+#: The modules that replace ``np`` and ``math``.
 _MEANING: dict[int, Any] = {
     id(np): _NUMPY,
     id(math): _MATH,
@@ -85,7 +86,7 @@ _MEANING: dict[int, Any] = {
 
 
 def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
-    """The same function, with ``np`` and ``math`` meaning what its values need; likewise what it calls of its own module."""
+    """The same function with ``np`` and ``math`` replaced, also in the functions of its module that it calls."""
     if not isinstance(function, FunctionType):
         return function
     seen = {} if seen is None else seen
@@ -109,7 +110,7 @@ def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
             names[name] = meant(names[name])
     names["__builtins__"] = builtins
     for cell, old in zip(closure, function.__closure__ or (), strict=True):
-        with suppress(ValueError):  # an empty cell: a name that is bound later
+        with suppress(ValueError):  # an empty cell: the name is bound later
             cell.cell_contents = meant(old.cell_contents)
     return again
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from .definition import Definition
     from .invariants import Invariant, Traced
 
-#: How many lines of an error are looked through for the user's own.
+#: The most lines of a traceback that are searched for the user's own.
 MOST_FRAMES = 200
 
-#: So many characters of a line of the user's file stand in a message.
+#: The most characters of a line of the user's file in a message.
 MOST_OF_A_LINE = 80
 
 
@@ -35,7 +35,7 @@ class Equations:
         definition: the function, of t, v, y (or t and y) and parameters by name, and which rates it gives.
         v_shape: shape of a member's velocity block.
         y_shape: shape of a member's coordinate block.
-        own_shapes: of each parameter the lengths of its own axes; None of one that changes with the time.
+        own_shapes: the lengths of each parameter's own axes; None for a parameter that depends on time.
         kept: the name of the invariant that a control or a projection keeps, or None.
         limited: whether the control is of the limited form.
         pushed: whether there is a control.
@@ -53,7 +53,7 @@ class Equations:
 
     @property
     def shapes(self) -> tuple[Shape, Shape]:
-        """Of both blocks."""
+        """Shapes of both blocks."""
         return self.v_shape, self.y_shape
 
     def batches(self, v: Any, y: Any) -> tuple[Shape, Shape]:
@@ -103,10 +103,10 @@ class Equations:
         return self.definition, self.v_shape, self.y_shape, self.kept, self.limited, self.pushed
 
     def __deepcopy__(self, memo: Any) -> Equations:
-        return self  # nothing of it changes
+        return self  # it is immutable
 
     def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
-        """v̇ and ẏ: of symbols, symbols; of numbers, those of every member. Where ẏ is v, it is not computed."""
+        """v̇ and ẏ: symbols from symbols, arrays over all members from numbers. Where ẏ is v, it is not computed."""
         batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
         with np.errstate(all="ignore"):
             parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
@@ -119,7 +119,7 @@ class Equations:
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
 
     def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
-        """What an invariant is of a state of symbols: one symbol, or a number that is known."""
+        """The value of an invariant for a state of symbols: one symbol, or a known number."""
         state = [_scalars(y, len(self.y_shape))]
         if self.definition.has_v:
             state.insert(0, _scalars(v, len(self.v_shape)))
@@ -160,7 +160,7 @@ class Equations:
             QUICK_SINES.reset(before)
 
     def _checked(self, made: Any) -> tuple[Any, Any]:
-        """The rates of v and of y as objects, or None for what the function does not give."""
+        """The rates of v and of y as objects; None for one that the function does not return."""
         if self.definition.blocks == 2:
             if not isinstance(made, (tuple, list)) or len(made) != 2:
                 raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {_kind(made)}")
@@ -195,7 +195,7 @@ def _scalars(numbers: Any, axes: int) -> Any:
 
 
 def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
-    """What scalars hold, as one array: of objects if they are symbols."""
+    """The values of scalars as one array: of objects if they are symbols."""
     values = [each.value if isinstance(each, Scalar) else each for each in (objects(each)[()] for each in items.flat)]
     if any(hasattr(value, "xor_bits") for value in values):
         made = np.empty(len(values), dtype=object)
@@ -209,7 +209,7 @@ def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
 
 
 def _line_of(error: BaseException, code: Any) -> str:
-    """Where in the file of the function it happened: the last line there."""
+    """Where in the file of the function the error was raised: the last line there."""
     found, frame = None, error.__traceback__
     for _ in range(MOST_FRAMES):
         if frame is None:

@@ -1,8 +1,8 @@
-"""What a user's function is run with: numbers and arrays that stand for those of a state.
+"""The arguments with which a user's function is run, in place of the numbers and arrays of a state.
 
-A ``Scalar`` holds one number: a symbol, which writes the tape of a step, or an array with that number of every member of a batch,
-by which the NumPy reference computes. An ``Array`` holds scalars in a shape. Both do what NumPy's arrays do, one operation
-after the other in a fixed order; what cannot be traced is an error that says what to write instead.
+A ``Scalar`` holds one number: a symbol, which writes the tape of a step, or, for the NumPy reference, an array with that number
+for every member of a batch. An ``Array`` holds scalars in a shape. Both behave like NumPy's arrays, one operation after the
+other in a fixed order; for an operation that cannot be traced, the error says what to write instead.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..reference.functions import operations
 
 
 def of_shape(text: str) -> TraceError:
-    """An error of a function that was run with an array of a wrong shape: another may do."""
+    """A function was run with an array of a wrong shape; another shape may fit."""
     error = TraceError(text)
     error.of_shape = True
     return error
@@ -46,7 +46,7 @@ def _value(x: Any) -> Any:
 
 
 def _mask(x: Any) -> Any:
-    """What a truth holds."""
+    """The value of a truth."""
     if isinstance(x, Truth):
         return x.value
     if isinstance(x, (bool, np.bool_)):
@@ -74,7 +74,7 @@ def elementwise(name: str, function: Callable[..., Any], *given: Any) -> Any:
 
 
 def objects(x: Any) -> Any:
-    """The scalars of anything that has some, as an array of objects; nothing else is changed."""
+    """The scalars of a value as an array of objects; a value without scalars is returned unchanged."""
     if isinstance(x, Array):
         return x.items
     if isinstance(x, (list, tuple)):
@@ -262,11 +262,11 @@ def _equal(a: Any, b: Any) -> Any:
 
 
 def inverted(mask: Any) -> Any:
-    """The opposite of a mask."""
+    """The negation of a mask."""
     return not mask if isinstance(mask, bool) else ~mask
 
 
-#: By NumPy's names. A NaN is unequal to everything, and neither below nor above anything.
+#: Comparisons by NumPy's names. A NaN is unequal to everything, and neither below nor above anything.
 COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     "less": lambda a, b: a < b,
     "less_equal": lambda a, b: a <= b,
@@ -288,7 +288,7 @@ def compared(name: str, a: Any, b: Any) -> Any:
 
 
 class Scalar(Operators):
-    """One number: of the state, a parameter, the time, or what is made of them."""
+    """One number: of the state, a parameter, the time, or computed from them."""
 
     __slots__ = ("value",)
     shape: tuple[int, ...] = ()
@@ -316,7 +316,7 @@ class Scalar(Operators):
 
 
 class Truth(Scalar):
-    """Whether something is so: a comparison. In arithmetic it is 1 or 0, as in NumPy."""
+    """The truth of a comparison. In arithmetic it is 1 or 0, as in NumPy."""
 
     __slots__ = ()
 
@@ -338,7 +338,7 @@ class Truth(Scalar):
         if isinstance(other, Array):
             return NotImplemented
         other = _mask(other)
-        if isinstance(other, bool):  # a mask of symbols knows no booleans
+        if isinstance(other, bool):  # a mask of symbols cannot be combined with booleans
             both = self.value if other else False
             either = True if other else self.value
             return Truth(both if sign == "&" else either)
@@ -377,7 +377,7 @@ class Array(Operators):
 
     @property
     def dtype(self) -> np.dtype[np.float64]:
-        """That of its numbers, once there are any."""
+        """The data type of its numbers, float64."""
         return np.dtype(np.float64)
 
     @property

@@ -1,4 +1,4 @@
-"""What a step is: every operation with names, what is computed how often, and the machine code that it becomes.
+"""Explains a step: every operation by name, how often it is computed, and the machine code.
 
 ``formula`` writes operations as text, ``listing`` makes lines of a tape, ``beside`` of what is made beside the steps,
 ``result`` holds and tells what was found.
@@ -39,11 +39,11 @@ def explain(
     start: str | None = None,
     record: str | Sequence[str] | None = (),
 ) -> Explanation:
-    """What a step of a system by a method computes, and what it becomes on this machine.
+    """Explain what a step of a system by a method computes, and its machine code on this machine.
 
-    ``print`` it for a listing: each value with its formula, by how often it is computed; the numbers of operations; the machine
-    code, or why the step is interpreted. In a notebook it is a table. Numbers of parameters and the step's length do not matter,
-    only which of them members have in common: those are computed with once a run instead of once a member.
+    ``print`` the result for a listing: each value with its formula, grouped by how often it is computed; the numbers of
+    operations; the machine code, or why the step is interpreted. In a notebook it is a table. The values of parameters and the
+    length of the step do not matter, only which parameters all members share: those are used once a run instead of once a member.
 
     ::
 
@@ -55,11 +55,11 @@ def explain(
           y' = y + Φ·v'
 
     Args:
-        system: what to step. The arguments that are arrays over its batch are each member's own.
+        system: the system to step. Arguments that are arrays over its batch differ from member to member.
         method: its name, or what ``stepwell.method`` returns.
-        members: how many trajectories go together, a multiple of the system's batch; if None as many as that, or one. Machine
-            code for many is other than that for one.
-        control: what keeps the energy, as ``integrate`` takes it.
+        members: number of trajectories in the batch, a multiple of the system's batch; if None that of the batch, or one. The
+            machine code for many differs from that for one.
+        control: an ``EnergyControl`` or a ``Projection``, as ``integrate`` takes it.
         fused: with fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as ``integrate`` takes it.
         attempt: an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with what decides on the next
             one.
@@ -74,7 +74,7 @@ def explain(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
     """
     how, system = find_method(method), a_system(system).sized()
     fits_together(system, how)

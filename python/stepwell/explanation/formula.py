@@ -19,7 +19,7 @@ ALL_BITS = 2**64 - 1
 
 
 class Formula(NamedTuple):
-    """A text, what it does last, whether it is the truth of a comparison, whether it is bits where these are no numbers."""
+    """A text, its last operation, whether it is the truth of a comparison, and whether it is bits and not a number."""
 
     text: str
     holds: int = ATOM
@@ -111,11 +111,11 @@ def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | N
 
 
 class Notation:
-    """How values are written: here for people, elsewhere as a language has it.
+    """How values are written: here for people, in subclasses in a language.
 
     Attributes:
         longest: characters of a line, its name not counted, beyond which it becomes several.
-        called: functions of one number that may stand in the place of their operations, by name.
+        called: functions of one number that are written by name in place of their operations.
     """
 
     longest = 72

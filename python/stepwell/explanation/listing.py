@@ -1,9 +1,9 @@
 """The operations of a step as lines, with a name and a formula each.
 
-What is used once stands in the formula that uses it, as long as a line stays short. A value that has a name in the text of the
-method has it here: ``dv1``, ``dy1`` the first increments of a step, ``v2``, ``y2`` the state at which the second are asked for,
-``v'``, ``y'`` the next state. Others are numbered: ``c1`` is computed before the steps, ``s1`` once a step, ``a1`` by every
-member in every step.
+A value that is used once is written in the formula that uses it, as long as the line stays short. A value that has a name in the
+text of the method has it here: ``dv1``, ``dy1`` the first increments of a step, ``v2``, ``y2`` the state of the second
+evaluation, ``v'``, ``y'`` the next state. Others are numbered: ``c1`` is computed before the steps, ``s1`` once a step, ``a1`` by
+every member in every step.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
 #: Characters of an increment of its own line; shorter ones stand where they are used.
 SHORT = 12
 
-#: Of each operation that counts, its kind. Changes of sign, copies and samples that are looked up are no arithmetic.
+#: The kind of each operation that is counted. Changes of sign, copies and the lookup of samples are not arithmetic.
 KINDS = {
     "add": "additions",
     "subtract": "additions",
@@ -41,7 +41,7 @@ KINDS = {
     **dict.fromkeys(("and", "or", "exclusive or", "add bits", "shift up", "shift down", "floor"), "bits"),
 }
 
-#: What a value of a body is made of: names of operations, operands, what else is given; and the places of what comes of it.
+#: A body: names of operations, their operands and other arguments; and the indices of the results.
 Body = tuple[list[tuple[str, list[int], int]], list[int]]
 
 
@@ -88,7 +88,7 @@ class Named(Tracer):
         self._length: Any = None
 
     def scaled(self, h: Any) -> Any:
-        """The system, which notes what it is asked for."""
+        """The system, which records its evaluations."""
         s, counts = super().scaled(h), Counter[str]()
 
         def noting(which: str, rate: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
@@ -289,7 +289,7 @@ class Writer:
         letter: str,
         results: Sequence[str] | None = None,
     ) -> tuple[Section, list[Leaf]]:
-        """A body as a section, and what comes of it, which has the names ``results`` if there are any, and else the letter's."""
+        """A body as a section, with its results, which are named by ``results`` if given, and else by the letter."""
         operations, places = body
         reads = Counter(place for _, of, _ in operations for place in of)
         wanted = {

@@ -1,4 +1,4 @@
-"""What is said of a step, as text, as a table of a notebook, and as JSON."""
+"""The explanation of a step, as text, as a table of a notebook, and as JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..methods import Method
 from ..systems import System
 from .listing import Section
 
-#: How often, in words; of what all members have in common it is said if there are several.
+#: How often, in words; the part about members is used if there are several.
 WHEN = {
     "run": "once a run",
     "member": "once a run, for each member",
@@ -37,16 +37,16 @@ PARTS = {
 
 @dataclass(frozen=True)
 class MachineCode:
-    """What a step becomes on a CPU.
+    """The machine code of a step.
 
     Attributes:
         size: its length in bytes.
-        width: how many numbers are in a vector, one for each member.
-        vectors: how many vectors a turn of the loop steps.
-        turns: how many turns step a tile, the members that go together.
-        resident: whether the state stays in registers over all steps of a turn; else it is read and written in each step.
-        registers: how many vector registers there are.
-        spills: how many values are kept beside the registers at most, because these do not suffice.
+        width: numbers in a vector, one for each member.
+        vectors: vectors that one iteration of the loop steps.
+        turns: iterations for a tile, the members that are stepped together.
+        resident: whether the state stays in registers over all steps of an iteration; else it is loaded and stored in each step.
+        registers: vector registers of the CPU.
+        spills: the most values that are kept in memory at once because there are not enough registers.
     """
 
     size: int
@@ -60,13 +60,13 @@ class MachineCode:
 
 @dataclass(frozen=True, eq=False)
 class Explanation(Value):
-    """What a step computes, and what it becomes on this machine. ``print`` it.
+    """The operations of a step and its machine code on this machine. ``print`` it.
 
     Attributes:
-        system: what is stepped, with its control.
-        method: by what.
-        members: how many trajectories.
-        fused: whether with fused multiply-adds.
+        system: the system, with its control.
+        method: the method.
+        members: number of trajectories.
+        fused: whether it uses fused multiply-adds.
         attempt: whether it is an attempt at an adaptive step.
         form: ``"direct"`` or ``"matrix"``.
         sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
@@ -203,7 +203,7 @@ class Explanation(Value):
             if any(_names(name, each) for each in text):
                 shown.append(meaning if name in ("fma", "v2", "P", "s") else f"{name}: {meaning}")
         if self.method.carry:
-            shown.append(f"{self.method.carry}: what stands in the place of v between steps")
+            shown.append(f"{self.method.carry}: what is carried in place of v between steps")
         return [f"Here {'; '.join(shown)}."] if shown else []
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""A step in the source code of another language, to be taken along into an engine.
+"""A step as source code of another language, for use in an engine.
 
-``tapes`` traces a step and cuts it, ``names`` gives names that a language takes, ``written`` puts both into the words of a
-``language``, of which there is a file each; ``result`` holds what comes of it.
+``tapes`` traces a step and splits it, ``names`` makes names that a language accepts, ``written`` writes both in a ``language``,
+of which there is a file each; ``result`` holds the text.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ def export(
     fused: bool = False,
     name: str | None = None,
 ) -> ExportedStep:
-    """A step of a system by a method as source code: one file that needs nothing else.
+    """A step of a system by a method as source code: one file without dependencies.
 
-    The file has a structure of the parameters, which may be changed there, a structure of the state, and functions: what is made
-    of the parameters before the steps, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``,
+    The file has a structure of the parameters, which may be changed there, a structure of the state, and functions: preparation
+    from the parameters, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``,
     to the last bit.
 
     ::
@@ -65,24 +65,24 @@ def export(
         system: what to step, one trajectory.
         method: its name, or what ``stepwell.method`` returns.
         language: ``"c"`` (C99), ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
-        dt: the step with which the file begins, in units of time; it may be changed there, as the parameters may.
+        dt: the initial value of the step in the file, in units of time; it may be changed there, as the parameters may.
         t0: the time of step 0, likewise.
         v: velocities of the example at the head of the file, shape (*block); zero if None. A control without a target keeps the
             energy of v and y.
         y: coordinates of the example, likewise; 1, 2, 3, … if None.
         member: which trajectory of a batch, by its index, or a tuple of one index for each axis of the batch.
         start: how a method with a choice starts; see ``method(…).starts``.
-        control: what keeps the energy, as ``integrate`` takes it.
-        fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has from 3.13 on.
-        name: what functions and types are called, or begin with; made of the system and the method if None.
+        control: the control of the energy, as in ``integrate``.
+        fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has them from 3.13 on.
+        name: the name of functions and types, or its beginning; from the system and the method if None.
 
     Returns:
         An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, if the language has no fused multiply-add, or if the step has so
-            many operations that they are not written out one by one.
+        UnsupportedError: if the method cannot do the system, if the language has no fused multiply-add, or if the step has
+            too many operations to be written out one by one.
     """
     how = find_method(method)
     system = a_system(system)

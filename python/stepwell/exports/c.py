@@ -133,7 +133,7 @@ class C(Language):
         ]
 
     def file(self, w: Written, head: list[str]) -> str:
-        """All of it, behind the comment at the head."""
+        """The whole text after the comment at the head."""
         parts = [self._structures(w), *self._tables(w), self._prepare(w), self._defaults(w), self._start(w), self._step(w)]
         if w.carries:
             parts.append(self._finish(w))
@@ -197,9 +197,7 @@ class C(Language):
         if start:
             lines += [
                 "",
-                *self.body(
-                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"}, "What stands in the place of v."
-                ),
+                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s->{w.slot}"}, "The carry, in place of v."),
             ]
         if not (start and start.needs_fields):
             lines.insert(0, "(void)m;")

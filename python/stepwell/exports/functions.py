@@ -1,4 +1,4 @@
-"""Functions of one number, found again among the operations that became of them, so that a file may call them by name."""
+"""Functions of one number, recognised by their operations, so that a file can call them by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..explanation.listing import Body
 from ..reference import log, trig
 from ..reference.fused import COMMUTE
 
-#: What each is called in a file.
+#: Their names in a file.
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {"sine": trig.sin, "cosine": trig.cos, "logarithm": log.log}
 
 Operation = tuple[str, tuple[int, ...], int]
@@ -19,13 +19,13 @@ Operation = tuple[str, tuple[int, ...], int]
 
 @cache
 def operations_of(function: str) -> Body:
-    """What a function of one number does to it, which is the state 0."""
+    """The operations of a function of one number, which is the state 0."""
     tape = _core.Tape()
     return tape.operations([FUNCTIONS[function](tape.state(0))])
 
 
 def argument(function: str, operations: Sequence[Operation], line: int) -> int | None:
-    """Of what this line is the function, or None if it is not."""
+    """The argument if this line is a value of the function, else None."""
     pattern, (root,) = operations_of(function)
     found: dict[int, int] = {}
 
@@ -52,7 +52,7 @@ def argument(function: str, operations: Sequence[Operation], line: int) -> int |
 
 
 def named(operations: list[Operation]) -> None:
-    """Put names in the place of functions; what they were made of is left where it is."""
+    """Replace functions by calls; operations that are then unused are left where they are."""
     roots = {function: operations_of(function) for function in FUNCTIONS}
     kinds = {function: body[0][body[1][0]][0] for function, body in roots.items()}
     for line in range(len(operations) - 1, -1, -1):

@@ -1,4 +1,4 @@
-"""What stands at the head of a file: what it is, how to call it, an example."""
+"""The comment at the head of a file: what it is, how to call it, an example."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STEPS = 1000
 #: Characters of the system's repr.
 MAX_SYSTEM = 400
 
-#: What the example begins with, by which it is found in the comment.
+#: The first line of the example, by which it is found in the comment.
 EXAMPLE = "Example:"
 
 
@@ -46,7 +46,7 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
 
 
 def _layout(name: str, shape: Shape) -> str:
-    """How the numbers of a block follow each other."""
+    """The order of the numbers of a block."""
     if not shape:
         return f"{name}[1]"
     size = 1

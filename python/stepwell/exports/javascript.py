@@ -114,7 +114,7 @@ class JavaScript(Language):
         ]
 
     def file(self, w: Written, head: list[str]) -> str:
-        """All of it, behind the comment at the head."""
+        """The whole text after the comment at the head."""
         parts = [self._prepare(w), self._start(w), self._step(w)]
         if w.carries:
             parts.append(self._finish(w))
@@ -166,9 +166,7 @@ class JavaScript(Language):
         if start:
             lines += [
                 "",
-                *self.body(
-                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
-                ),
+                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
             ]
         lines += ["return s;"]
         about = "// The state at step 0, of velocities and coordinates."

@@ -1,7 +1,7 @@
-"""Operations as a language writes them: what all have in common.
+"""Operations as a language writes them: the part that all languages share.
 
-A value is a number, a truth, or bits (a whole number of 64 bits). Numbers become bits, and bits numbers, by functions that stand
-in the file: numbers whose bits are those of a NaN would not come through everywhere unchanged.
+A value is a number, a truth, or bits (a 64-bit integer). Functions in the file convert numbers to bits and bits to numbers. Bits
+are never kept as a number, since not every language would preserve the bits of a NaN.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 #: Characters of a line of numbers.
 WIDTH = 100
 
-#: What makes numbers.
+#: Operations whose result is a number.
 ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
 
 #: Operations that become calls of functions on bits.
 BIT_FUNCTIONS = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}
 BIT_FUNCTIONS |= {"shift up": "shift_up", "shift down": "shift_down"}
 
-#: The last bit of a number, put where its sign is: what turns the sign of a sine.
+#: The shift that moves the last bit of a number to its sign: it sets the sign of a sine.
 LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), 63\)")
 
 
@@ -44,8 +44,8 @@ class Assignment(NamedTuple):
         name: as it is used.
         kind: "number", "truth" or "bits".
         text: its formula.
-        note: what it is in the method, where its name does not say so.
-        evaluation: of which evaluation of the rates it is known to be, counted from 1; 0 where that is not known.
+        note: its meaning in the method, if the name does not say it.
+        evaluation: the rate evaluation to which it belongs, counted from 1; 0 if that is not known.
     """
 
     name: str
@@ -64,15 +64,15 @@ class Place(NamedTuple):
 
 
 class Function(NamedTuple):
-    """What a function does.
+    """The contents of a function.
 
     Attributes:
         reads: the numbers of the state that it needs.
         needs_time: whether it needs the time.
-        needs_fields: whether it reads parameters, or what is made of them.
-        of_time: what depends on the time alone.
-        lines: what depends on the state.
-        writes: the numbers that it makes.
+        needs_fields: whether it reads parameters or values computed from them.
+        of_time: the values that depend on the time alone.
+        lines: the values that depend on the state.
+        writes: the numbers that it writes.
     """
 
     reads: list[Place]
@@ -88,8 +88,8 @@ class Language(Notation, ABC):
 
     Attributes:
         title: the language's name.
-        endings: those of its files.
-        comment: what begins a comment.
+        endings: endings of its files.
+        comment: the beginning of a comment.
         helpers: the text of each function that a file may need.
         kinds: of each value with a name of its own, as it is used: "number", "truth" or "bits".
     """
@@ -105,11 +105,11 @@ class Language(Notation, ABC):
     floor: ClassVar[str]
     fma: ClassVar[str | None]
     bits_literal: ClassVar[str]
-    #: What is written before a field and a parameter.
+    #: The prefix of a field and a parameter.
     me: ClassVar[str]
-    #: What ends a statement.
+    #: The end of a statement.
     end: ClassVar[str] = ";"
-    #: The time of the step that a state is at.
+    #: The expression for the time of the present step.
     time: ClassVar[str]
     tables: list[Table]
     longest = 88
@@ -119,12 +119,12 @@ class Language(Notation, ABC):
         self.prefix, self.fields = prefix, fields
         self.names = Names()
         self.kinds: dict[str, str] = {}
-        self.before = False  # whether what is written is made before the steps, and kept in fields
+        self.before = False  # whether values are computed before the steps and kept in fields
 
     # ---- values
 
     def number(self, bits: int) -> Formula:
-        """A constant; one that is no number is made of its bits."""
+        """A constant; one that is not finite is made from its bits."""
         (x,) = struct.unpack("<d", struct.pack("<Q", bits))
         if x != x:
             return Formula(self.call("number_of", self.whole(bits)))
@@ -146,11 +146,11 @@ class Language(Notation, ABC):
         return Formula(word, is_truth=value.is_truth, is_bits=value.is_bits)
 
     def call(self, helper: str, *of: str) -> str:
-        """A call of a function that stands in the file."""
+        """A call of a function in the file."""
         return f"{self.helper(helper)}({', '.join(of)})"
 
     def helper(self, name: str) -> str:
-        """What such a function is called."""
+        """The name of such a function."""
         return name
 
     def as_number(self, value: Formula) -> Formula:
@@ -238,7 +238,7 @@ class Language(Notation, ABC):
         )
         if name == "and":
             return Formula(f"{a.within(NOT)} {both} {b.within(NOT)}", BOTH, True)
-        if name == "or":  # compilers want parentheses round what is and in or
+        if name == "or":  # compilers warn unless an `and` inside an `or` has parentheses
             return Formula(f"{a.within(NOT)} {either} {b.within(NOT)}", EITHER, True)
         if ALL_BITS in bits:
             text = f"{negation}{(b if bits[0] is not None else a).within(ATOM)}"
@@ -303,7 +303,7 @@ class Language(Notation, ABC):
     def body(
         self, f: Function, read: Mapping[str, str], write: Mapping[str, str], after: str = "The state after the step."
     ) -> list[str]:
-        """What is in a function, not indented: where each block is read and written, and what is said of what is written."""
+        """The body of a function, not indented: where each block is read and written, and a comment."""
 
         def place(block: str, index: int, of: Mapping[str, str]) -> str:
             return of[block] if index < 0 else f"{of[block]}[{index}]"
@@ -345,11 +345,11 @@ class Language(Notation, ABC):
 
     @abstractmethod
     def file(self, w: Written, head: list[str]) -> str:
-        """All of it, behind the comment at the head."""
+        """The whole text after the comment at the head."""
 
 
 def indented(lines: Iterable[str], by: str = "    ") -> list[str]:
-    """Lines that are no further to the left than this."""
+    """Lines indented by at least this much."""
     return [by + line if line else "" for line in lines]
 
 
@@ -367,6 +367,6 @@ def listed(begin: str, items: Sequence[str], end: str, indent: str) -> list[str]
 
 
 def printable(line: str) -> str:
-    """What ends no comment and joins no lines."""
+    """A text that does not end a comment or join lines."""
     line = "".join(letter if letter.isprintable() else " " for letter in line)
     return line.replace("*/", "* /").replace("??", "? ?").rstrip("\\ ")

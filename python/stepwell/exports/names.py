@@ -1,4 +1,4 @@
-"""Names of values as names that every language takes: ``v'[0,1]`` is ``next_v_0_1``, ``Φ`` is ``phi``."""
+"""Names of values as names that every language accepts: ``v'[0,1]`` is ``next_v_0_1``, ``Φ`` is ``phi``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ abs acos asin atan ceil cos errno exp f floor fma fmod i inf isnan log m math me
 stdout stderr strlen struct tan time u64
 """
 
-#: Names of types as they are written in languages that begin them with a capital, which would hide what a file uses.
+#: Names of types that a file uses, in languages whose types begin with a capital: others must not hide them.
 TYPES = """
 Array ArrayBuffer BigInt BigInt64Array BigUint64Array Box Boolean Clone Copy Debug Default Error Float64Array Function Infinity
 Math NaN Number Object Option Range RangeError Result Self String Symbol TypeError ImportError ValueError Vec None True False
@@ -34,7 +34,7 @@ Math NaN Number Object Option Range RangeError Result Self String Symbol TypeErr
 
 RESERVED, HIDING = frozenset(WORDS.split()), frozenset(TYPES.split())
 
-#: Letters of names that other alphabets have.
+#: Letters of other alphabets, spelled out.
 LETTERS = {
     "Φ": "phi",
     "Ψ": "psi",
@@ -62,7 +62,7 @@ class Names:
         self._of: dict[str, str] = {}
 
     def __call__(self, name: str, key: str = "") -> str:
-        """The name of a value, always the same of the same; ``key`` tells it from others that would have that name."""
+        """The name of a value, always the same for the same value; ``key`` distinguishes it from others of that name."""
         if (key := key or name) not in self._of:
             word = plain(name)
             while word in self._taken or word in RESERVED:
@@ -94,7 +94,7 @@ def camel(name: str) -> str:
 
 
 def prefix(name: object) -> str:
-    """Return the argument ``name`` if functions and types can be called so.
+    """Return the argument ``name`` if functions and types can have that name.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -132,7 +132,7 @@ class Field(NamedTuple):
 def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tuple[list[Field], dict[int, tuple[str, Shape]]]:
     """Parameters that are used as fields, those of one array together; and of each parameter its field and its place there."""
     found = [ELEMENT.fullmatch(name) for name, _ in numbers]
-    # x[0] beside x[1].amplitude is a number by itself.
+    # If x[1].amplitude exists, x[0] is not an element of an array.
     alone = {name.partition("[")[0] for name, _ in numbers if "]." in name} | {name for name, _ in numbers if "[" not in name}
     groups: dict[str, list[int]] = {}
     for i, (name, _) in enumerate(numbers):

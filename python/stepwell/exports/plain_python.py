@@ -147,7 +147,7 @@ class Python(Language):
         ]
 
     def file(self, w: Written, head: list[str]) -> str:
-        """All of it, behind the comment at the head."""
+        """The whole text after the comment at the head."""
         p = camel(self.prefix)
         parts = [self._init(w), self._prepare(w), self._start(w), self._step(w)]
         if w.carries:
@@ -209,9 +209,7 @@ class Python(Language):
         if start:
             lines += [
                 "",
-                *self.body(
-                    start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "What stands in the place of v."
-                ),
+                *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
             ]
         return [f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])]
 

@@ -1,4 +1,4 @@
-"""A step that was exported: its text, and how to keep it."""
+"""An exported step: its text, and how to save it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ..systems import System
 
 @dataclass(frozen=True, eq=False)
 class ExportedStep(Value):
-    """A step in the source code of another language. ``print`` it, or ``save`` it.
+    """A step as source code of another language. ``print`` it, or ``save`` it.
 
     Attributes:
         source: the text of the file.
-        name: what its functions and types are called, or begin with.
+        name: the name of its functions and types, or its beginning.
         language: the language's name.
-        endings: how a file of it may end.
-        system: what is stepped, with its control.
-        method: by what.
+        endings: the endings that its file may have.
+        system: the system, with its control.
+        method: the method.
         member: which trajectory of the system's batch.
-        fused: whether with fused multiply-adds.
-        operations: how many operations are written out, those before the steps included.
+        fused: whether it uses fused multiply-adds.
+        operations: how many operations are written out, including those before the steps.
     """
 
     source: str
@@ -44,7 +44,7 @@ class ExportedStep(Value):
         """Write the file.
 
         Args:
-            path: where; it ends as files of the language do.
+            path: the file; its ending must be one of the language.
 
         Returns:
             The path.
@@ -57,7 +57,7 @@ class ExportedStep(Value):
         return place
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it as numbers and texts."""
+        """Its attributes as numbers and texts."""
         held = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return held | {"system": repr(self.system), "method": self.method.name}
 

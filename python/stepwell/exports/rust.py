@@ -108,7 +108,7 @@ class Rust(Language):
         ]
 
     def file(self, w: Written, head: list[str]) -> str:
-        """All of it, behind the comment at the head."""
+        """The whole text after the comment at the head."""
         p = camel(self.prefix)
         methods = [self._new(w), self._prepare(w), self._start(w), self._step(w)]
         if w.carries:
@@ -173,7 +173,7 @@ class Rust(Language):
             write = {w.slot: f"s.{w.slot}"}
             lines = [
                 f"let mut s = {state};",
-                *self.body(start, {"v": "velocities", "y": "coordinates"}, write, "What stands in the place of v."),
+                *self.body(start, {"v": "velocities", "y": "coordinates"}, write, "The carry, in place of v."),
                 "s",
             ]
         else:

@@ -1,4 +1,4 @@
-"""The operations of a step, and of what a method does before and after the steps, cut by how often their values change."""
+"""The operations of a step, and of a method's start and finish, split by how often their values change."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from ..reference.signal import Held
 from ..systems.base import aligned
 from .functions import named
 
-#: The most operations that are written out one by one; a longer text is of no use to compilers, nor to people.
+#: The most operations that are written out one by one; a longer text is too long for compilers and for people.
 MAX_OPERATIONS = 20_000
 
 #: How often a value changes: never, once a run, once a step by the time alone, with the state.
 NEVER, RUN, STEP, STATE = range(4)
 
-#: Operations whose value is no number but bits or a truth, which a state or a field of it cannot be.
+#: Operations whose value is bits or a truth and not a number, so that it cannot be part of a state or a field.
 NO_NUMBER = ("less", "at most", "equal", "and", "or", "exclusive or", "add bits", "shift up", "shift down")
 
 
 class Part(NamedTuple):
-    """A function of the state: the step, or what makes and reads what a method carries.
+    """A function of the state: the step, or a method's start or finish.
 
     Attributes:
-        tape: where it was traced.
-        names: what values on that tape are called, by their numbers there.
-        roots: the values that it makes, by their numbers among all operations.
-        inputs: what the numbers of the state before are called.
-        results: what the values that it makes are called.
+        tape: the tape on which it was traced.
+        names: names of values on that tape, by their numbers there.
+        roots: the values that it computes, by their numbers among all operations.
+        inputs: names of the numbers of the state before.
+        results: names of the values that it computes.
     """
 
     tape: Any
@@ -57,7 +57,7 @@ class Operations:
     """Operations of several functions in one list, each once.
 
     Attributes:
-        all: name, operands, what else is given; operands come first.
+        all: name, operands and other arguments of each; operands come before the operations that use them.
         rank: how often the value of each changes.
     """
 
@@ -67,7 +67,7 @@ class Operations:
         self._places: dict[tuple[str, tuple[int, ...], int], int] = {}
 
     def add(self, operations: Sequence[tuple[str, Sequence[int], int]], roots: Sequence[int]) -> list[int]:
-        """Take in operations; what comes back are the roots' numbers here."""
+        """Add operations; returns the numbers of the roots here."""
         place: list[int] = []
         for name, of, given in operations:
             key = name, tuple(place[each] for each in of), given
@@ -80,7 +80,7 @@ class Operations:
         return [place[each] for each in roots]
 
     def needed(self, roots: Sequence[int], stop: Callable[[int], bool]) -> list[int]:
-        """What these values are made of, in order, down to those at which to stop, which are among them."""
+        """The operations of which these values are computed, in order, back to and including those at which to stop."""
         found: set[int] = set()
         waiting = list(roots)
         while waiting:
@@ -92,16 +92,16 @@ class Operations:
         return sorted(found)
 
     def kept(self, parts: Sequence[Part]) -> list[int]:
-        """What is computed before the steps and read in them."""
+        """Values that are computed before the steps and read in them."""
         roots = [each for part in parts for each in part.roots]
         above = [each for each in self.needed(roots, lambda line: self.rank[line] <= RUN) if self.rank[each] > RUN]
         read = {each for line in above for each in self.all[line][1]} | set(roots)
         return sorted(each for each in read if self.rank[each] == RUN and self.all[each][1])
 
     def body(self, roots: Sequence[int], leaves: dict[int, tuple[str, int]], *, separate: bool) -> Body:
-        """What makes these values, as a body, of leaves that are there: for each line how it is asked for.
+        """The body that computes these values from given leaves, by line.
 
-        If ``separate``, each value has a place of its own, and one that is a number.
+        If ``separate``, each value has a place of its own, which holds a number.
         """
         needed = self.needed(roots, leaves.__contains__)
         place = {line: i for i, line in enumerate(needed)}
@@ -125,10 +125,10 @@ class Traced:
 
     Attributes:
         operations: those of all its functions.
-        parts: its functions, by name: "step", and "start" and "finish" of a method that carries something else than v.
-        numbers: what each parameter is called, with its value, in the tape's order.
+        parts: its functions, by name: "step", and "start" and "finish" for a method that carries something other than v.
+        numbers: name and value of each parameter, in the tape's order.
         tables: the sampled inputs.
-        count: how many operations of arithmetic there are in a step, those that are made before it included.
+        count: the number of arithmetic operations of a step, including those before the steps.
     """
 
     def __init__(self, plan: engine.Plan, member: Shape) -> None:
@@ -136,7 +136,7 @@ class Traced:
         model = engine.model(plan)
         _core.check(model)
         parts = _core.in_parts(engine.model(plan._replace(fused=False)), 1)
-        if parts is not None and parts[1] > 4 * MAX_OPERATIONS:  # an estimate, which is too high for short methods
+        if parts is not None and parts[1] > 4 * MAX_OPERATIONS:  # an estimate, too high for short methods
             raise too_long(plan, f"about {parts[1]}")
         self.operations = Operations()
         self.parts: dict[str, Part] = {}
@@ -147,7 +147,7 @@ class Traced:
         self.count = sum(bool(of) for _, of, _ in self.operations.all)
         if self.count > MAX_OPERATIONS:
             raise too_long(plan, str(self.count))
-        if not plan.fused:  # else their products went into the sums around them
+        if not plan.fused:  # else their products would be fused with the sums around them
             named(self.operations.all)
         names, tables = parameters(plan)
 
@@ -180,7 +180,7 @@ class Traced:
         return Part(tape, tracer.names, self.operations.add(told, roots), inputs, results), tracer
 
 
-#: What a control or a projection has added up.
+#: The sum that a control or a projection accumulates.
 TALLY = "tally"
 
 
@@ -195,7 +195,7 @@ def _fused(tape: Any, symbols: list[Any]) -> Any:
 
 
 def too_long(plan: engine.Plan, count: str) -> UnsupportedError:
-    """What is said of a step that is not written out."""
+    """The error for a step that is not written out."""
     return UnsupportedError(
         f"system: a step of {_checks.short(plan.system)} by {plan.method.name} has {count} operations, and at most "
         f"{MAX_OPERATIONS} are written out; export a smaller system"

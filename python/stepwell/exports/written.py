@@ -1,4 +1,4 @@
-"""What a file says, in the words of its language but not yet in its order: fields, what is made before the steps, functions."""
+"""The contents of a file in its language, not yet in its order: fields, values computed before the steps, functions."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from .language import Assignment, Function, Language, Place
 from .names import Field, Names, fields
 from .tapes import STATE, STEP, TALLY, Operations, Part, Traced
 
-#: What is already called something in a function: its arguments and the time.
+#: Names in use in a function: its arguments and the time.
 LOCALS = ("m", "s", "t", "self", "coordinates", "velocities")
 
 #: Names that fields may not have, because something else of the object has them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
 
 
-#: What is named after an evaluation of the rates: the state at which it is made, and the increments.
+#: Values that are named after a rate evaluation: the state at which it is made, and the increments.
 EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
 
 class Table(NamedTuple):
-    """A sampled input: what its samples are called, where the first is in time, and how far the next."""
+    """A sampled input: the name of its samples, the time of the first, and the interval to the next."""
 
     name: str
     about: str
@@ -35,17 +35,17 @@ class Table(NamedTuple):
 
 
 class Written:
-    """All that a file says.
+    """The contents of a file.
 
     Attributes:
         parameters: the fields that users may change, dt and t0 first.
-        made: what is made of them before the steps.
-        functions: "step", and "start" and "finish" of a method that carries something else than v.
+        made: values computed from them before the steps.
+        functions: "step", and "start" and "finish" for a method that carries something other than v.
         tables: the sampled inputs.
-        slot: what the first block of a state is called.
-        n_v: how many numbers it has.
-        n_y: how many the second has.
-        evaluations: how often a step adds to the tally of a control; 0 without one.
+        slot: the name of the first block of a state.
+        n_v: the number of numbers in it.
+        n_y: the number of numbers in the second.
+        evaluations: how many times a step adds to the sum of a control; 0 without one.
     """
 
     def __init__(self, traced: Traced, language: Language) -> None:
@@ -76,12 +76,12 @@ class Written:
 
     @property
     def carries(self) -> bool:
-        """Whether something else than v is in the place of v."""
+        """Whether the method carries something other than v."""
         return self.slot != "v"
 
     @property
     def blocks(self) -> list[tuple[str, str, int]]:
-        """Of each block that is not empty: what it is called, what its velocities or coordinates are called, its length."""
+        """For each block that is not empty: its name, the name of its velocities or coordinates, its length."""
         both = [(self.slot, "velocities", self.n_v), ("y", "coordinates", self.n_y)]
         return [each for each in both if each[2]]
 
@@ -103,7 +103,7 @@ class Written:
     # ---- parts
 
     def _prepared(self, operations: Operations, kept: list[int]) -> tuple[list[Assignment], list[Leaf]]:
-        """What is made before the steps, with how each is read afterwards."""
+        """The values computed before the steps, and how each is read in them."""
         tape, names = next((part.tape, dict(part.names)) for part in self.traced.parts.values())
         numbers = [name for name, _ in self.traced.numbers]
         for i, name in enumerate(numbers):
@@ -127,7 +127,7 @@ class Written:
         asked: set[str] = set()
 
         def place(names: list[str], i: int) -> Place:
-            """Where a number of the state is; what a control has added up comes last."""
+            """The place of a number of the state; the sum of a control comes last."""
             block = names[i].partition("[")[0].rstrip("'")
             at = -1 if block == TALLY else i if i < self.n_v else i - self.n_v
             return Place(block, at, language.names(names[i]))
@@ -141,7 +141,7 @@ class Written:
         def leaf(name: str, given: int) -> Leaf:
             asked.add(name)
             match name:
-                case "made":  # names of values are found again on a tape; these are of the step's
+                case "made":  # names are by numbers on a tape, here that of the step
                     return known[given] if tape is self.traced.parts["step"].tape else known[given]._replace(symbol=None)
                 case "entry":
                     return entries[given]

@@ -1,4 +1,4 @@
-"""Adaptive steps: each member takes its own, so long that the estimate of its error stays within a tolerance.
+"""Adaptive steps: each member has steps of its own, as long as the estimate of their error stays within a tolerance.
 
 The increments of a step h are h times those of a step of 1, so a system is scaled once and stretched to every step.
 """
@@ -21,17 +21,18 @@ SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 5.0
 LOW = 5
 #: r below TINY counts as TINY; p's root, the sixteenth or the thirty-second, is that of 1e-4 or more.
 TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
-#: What a step moves y by, relative to the longest that y has been, is lost in rounding below this, with some room. So an error of
-#: v that moves y by less is none, however small v is: near a rest v is what rounding leaves of forces that cancel.
+#: A change of y in a step that is smaller than this, relative to the largest length of y so far, is lost in rounding, with some
+#: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
+#: rounding.
 ROUNDING = 1.0 / (1 << 40)
 #: A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
 #: have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 #: that follows.
 PUSHED = 1.0 / 64.0
 
-#: The first step is this share of the time in which the start changes: so short that it is never too long, for what is too short
-#: grows by MAX_FACTOR a step. Where nothing tells such a time it is BLIND, in units of time; and it moves the time by 2¹²
-#: roundings.
+#: The first step is the fraction FIRST of the time in which the state changes at the start: rather too short than too long, since
+#: it then grows by MAX_FACTOR a step. Where there is no such time it is BLIND, in units of time. It is at least MOVES times the
+#: time of the start, 2¹² roundings.
 FIRST, BLIND, MOVES = 0.01, 1e-6, 1.0 / (1 << 40)
 
 OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
@@ -48,7 +49,7 @@ class Pair(Protocol):
 
 
 class Outlook(NamedTuple):
-    """The length of the step that comes next, whether it is an extra one, and whether there is a step of the run to try."""
+    """The length of the next step, whether it is an extra one, and whether there is a step of the run to try."""
 
     step: Any
     is_extra: Any
@@ -56,25 +57,25 @@ class Outlook(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Where each member stands, and how it goes on. All are numbers: those that count, too.
+    """The time of each member and the state of its step-size controller. All are floats, even the counts.
 
     Steps do not depend on the saved times: a step that passes the next of them is held, not taken, until the states within it are
-    saved. Each is made by an extra step, from the start of the held one.
+    saved. Each is computed by an extra step, from the start of the held one.
 
     Attributes:
         t: its time.
         h: the step that it will try next.
-        target: the time that is asked for next.
+        target: the next output time.
         extra: above zero, the length of the extra step that comes next, to a saved time.
-        held: 1 if the step is known to be good that comes next and passes the target.
+        held: 1 if the next step is held: it was accepted, but passes the target.
         relative: tolerated error of a step, relative to the length of a block.
-        absolute: tolerated error beside the relative one.
-        lasts: 1 if the length that counts is the longest that a block has been so far, 0 if it is that of now.
-        longest_v: the square of the longest that v has been so far.
+        absolute: tolerated error in addition to the relative one.
+        lasts: 1 if errors are relative to the largest length of a block so far, 0 if they are relative to its present length.
+        longest_v: the square of the largest length of v so far.
         longest_y: likewise of y.
         begin: the time of the start.
-        interval: no step is longer while inputs change from sample to sample, so that none is passed over,
-        until: which is until then.
+        interval: the longest step while inputs change from sample to sample, so that no sample is skipped.
+        until: the time until which they do.
         before: the sixteenth root of the last accepted error over the tolerance, or its thirty-second.
         most: how much the next step may grow.
         accepted: accepted attempts.
@@ -128,7 +129,7 @@ class Stretched:
 
 
 class Outcome(NamedTuple):
-    """Kept states, and for each member where it stands in the end: state, pace and status."""
+    """Saved states, and the state, pace and status of each member at the end."""
 
     v: Array
     y: Array
@@ -147,7 +148,7 @@ def start(
     y: Array,
     block_axes: tuple[int, int],
 ) -> Pace:
-    """Where members stand at the start, with a step to try first.
+    """The paces of members at the start, with a step to try first.
 
     ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
@@ -186,7 +187,7 @@ def run(
     at: Sequence[float],
     budget: int,
 ) -> Outcome:
-    """Go on from where members stand and save the states at each time of ``at``, ascending. Members that stop before have NaN.
+    """Continue all members and save their states at each time of ``at``, ascending. Members that stop before have NaN.
 
     ``attempt(pace, budget, v, y)`` is one attempt of all members.
     """
@@ -213,7 +214,7 @@ def run(
 def attempt(
     pair: Pair, s: Scaled, order: int, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
 ) -> tuple[Pace, Array, Array]:
-    """One attempt at a step: the state goes on if its error is tolerated, and if there is anything to try.
+    """One attempt at a step: the state advances if the error is tolerated, and if there is a step to try.
 
     An extra step leaves the pace as it is. ``order`` is the one in which the error is estimated.
     """
@@ -232,9 +233,9 @@ def attempt(
 
 
 def decided(pace: Pace, high: bool, r2: Any, new: Sequence[Any], outlook: Outlook) -> tuple[Pace, Any]:
-    """What comes after an attempt with this error, and whether the state goes on; ``new`` are squares of the new lengths."""
+    """The pace after an attempt with this error, and whether the state advances; ``new`` are squares of the new lengths."""
     step, is_extra, runs = outlook
-    # Lengths whose squares overflow tolerate anything, so they count as not finite.
+    # Lengths whose squares overflow would tolerate any error, so they count as not finite.
     r2 = where(less(new[0] + new[1], np.inf), r2, np.inf)
     good = at_most(r2, 1.0)  # NaN is not
     floored = where(less(TINY * TINY, r2), r2, TINY * TINY)
@@ -275,7 +276,7 @@ def decided(pace: Pace, high: bool, r2: Any, new: Sequence[Any], outlook: Outloo
 
 def tolerated(pace: Pace, step: Any, old: Sequence[Any], new: Sequence[Any]) -> list[Any]:
     """Squares of the errors that are tolerated in both blocks, from squares of their lengths before and after a step."""
-    # What has been at zero so far and is pushed now is as long as the push would have made it in a part of the time since.
+    # A block at zero so far on which a force sets in counts as long as that force would have made it in a part of the time since.
     since = PUSHED * ((pace.t + step - pace.begin) / step)
     since2 = longer(1.0, since * since)
     rested = at_most(pace.longest_v + pace.longest_y, 0.0)

@@ -16,7 +16,7 @@ def _objects(*given: Any) -> bool:
 
 
 def _asked(name: str, given: Any, *more: Any) -> Any:
-    """What the method of that name makes of every element."""
+    """The method of that name, applied to every element."""
     return np.frompyfunc(lambda each, *rest: getattr(each, name)(*rest), 1 + len(more), 1)(given, *more)
 
 
@@ -29,7 +29,7 @@ def _number(bits: Any) -> Any:
 
 
 def less(a: Any, b: Any) -> Any:
-    """Whether a < b. The larger of two is asked for by exchanging them."""
+    """Whether a < b. For a > b exchange them."""
     return np.frompyfunc(operator.lt, 2, 1)(a, b) if _objects(a, b) else np.less(a, b)
 
 

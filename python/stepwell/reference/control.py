@@ -1,6 +1,6 @@
 """What keeps the energy near its target (§12, Appendix D): a push −g·v in every stage, or a projection after the step.
 
-Both are put round a system that tells its ``energies``, and are then a system themselves. Energies come times h.
+Both wrap a system that has ``energies``, and are a system themselves. Energies are multiplied by h.
 """
 
 from typing import Any, Protocol

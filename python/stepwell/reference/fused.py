@@ -1,7 +1,7 @@
 """The second exact arithmetic: sums with a product in them are fused multiply-adds, a·b + c rounded once.
 
-Which products are fused is decided on the tape of a step, so it is the same for everybody. This file says how, evaluates a fused
-tape operation by operation, and has a fused multiply-add of its own, since NumPy has none.
+Which products are fused is decided on the tape of a step, so it is the same on every machine. This file says how, evaluates a
+fused tape operation by operation, and has a fused multiply-add of its own, since NumPy has none.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -64,7 +64,7 @@ def ranks(tape: Sequence[Operation]) -> list[int]:
 def fused(tape: Sequence[Operation], roots: Sequence[int]) -> list[Operation]:
     """The same tape with fused multiply-adds; ``roots`` are the lines of the next state, and all others are needed for them.
 
-    A product is fused into the sum or the difference that it is a term of if nothing else reads it and it depends on the state.
+    A product is fused into the sum or the difference of which it is a term if nothing else reads it and it depends on the state.
     Of two such products the one of the higher rank is fused.
     """
     rank = ranks(tape)
@@ -174,7 +174,7 @@ def _mask(truth: Any) -> Array:
     return _number(np.where(truth, np.uint64(0xFFFF_FFFF_FFFF_FFFF), np.uint64(0)))
 
 
-#: What each operation makes of its operands and of what else it is given.
+#: The meaning of each operation: a function of its operands and its other argument.
 MEANING: dict[str, Callable[..., Any]] = {
     "add": lambda a, b, _: a + b,
     "subtract": lambda a, b, _: a - b,
@@ -205,7 +205,7 @@ class Evaluated:
 
     Args:
         tape: its operations.
-        roots: the lines whose values are asked for.
+        roots: the lines whose values are returned.
         numbers: of each parameter, by its number on the tape, what it is for every member.
         tables: the sampled inputs.
     """
@@ -217,7 +217,7 @@ class Evaluated:
 
     @classmethod
     def traced(cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any]) -> "Evaluated":
-        """Of symbols on a tape that tells its operations."""
+        """For symbols on a tape that lists its operations."""
         operations, roots = tape.operations(symbols)
         return cls([Operation(name, tuple(of), given) for name, of, given in operations], roots, numbers, tables)
 

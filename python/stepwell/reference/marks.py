@@ -1,8 +1,8 @@
 """Marks: which values on a tape are sin x, log x and so on, of which arguments.
 
-Such a function is made of sums, products, roundings and operations on bits. Its value is right to the last bits; a derivative
-taken line by line would not be, since rounding to a whole number and moving bits have none. So whoever differentiates a tape
-(``stepwell.derivatives``) needs to know that a value is sin x, and takes cos x. The functions say so while they are traced:
+Such a function consists of sums, products, roundings and operations on bits. Its value is accurate to the last bits, but a
+derivative operation by operation would be wrong, since roundings and operations on bits have none. So ``stepwell.derivatives``
+must know that a value is sin x, to use cos x. The functions note that while they are traced:
 
     with recording() as marks:
         ...  # trace something that calls functions decorated with @differentiable
@@ -29,7 +29,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {}
 
 
 class Mark(NamedTuple):
-    """That a value is a function of others.
+    """The mark of a value: the function and the arguments of which it is the value.
 
     Attributes:
         name: of the function.
@@ -42,7 +42,7 @@ class Mark(NamedTuple):
     function: Callable[..., Any] | None
 
 
-#: Of the symbols of one tape, by the number of the operation that makes them, what they are.
+#: The marks of one tape, by the number of the operation that computes the value.
 Marks = dict[int, Mark]
 
 _active: ContextVar[Marks | None] = ContextVar("marks", default=None)
@@ -50,7 +50,7 @@ _active: ContextVar[Marks | None] = ContextVar("marks", default=None)
 
 @contextmanager
 def recording(marks: Marks | None = None) -> Iterator[Marks]:
-    """Note the functions that are called with symbols, in a new table or in this one. All symbols must be of one tape."""
+    """Note functions that are called with symbols, in a new table or in this one. All symbols must be of one tape."""
     kept: Marks = {} if marks is None else marks
     before = _active.set(kept)
     try:
@@ -83,8 +83,8 @@ def mark(name: str, result: Any, *arguments: Any, function: Callable[..., Any] |
 def _note(marks: Marks, name: str, result: Any, arguments: tuple[Any, ...], function: Callable[..., Any] | None) -> None:
     """Note one number's function.
 
-    A value that is older than its arguments is none that the function made: the tape found it equal to an earlier one, as
-    maximum(x, x) is x. It keeps the derivative that it has; what was noted first stays for the same reason.
+    A value that is older than its arguments was not computed by the function: the tape found it equal to an earlier one, as
+    maximum(x, x) equals x. It keeps its derivative, and a value that has a mark keeps that, for the same reason.
     """
     if isinstance(result, Symbol) and all(each.id < result.id for each in arguments if isinstance(each, Symbol)):
         marks.setdefault(result.id, Mark(name, arguments, function))

@@ -55,7 +55,7 @@ class Drive:
         return np.stack(turned, axis=1)
 
     def after(self, leap: Leap, s: Array, t: Array) -> Array:
-        """The state that a leap makes of s at time t."""
+        """The state after a leap from s at time t."""
         return times(leap.p, s) + times(leap.q, self.columns(t))
 
     def join(self, first: Leap, then: Leap) -> Leap:
@@ -90,7 +90,7 @@ def one_step(p: Array, q: Array, inputs: Sequence[Constant | Sine], nodes: Seque
 
 
 def run(step: Leap, drive: Drive, s: Array, first_bad: Whole, *, t0: float, first: int, saves: Iterable[int]) -> Iterator[Array]:
-    """The states at ``saves``, steps counted from number ``first``; who diverged since then and when goes into ``first_bad``."""
+    """The states at ``saves``, steps counted from number ``first``; ``first_bad`` gets the steps at which members diverged."""
     leaps: dict[int, Leap] = {}
     done = 0
     for save in saves:

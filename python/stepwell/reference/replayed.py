@@ -9,7 +9,7 @@ from typing import Any
 from .functions.operations import is_symbol
 from .fused import MEANING
 
-#: What operations are of symbols; a constant among bits is given by its bits.
+#: The operations of symbols; a constant of an operation on bits is given by its bits.
 OF_SYMBOLS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
@@ -36,10 +36,10 @@ WITH_BITS: dict[str, Callable[[Any, int], Any]] = {
 
 
 class Operations:
-    """Values that are made of a state and of parameters by these operations, in this order.
+    """Values that these operations, in this order, compute from a state and parameters.
 
     Args:
-        operations: of each line its name, the lines that it reads, and what else it is given; as ``_core.Tape.operations`` gives
+        operations: for each line its name, the lines that it reads, and its other arguments; as ``_core.Tape.operations`` gives
             them.
         places: the lines of the values.
     """

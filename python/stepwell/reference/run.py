@@ -25,12 +25,15 @@ def run(
     saves: Whole,
     velocity: Velocity | None = None,
 ) -> tuple[Array, Array, Blocks, Whole]:
-    """Make ``steps`` steps from number ``first``; return the last slots, those at ``saves``, ascending, and who diverged when.
+    """Make ``steps`` steps from number ``first``.
 
     ``step(t, v, y)`` makes one step; the first axes of ``v`` and ``y``, ``block_axes`` many each, are those of a block. Time is
-    t0 + k·h, never accumulated. A member has diverged at the first step after which a number of its state is not finite, v or y;
-    where something else stands in the place of v, ``velocity(t, v, y)`` makes v of it. ``first_bad`` has the steps of earlier
-    runs, −1 for none.
+    t0 + k·h, never accumulated. A member has diverged at the first step after which a number of its v or y is not finite; for a
+    method with a carry, ``velocity(t, v, y)`` computes v from it. ``first_bad`` has the steps at which members diverged in
+    earlier runs, −1 for none.
+
+    Returns:
+        The slots at the end; both slots at ``saves``, step counts in ascending order; ``first_bad`` of this and earlier runs.
     """
     kept = np.empty((len(saves), *v.shape)), np.empty((len(saves), *y.shape))
     done = 0

@@ -11,7 +11,7 @@ from .marks import differentiable
 from .types import Array
 
 PER_HALF_TURN = 0.3183098861837907  # 1/π
-MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which then stands in the low bits
+MAGIC = 6755399441055744.0  # 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits
 PI = (3.1415926534682512, 1.2154201013012384e-10)
 S = (
     -0.16666666666666666,

@@ -33,16 +33,16 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def scene(name: str | Scene) -> Scene:
-    """The scene of that name, as it is made without arguments, or that of a file of one's own.
+    """The scene of that name with default arguments, or the scene of a file of your own.
 
     Args:
-        name: a name of ``scenes``; or a Python file that makes a ``Scene``, ``my_scene.py``, with the name of the variable behind
-            it if it makes several, ``my_scene.py:fast``. The file is run.
+        name: a name of ``scenes``; or a Python file that defines a ``Scene``, ``my_scene.py``. If it defines several, the name of
+            the variable follows: ``my_scene.py:fast``. The file is run.
 
     Raises:
         DTypeError: if it is neither a scene nor a name.
         UnknownNameError: if there is none; the message names the nearest.
-        ArgumentError: if the file makes none, or several.
+        ArgumentError: if the file defines none, or several.
     """
     if isinstance(name, Scene):
         return name
@@ -53,7 +53,7 @@ def scene(name: str | Scene) -> Scene:
     return _makers()[_checks.known("scene", name, _makers())]()
 
 
-#: A file of one's own, and a variable of it.
+#: A user's file, and a variable of it.
 FILE = re.compile(r"(.+\.py)(?::(\w+))?")
 
 
@@ -62,7 +62,7 @@ _LOADED: set[str] = set()
 
 
 def _from_file(path: str, variable: str | None) -> Scene:
-    """The scene that a file makes."""
+    """The scene that a file defines."""
     name = re.sub(r"\W", "_", Path(path).stem)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None

@@ -1,4 +1,4 @@
-"""What a scene is, and how wrong a run of it is."""
+"""Scenes, and the errors of their runs."""
 
 from __future__ import annotations
 
@@ -27,28 +27,29 @@ SCALE_SAMPLES = 1001
 
 @dataclass(frozen=True, eq=False)
 class Scene(Value):
-    """A system with its start, a step and a time over which to judge a method.
+    """A system with an initial state, a step and a time span over which methods are judged.
 
-    Three things are enough beside the system, ``Scene(system, v=0.0, y=1.0, horizon=30.0)``; all else has something to go by.
+    ``Scene(system, v=0.0, y=1.0, horizon=30.0)`` suffices; all other arguments have defaults.
 
     Attributes:
-        system: what to step, of one member.
+        system: the system to step, of one member.
         v: velocity block at t = 0, of the system's ``v_shape``, or one number for all of it; a first-order system has none.
         y: coordinate block at t = 0, likewise of its ``y_shape``.
         horizon: time over which errors are measured, in units of time, above zero; that of ``until`` if None.
         dt: the usual step, in units of time; the document's where it gives one, a thousandth of the horizon if None.
-        exact: the solution as a function of times of shape (n,): blocks v and y of shape (n, *block). A formula, or an orbit
-            computed to more digits than a float holds; None for a motion without one, which a tight run stands in for.
-        until: the last time that ``exact`` is asked for, in units of time; errors after it are NaN, for they are not known.
+        exact: the solution as a function of times of shape (n,), which returns blocks v and y of shape (n, *block): a formula, or
+            an orbit computed in multi-precision. If None, there is no state error, and charts and advice use a run to a tight
+            tolerance as the reference solution.
+        until: the last time for which ``exact`` is valid, in units of time; errors after it are NaN, since they are not known.
         control: the control with which ``run`` steps, or None.
-        period: time after which the exact solution is where it began, in units of time, or None.
-        name: what you type.
-        title: what it is called in a picture; the name if empty.
-        section: section of the document, and what is stepwell's own.
+        period: the period of the exact solution, in units of time, or None.
+        name: the name by which it is chosen.
+        title: its title in a picture; the name if empty.
+        section: section of the document, or a note that the scene is stepwell's own.
         description: what moves, and what it shows.
         error: what an error of 1 means here.
 
-    Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the scenes here
+    Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the built-in scenes
     can, a lambda cannot.
 
     Raises:
@@ -75,7 +76,7 @@ class Scene(Value):
     error: str = "as far from the true velocities or coordinates as the largest true ones"
 
     def __post_init__(self) -> None:
-        """Check what was given, and find what was not."""
+        """Check the arguments and fill in the defaults."""
         if self.y is None:
             raise ArgumentError("y: expected the coordinates at t = 0, got None")
         y = _checks.numbers("y", self.y)
@@ -111,7 +112,7 @@ class Scene(Value):
         Args:
             method: its name, or what ``stepwell.method`` returns.
             dt: the step, in units of time; the scene's if None.
-            steps: how many steps; if None, the least number that reaches the horizon.
+            steps: number of steps; if None, the least number that reaches the horizon.
             **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``. ``control`` is the
                 scene's own if it is not given; ``control=None`` leaves it out.
 
@@ -120,7 +121,7 @@ class Scene(Value):
 
         Raises:
             ArgumentError: what was given and what was expected.
-            UnsupportedError: if the method cannot do the system.
+            UnsupportedError: if the method cannot step the system.
 
         Warns:
             DivergenceWarning: if the state left the range of finite numbers.
@@ -137,19 +138,19 @@ class Scene(Value):
         """The least number of steps of ``dt`` that reach the horizon.
 
         Raises:
-            ArgumentError: if ``dt`` is no step, or needs more steps than can be counted.
+            ArgumentError: if ``dt`` is not a valid step, or needs more steps than can be counted.
         """
         dt = _checks.number("dt", dt, positive=True, unit="units of time")
         quotient = self.horizon / dt
         if quotient > _checks.LAST_STEP:
             raise ArgumentError(f"dt: {dt:g} needs more than {_checks.LAST_STEP} steps to reach {self.horizon:g}")
-        # A quotient that misses a whole number by rounding alone asks for no further step.
+        # A quotient that exceeds a whole number by rounding alone needs no further step.
         return max(1, math.ceil(quotient - 1e-9))
 
     def state_error(self, run: Run) -> Array:
-        """How wrong each saved state is, shape (saved,); infinite where it is not finite, NaN where the true one is not known.
+        """The relative error of each saved state, shape (saved,); infinite if it is not finite, NaN if the true state is unknown.
 
-        The larger of the errors of the two blocks; that of a block is the length of its difference from the exact one,
+        It is the larger of the errors of the two blocks; that of a block is the length of its difference from the exact one,
         divided by the block's largest length in the exact solution. At 1 the error is as large as the solution.
 
         Raises:
@@ -166,10 +167,10 @@ class Scene(Value):
         return np.where(known, np.where(np.isfinite(error), error, np.inf), np.nan)
 
     def energy_error(self, run: Run) -> Array:
-        """How wrong the energy of each saved state is, shape (saved,), relative to the largest kinetic energy.
+        """The error of the energy of each saved state, shape (saved,), relative to the largest kinetic energy.
 
-        The kinetic energy is the scale because it has a zero of its own; that of a potential is a convention.
-        Not finite and not known are as in ``state_error``.
+        The kinetic energy is the scale because its zero is not a convention, as that of a potential is.
+        States that are not finite or not known are treated as in ``state_error``.
 
         Raises:
             ArgumentError: if the scene has no exact solution, or the run is of another system.
@@ -191,7 +192,7 @@ class Scene(Value):
         return np.maximum(*lengths)
 
     def owns(self, run: Run) -> bool:
-        """Whether a run is of this scene's system, controlled or not, and of one member; any start will do."""
+        """Whether a run is of this scene's system, controlled or not, and of one member; its start does not matter."""
         return run.system.uncontrolled.sized(run.v[0], run.y[0]) == self.system.sized(self.v, self.y) and run.status.ndim == 0
 
     def _check(self, run: Run) -> None:

@@ -24,7 +24,7 @@ NODE_PRODUCTS = [float(np.prod(node - np.delete(NODES, j))) for j, node in enume
 
 
 def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float) -> Exact:
-    """A quicker function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
+    """A faster function that is the same within ``close``, in the scales, up to a time: by a polynomial over each interval.
 
     Intervals are halved until that is so; where it would take too many, it is the same function.
     """
@@ -49,7 +49,7 @@ def tabled(exact: Exact, until: float, scales: tuple[float, float], close: float
     starts, lengths, v, y = (np.concatenate(each) for each in zip(*good, strict=True))
     order = np.argsort(starts)
     starts, lengths = starts[order], lengths[order]
-    # For each node the numbers of a state as rows, for operations on long rows are the quick ones.
+    # For each node the numbers of a state as rows, since operations on long rows are the fastest.
     tables = [np.ascontiguousarray(block[order].reshape(*block.shape[:2], -1).transpose(1, 2, 0)) for block in (v, y)]
 
     return Table(starts, lengths, tables, [block.shape[2:] for block in (v, y)])

@@ -1,4 +1,4 @@
-"""The true motion of a scene that has no formula: a run to a tight tolerance, as far as a less tight one agrees with it."""
+"""The reference solution of a scene without a formula: a run to a tight tolerance, as long as a less tight one agrees with it."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from .base import Scene
 METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE = "dop853", 1e-14, 1e-13
 
 #: The two agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least error
-#: that a chart of such a scene asks about. But for rounding, the reference is ten times as accurate as the run that checks it.
+#: that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the run that checks it.
 MAX_DIFFERENCE = 1e-8
 
 #: Times at which they are compared, and from how many of them the reference can be continued.
 SAMPLES, RESTARTS = 400, 20
 
-#: Steps of such a run at most, rejected ones counted. Beyond what they reach, the solution is unknown.
+#: The most steps of such a run, including rejected ones. Beyond the time that they reach, the solution is unknown.
 MAX_STEPS = 2_000_000
 
 
 class Tight:
-    """The run of a scene to a tight tolerance, as a function of time; it is the same whatever it is asked for."""
+    """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls."""
 
     def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE) -> None:
         self.scene, self.tolerance = replace(scene, control=None), tolerance
-        #: Arguments to go on from, by the time from which on.
+        #: Arguments to continue the run, each with the time from which it continues.
         self._on: list[tuple[float, dict[str, Any]]] = [(0.0, {"v": scene.v, "y": scene.y, "tolerance": tolerance})]
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
@@ -45,7 +45,7 @@ class Tight:
         return run.v[place.reshape(-1)], run.y[place.reshape(-1)]
 
     def followed(self, times: Array) -> tuple[Array, Array]:
-        """The states at these times, ascending; NaN from where it stopped. At some of them it can be taken up later."""
+        """The states at these times, ascending; NaN from where it stopped. At some of them the run can be continued later."""
         runs = []
         for part in np.array_split(times, RESTARTS):
             runs.append(run := self._run(part, self._on[-1][1]))
@@ -74,11 +74,12 @@ class Tight:
 
 
 def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
-    """The scene with an ``exact`` solution: its own, or else a tight run, known until a less tight one leaves it.
+    """The scene with an ``exact`` solution: its own, or else a tight run, known as long as a less tight one agrees.
 
     Args:
         scene: any.
-        agrees: how near to each other the two runs are where the motion counts as known, in the blocks' largest lengths so far.
+        agrees: the largest difference of the two runs up to which the motion counts as known, in the blocks' largest lengths so
+            far.
 
     Returns:
         A scene whose ``exact`` and ``until`` are set. A scene that has an exact solution is returned as it is. The true motion is

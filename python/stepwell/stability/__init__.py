@@ -1,4 +1,4 @@
-"""Stability in the z-plane (§4): what one step does to a state, told by the eigenvalues of its transition matrix.
+"""Stability in the z-plane (§4): the eigenvalues of the transition matrix of a step.
 
 ``maps`` finds the matrices, ``eigen`` their eigenvalues and modes, ``analysis`` puts them into the document's words, ``limit``
 finds the step at which a mode begins to grow, ``along`` does so at every saved state of a run, ``expansion`` makes series in Φ,

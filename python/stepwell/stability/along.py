@@ -1,9 +1,9 @@
 """``stability_along``: the stability limit at every saved state of a run, and the state that sets it.
 
-At each state the rates are linearised, and each mode that does not grow by itself has a limit of its own. A step that treats
-both blocks alike makes of a mode λ a function of λ·dt alone, and that of ÿ = K·y by any method one of κ·dt², κ an eigenvalue of
-K: there the limit is found once for each direction of λ and scaled. Everywhere else steps are tried on a ladder, and the
-eigenvalues of each are matched with the rates that they continue.
+At each state the rates are linearised, and each mode that does not grow in the exact solution has a limit of its own. If a
+method treats both blocks alike, the growth of a mode depends on λ·dt alone. For ÿ = K·y it depends on κ·dt² by any method, κ
+being an eigenvalue of K. In both cases the limit is found once for each direction of λ, and scaled. Otherwise a geometric grid of
+steps is tried, and the eigenvalues of each step are matched with the rates.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from .limit_digits import LADDER
 from .limit_search import GROWTH_EXPONENT, NEVER_STABLE_STEP, NUMBERS_AT_ONCE, PAST_LIMIT, Search
 from .parts import function_of_rates
 
-#: Of a state's rates, a real part below the first part of the fastest is zero, and a rate below the second is.
+#: A real part below the first fraction of a state's fastest rate counts as zero, and so does a rate below the second.
 REAL_ZERO, RATE_ZERO = 1e-9, 1e-6
 
-#: Where steps are tried: every other rung of the ladder of ``stability_limit``.
+#: The steps that are tried: every other one of the geometric grid of ``stability_limit``.
 STRIDE = 2
 
 #: Halvings of the interval between two rungs, to the last digit.
@@ -42,18 +42,18 @@ class StabilityAlong(Value):
     """Stability limits along a run.
 
     Attributes:
-        method: whose limits.
-        run_dt: the step of the run, or None of a run with a tolerance.
+        method: the method.
+        run_dt: the step of the run, or None for a run with a tolerance.
         t: times of the saved states, shape (saved,).
-        limits: of each saved state the largest step below which no mode grows that does not grow by itself, shape
-            (saved, *batch): 0 for never, infinite where there is no such mode, NaN where the state is not finite.
-        rates: of each saved state λ of the mode that sets the limit, complex, likewise; NaN where none does.
-        growth: of each saved state the largest real part of its rates, likewise: above zero where neighbouring motions part by
-            themselves, whatever the step.
+        limits: for each saved state the largest step below which no mode grows that does not grow in the exact solution, shape
+            (saved, *batch): 0 if there is no such step, infinite if there is no such mode, NaN if the state is not finite.
+        rates: for each saved state λ of the mode that sets the limit, complex, likewise; NaN where none does.
+        growth: for each saved state the largest real part of its rates, likewise: above zero where neighbouring motions separate
+            at any step.
         dt: the smallest of the limits, shape (*batch), a number for one member.
         index: which saved state sets it, likewise.
         when: the time of that state, likewise.
-        mode: what begins to grow there, a ``Mode``, or None; of a batch an array of them. Its shape is in v and y of the rates.
+        mode: the mode that becomes unstable there, a ``Mode``, or None; an array of them for a batch. Its shape is in v and y.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class StabilityAlong(Value):
         """At which saved states the step of the run is above the limit, shape (saved, *batch).
 
         Raises:
-            ArgumentError: of a run with a tolerance, which has chosen its own steps.
+            ArgumentError: for a run with a tolerance, whose steps are adaptive.
         """
         if self.run_dt is None:
             raise ArgumentError("exceeded: expected a run with a fixed step, got one with a tolerance")
@@ -90,17 +90,16 @@ class StabilityAlong(Value):
 
 
 def stability_along(run: Run, method: str | Method | None = None) -> StabilityAlong:
-    """Which saved state of a run sets the stability limit, when, and by which mode.
+    """Find the saved state of a run that sets the stability limit, its time, and the mode that becomes unstable.
 
-    At each saved state the rates are linearised. What grows there by itself, such as the distance of two bodies that fall past a
-    third, is no fault of a step and does not count; what swings or dies must not grow, and the limit is the largest step below
-    which it does not. At an equilibrium near which nothing grows by itself, that is ``stability_limit``. Away from one, it is
-    that of the linearised rates held as they are, while ``stability_limit`` takes the derivative of a whole step, within which
-    the state moves.
+    At each saved state the rates are linearised. Modes that grow in the exact solution, such as the distance of two bodies that
+    fall past a third, are left out. The limit is the largest step below which no other mode grows. At an equilibrium where no
+    mode grows in the exact solution, that equals ``stability_limit``. At other states they differ: here the linearised rates are
+    kept fixed, while ``stability_limit`` uses the derivative of a whole step, within which the state changes.
 
     Args:
-        run: a run, with the saved states to look at (``every=`` or ``at=``).
-        method: whose limit; the run's own if None.
+        run: a run with saved states (``every=`` or ``at=``).
+        method: the method to judge; that of the run if None.
 
     Returns:
         A ``StabilityAlong``: ``dt``, ``index``, ``when`` and ``mode``, and ``limits`` of every state.
@@ -129,7 +128,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     each = _limits(system, how, flat)
     growth = np.where(finite, eigen.eigenvalues(flat).real.max(axis=0), np.nan).reshape(shape)
     limits = np.where(finite, each.limits, np.nan).reshape(shape)
-    rates = np.where(each.rates.imag < 0.0, each.rates.conj(), each.rates)  # of a pair, the one that turns forwards
+    rates = np.where(each.rates.imag < 0.0, each.rates.conj(), each.rates)  # of a pair, the one with the positive angle
     rates = np.where(finite, rates, np.nan).reshape(shape)
     index = np.where(np.isnan(limits), np.inf, limits).argmin(axis=0)
     modes = np.empty(shape[1:], dtype=object)
@@ -150,7 +149,7 @@ def _linearised(system: System, run: Run) -> Array:
         return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
     v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((run.v, system.v_shape), (run.y, system.y_shape)))
     t: Any = run.t.reshape(-1, *(1,) * len(members))
-    # The built-in systems only add inputs, which have no part in the derivative: one time does for all.
+    # Built-in systems only add inputs, which do not change the derivative: one time suffices.
     A = maps.rates(system, float(run.t[0]) if system.complex_step else t, v, y)
     return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
 
@@ -175,7 +174,7 @@ def _limits(system: System, method: Method, A: Array) -> _Found:
         turning = np.abs(squares.imag) > REAL_ZERO * size
         squares = np.where(np.abs(squares) <= RATE_ZERO**2 * size, np.nan, squares.real)
         found = _smallest(-np.sqrt(squares + 0j), lambda rates: _of_second_order(method, rates))
-        if (other := turning.any(axis=0)).any():  # forces that no energy belongs to
+        if (other := turning.any(axis=0)).any():  # forces without a potential energy
             tried = _by_trying(method, A[:, :, other], n_v)
             found.limits[other], found.rates[other] = tried
         return found
@@ -183,7 +182,7 @@ def _limits(system: System, method: Method, A: Array) -> _Found:
 
 
 def _of_second_order(method: Method, rates: Complex) -> Array:
-    """The limits of modes of ÿ = λ²·y: of one that swings, or of the one of two that dies, while the other grows."""
+    """The limits of modes of ÿ = λ²·y: of one that oscillates, or of the decaying one of a pair of which the other grows."""
     swings = rates.imag != 0.0
     found = np.full(rates.shape, float(stability_limit(Oscillator(1.0), method)))
     if not swings.all():
@@ -192,7 +191,7 @@ def _of_second_order(method: Method, rates: Complex) -> Array:
 
 
 def _smallest(rates: Complex, limit_of: Any) -> _Found:
-    """The smallest limit of each state's modes, shape (modes, states); those that grow by themselves, or do nothing, are NaN."""
+    """The smallest limit of each state, from the rates of its modes, shape (modes, states); rates of NaN have no limit."""
     limits = np.full(rates.shape, np.inf)
     counts = np.isfinite(rates)
     limits[counts] = limit_of(rates[counts])
@@ -202,7 +201,7 @@ def _smallest(rates: Complex, limit_of: Any) -> _Found:
 
 
 def _clean(rates: Complex) -> Complex:
-    """Rates without what rounding made of zeros; NaN for those that grow by themselves or do nothing."""
+    """Rates with rounding errors of zeros removed; NaN for those that grow in the exact solution or are zero."""
     size = np.abs(rates).max(axis=0)
     rates = np.where(np.abs(rates.real) <= REAL_ZERO * size, 1j * rates.imag, rates)
     return np.where((rates.real > 0.0) | (np.abs(rates) <= RATE_ZERO * size), np.nan, rates)
@@ -219,7 +218,7 @@ def _stiffness(A: Array, n_v: int) -> Array | None:
 
 
 def _of_rates(method: Method, rates: Complex, n_v: int) -> Array:
-    """The limits of modes of a method that makes of each a function of λ·dt."""
+    """The limits of modes of a method whose growth factors depend on λ·dt alone."""
     size = np.abs(rates)
     directions, which = np.unique(np.where(rates.imag < 0.0, rates.conj(), rates) / size, return_inverse=True)
     found = np.empty(directions.shape)
@@ -237,7 +236,7 @@ def _of_rates(method: Method, rates: Complex, n_v: int) -> Array:
 
 
 def _by_trying(method: Method, A: Array, n_v: int) -> _Found:
-    """The limits by steps of many lengths: the first at which a mode grows that does not grow by itself."""
+    """The limits by trying steps of many lengths: the first at which a mode grows that does not grow in the exact solution."""
     true = eigen.eigen(A)
     fastest = np.nan_to_num(np.abs(_clean(true.values)), nan=0.0).max(axis=0)
     states = np.flatnonzero(fastest > 0.0)
@@ -259,7 +258,7 @@ class _Trials:
         self.true = eigen.eigen(A)
 
     def growth(self, dt: Array) -> tuple[Array, Array, Complex]:
-        """At steps, shape (states,): by how much the mode that grows most is outside the unit circle, its tolerance, its rate."""
+        """For steps of shape (states,): how far the fastest-growing mode is outside the unit circle, its tolerance, its rate."""
         P = maps.transition(self.system, self.method, dt)
         finish = maps.finish(self.system, self.method, dt, dt.shape)
         found = eigen.eigen(P, eigen.slot_units(finish, self.true.units))
@@ -304,7 +303,7 @@ class _Trials:
 
 
 def _mode(system: System, method: Method, A: Array, limit: float, rate: complex) -> Mode:
-    """What begins to grow at the limit of a state whose linearised rates have this matrix."""
+    """The mode that becomes unstable at the limit of a state, from the matrix of its linearised rates."""
     n_v, n = maps.size(system)[0], len(A)
     linear = LinearSystem(A, velocities=n_v)
     past = limit * (1.0 + PAST_LIMIT) if limit else NEVER_STABLE_STEP / abs(rate)

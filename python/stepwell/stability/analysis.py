@@ -1,4 +1,4 @@
-"""``analyse``: a step of any system by any method, in the words of the document's §4."""
+"""``analyse``: the stability of a step of any system by any method, in the words of the document's §4."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from .eigen import Complex
 from .exact import MAX_ROWS
 from .parts import spectra
 
-#: What a sequence of samples does (§4), by the eigenvalue that decides. A single negative eigenvalue, which the document does not
-#: name, changes its sign at every step: an oscillation of two samples per period. Where so many eigenvalues nearly
-#: meet that rounding hides whether they are outside the unit circle, it is not decided, and not called stable.
+#: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
+#: list, changes the sign at every step: an oscillation of two samples per period. If so many eigenvalues nearly
+#: coincide that rounding hides whether they are outside the unit circle, the kind is "not decided", and not stable.
 KINDS = (
     "monotonic stable",
     "constant",
@@ -40,29 +40,28 @@ KINDS = (
 
 
 class Analysis(Value):
-    """What one step does to a state. ``members`` is the shape to which dt, the parameters and the states broadcast.
+    """One step as a linear map. ``members`` is the shape to which dt, the parameters and the states broadcast.
 
     Attributes:
-        system: what is stepped.
-        method: how.
+        system: the system.
+        method: the method.
         dt: the step, in units of time, of shape ``members``.
         P: transition matrix, shape (n, n, *members): rows and columns are the slots.
-        Q: input matrix of a linear system, shape (n, inputs, *members): what a step makes, from rest, of an input of 1
-            that is held over the step.
-        slots: names of the n numbers that a step maps; ``y_prev`` in the place of ``v`` for Verlet.
+        Q: input matrix of a linear system, shape (n, inputs, *members): the state after a step from rest with an input held at 1.
+        slots: names of the n numbers that a step maps; ``y_prev`` in place of ``v`` for Verlet.
         inputs: names of the inputs.
         polynomial: coefficients of det(Iz − P), highest power first, shape (n + 1, *members).
         p: half the trace of P, for two states; the polynomial is z² − 2pz + q. None for other numbers of states.
         q: the determinant of P, for two states, and r₁² of a conjugate pair; else None.
         eigenvalues: of P, shape (n, *members): the largest first, of equal ones the fastest first.
-        rates: for each eigenvalue of P the eigenvalue λ of the rates whose mode it continues; e^(λ·dt) would be exact.
+        rates: for each eigenvalue of P the eigenvalue λ of the rates of the same mode; e^(λ·dt) would be exact.
         radius: r₁, the largest magnitude of an eigenvalue.
         angle: Ψ in 0 … π, the angle per step of that eigenvalue, by atan2.
         true_angle: Φ, the angle per step of the same mode of the exact solution: ω₀·dt for the undamped oscillator.
         omega: Ω₀ = Ψ/dt, the frequency of the numerical solution, in radians per unit of time.
         frequency_ratio: Ψ/Φ; NaN where the exact solution does not oscillate.
         samples_per_period: 2π/Ψ; infinite where nothing oscillates.
-        kind: one of ``KINDS``, the document's words for what the samples do.
+        kind: one of ``KINDS``, the document's words for the behaviour of the samples.
         stable: whether the samples stay bounded.
     """
 
@@ -191,14 +190,14 @@ class Analysis(Value):
 def analyse(
     system: System, method: str | Method, *, dt: Any = None, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None
 ) -> Analysis:
-    """The transition matrix of a step, its eigenvalues, and what they say (§4).
+    """Find the transition matrix of a step and its eigenvalues, and classify them (§4).
 
-    P of a linear system comes from stepping unit vectors; of any other from the exact derivative of a step at a state,
-    which is then what the method does to a small disturbance of it. Verlet is analysed through its two positions; at small steps
-    up to 2⁻⁵²/Φ² of its angle is rounding.
+    P of a linear system is found by stepping unit vectors. For a nonlinear system it is the Jacobian of a step at a state, exact
+    to rounding, which maps a small disturbance to that after the step. Verlet is analysed with its two positions as the state;
+    at small steps its angle has a relative rounding error of up to 2⁻⁵²/Φ².
 
     Args:
-        system: what is stepped; its parameters may be arrays. That of a run under control is ``run.system``.
+        system: the system; its parameters may be arrays. That of a run under control is ``run.system``.
         method: its name, or what ``stepwell.method`` returns.
         dt: the step, in units of time, above zero; an array broadcasts with the parameters. Left out for a run, it is the run's.
         at: the state at which a system that is not linear is linearised: a pair ``(v, y)`` of shapes (*block, *batch), or a
@@ -212,7 +211,7 @@ def analyse(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
     """
     how = find_method(method)
     at = given_state(at, v, y)
@@ -256,7 +255,7 @@ def analyse(
 
 
 def given_state(at: Any, v: Any, y: Any) -> Any:
-    """What is meant by ``at``, or by ``v`` and ``y`` in its place."""
+    """The state given as ``at``, or as ``v`` and ``y``."""
     if v is None and y is None:
         return at
     if y is None:
@@ -276,7 +275,7 @@ def state(argument: str, system: System, at: Any, or_what: str = "of blocks") ->
 
 
 def velocities(system: System, v: Any) -> Any:
-    """What is given as v; a system that has no velocities needs none."""
+    """The velocities that were given; a system without velocities needs none."""
     if v is not None:
         return v
     if system.v_shape != (0,):

@@ -44,11 +44,11 @@ def operations(method: str | Method, system: System | None = None) -> Operations
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
-        system: what is stepped; the undamped oscillator if None.
+        system: the system; the undamped oscillator if None.
 
     Raises:
         ArgumentError: if the system is a batch.
-        UnsupportedError: if the method cannot do the system.
+        UnsupportedError: if the method cannot step the system.
     """
     how = find_method(method)
     system = Oscillator() if system is None else a_system(system)

@@ -55,7 +55,7 @@ class Criterion(NamedTuple):
     """The answers for one method.
 
     Attributes:
-        method: which.
+        method: the method.
         limit: the undamped oscillator is stable for Φ below this; 0 for never.
         samples_per_period: there must be more steps per period than this, 2π/limit; infinite for never.
         series: the exact polynomials and series in Φ.

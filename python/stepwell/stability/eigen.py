@@ -120,7 +120,7 @@ def vector(matrix: Array, value: complex) -> Complex:
     """The eigenvector of a known eigenvalue, also of a multiple one, shape (n,): what the matrix without it makes smallest."""
     n, units = len(matrix), units_of(matrix)
     less = matrix * units / units[:, np.newaxis] - value * np.eye(n)
-    if n > SVD_MAX_ROWS:  # by inverse iteration, which is quicker, where the inverse exists
+    if n > SVD_MAX_ROWS:  # by inverse iteration, which is faster, where the inverse exists
         found = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
         try:
             for _ in range(3):
@@ -165,7 +165,7 @@ def units_of(matrix: Array) -> Array:
 def slot_units(finish: Array, units: Array) -> Array:
     """Units of the slots whose states have these units, shape (n, *members): in both, what a slot makes of a state is at most 1.
 
-    A step is looked at in the units of the rates. Those that suit its own matrix may miss what it rounds: near z = −1 velocity
+    A step is analysed in the units of the rates. Units that suit its own matrix may hide its rounding: near z = −1 velocity
     and coordinate of a mode leave each other alone, whatever happened between.
     """
     with np.errstate(all="ignore"):
@@ -265,7 +265,7 @@ def matched_of_two(matrix: Array, values: Complex, rates: Array, exact: Complex,
 
 
 def nearest(values: Complex, rates: Complex, exact: Complex) -> Complex:
-    """For each eigenvalue of one step the rate that it continues, told by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
+    """For each eigenvalue of one step the rate of the same mode, found by the exact eigenvalue e^(λ·dt) alone, shape (n,)."""
     with np.errstate(all="ignore"):
         distance = np.nan_to_num(np.abs(values[:, np.newaxis] - exact), nan=np.inf)
     found = np.empty_like(values)

@@ -1,4 +1,4 @@
-"""``stability_limit``: the largest step below which nothing grows that should not, and the mode that then does.
+"""``stability_limit``: the largest step below which no mode grows that should not, and the mode that grows beyond it.
 
 A linear system of more than two states is taken apart first (``parts``). Each part, or a system of two states, is then searched:
 the step is sought on a ladder of steps for all members at once; the first rung on which a mode grows and the one before it
@@ -33,36 +33,37 @@ __all__ = ["Mode", "StabilityLimit", "StabilityLimits", "stability_limit"]
 
 
 def stability_limit(system: System, method: str | Method, *, at: Any = None, t: float = 0.0, v: Any = None, y: Any = None) -> Any:
-    """The largest step below which a method is stable for every mode of a system.
+    """Find the largest step below which a method is stable for every mode of a system.
 
-    Stable means that what should not grow does not: every eigenvalue of the transition matrix stays in or on the unit circle for
+    Stable means that every eigenvalue of the transition matrix stays in or on the unit circle for
     all smaller steps. At the limit itself two eigenvalues may meet, as at Φ = 2 by False Euler, and the samples then grow
     linearly. A method whose samples grow at the smallest steps is never stable, even if larger steps damp (Fehlberg's);
-    neither is a system that grows by itself. Limits of one or two states are exact to some 1e-15, whatever the units; so are
-    those of systems that fall into such parts: filters in a row, chains, and any linear system by a method that treats both
-    blocks alike (Runge-Kutta). Of others they are as exact as the condition of the mode that leaves allows, some 1e-9 of the
-    step at worst. Eigenvalues that meet, or nearly, are found in as many digits as it takes: for the matrix as it is given,
-    since where n of them meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that
-    cannot be taken apart, the limit may stay undecided, and then says so. Damping of less than a millionth of critical
-    damping counts as none. Where a method grows in a window of steps and is stable beyond, the window is found for two
-    states, however narrow; for others, one that is less than 2 % of the step wide may be missed, or 17 % where many digits
-    are needed.
+    neither is a system whose exact solution grows.
+
+    Limits of systems of one or two states are exact to some 1e-15, whatever the units. So are those of systems that decompose
+    into such parts: filters in series, chains, and any linear system by a method that treats both blocks alike (Runge-Kutta). For
+    others the accuracy depends on the condition of the mode that becomes unstable, some 1e-9 of the step at worst. Multiple or
+    nearly multiple eigenvalues are computed in as many digits as needed. The result holds for the matrix as given: where n
+    eigenvalues meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that cannot be
+    decomposed, the limit may stay undecided; see ``decided``. Damping of less than a millionth of critical damping counts as
+    none. Where a method grows in a window of steps and is stable beyond it, the window is found for two states, however narrow;
+    for others, a window narrower than 2 % of the step may be missed, or 17 % where many digits are needed.
 
     Args:
-        system: a linear system; parameters may be arrays. Its inputs do not matter: they add to the samples what stays bounded.
+        system: a linear system; parameters may be arrays. Its inputs do not matter: their contribution to the samples is bounded.
         method: its name, or what ``stepwell.method`` returns.
-        at: a state (v, y) at which a system that is not linear is taken for one.
+        at: a state (v, y) at which a nonlinear system is linearised.
         t: the time of that state.
         v: in place of ``at``, the velocities of the state.
         y: in place of ``at``, its coordinates.
 
     Returns:
         A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). Its
-        ``decided`` is False where rounding hides what happens between it and ``grows``, in units of time.
+        ``decided`` is False where rounding hides the limit between it and ``grows``, in units of time.
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, or the system is not linear and no state is given.
+        UnsupportedError: if the method cannot step the system, or the system is not linear and no state is given.
 
     Example:
         >>> sw.stability_limit(sw.LinearSystem([[-1, 0, 0], [1, -1, 0], [0, 1, -1]]), "rk4")

@@ -24,12 +24,12 @@ COMPLEX_STEP = 1e-200
 
 
 def size(system: System) -> tuple[int, int]:
-    """How many numbers stand in each block."""
+    """The number of components of each block."""
     return prod(system.v_shape), prod(system.y_shape)
 
 
 def transition(system: System, method: Method, dt: Array) -> Array:
-    """P of a linear system, of shape (n, n, *members): what a step makes of the unit vectors of the slots.
+    """P of a linear system, of shape (n, n, *members): the unit vectors of the slots after a step.
 
     A single step length goes through the core. Different ones go through the reference at once, which equals the core to the
     last bit.
@@ -42,7 +42,7 @@ def transition(system: System, method: Method, dt: Array) -> Array:
 
 
 def response(system: System, method: Method, dt: Array, members: Shape) -> Array:
-    """Q of a linear system, of shape (n, inputs, *members): what a step makes, from rest, of an input held at 1."""
+    """Q of a linear system, of shape (n, inputs, *members): the state after a step from rest, with an input held at 1."""
     n = sum(size(system))
     q = np.zeros((n, len(system.input_names), *members))
     for j, name in enumerate(system.input_names):
@@ -59,9 +59,8 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
     """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
 
-    By the complex step where the system's reference takes such numbers, else from the tape of the step.
-
-    If the system is set back onto its energy after a step, that belongs to it.
+    By the complex step where the system's reference accepts complex numbers, else from the tape of the step. A projection of the
+    system onto its energy is part of the step.
     """
     members = together(system, dt, v, y)
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
@@ -112,7 +111,7 @@ def finish(
 
 
 def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
-    """What a method carries in the place of v, where each member may have a step of its own."""
+    """The carry of a method, where each member may have its own step."""
 
     def spread(block: Array, shape: Shape) -> Array:
         own = block.shape[len(shape) :]

@@ -1,13 +1,13 @@
-"""A linear system taken apart into smaller ones that together have the same eigenvalues of every step.
+"""Decomposes a linear system into smaller ones that together have the same eigenvalues of every step.
 
-Eigenvalues that nearly meet are moved far by rounding, those of a part are not: what drives but is not driven back (filters,
-one behind the other) is told apart exactly, by which elements of A are zero. Where a step is then a function of one matrix
-alone, each eigenvalue of that matrix makes a part of one or two states. Two facts allow it, whatever the method, because all
-that a step does to a state is to sum rates:
+Rounding moves eigenvalues that nearly coincide far, but not those of a smaller part. A part that drives others but is not driven
+by them (filters in series) is found exactly, by the elements of A that are zero. Where a step is then a function of a single
+matrix, each eigenvalue of that matrix gives a part of one or two states. Two facts allow this for every method, because a
+step only sums rates:
 
-- A method that treats both blocks alike makes of ṡ = A·s a polynomial in h·A, and of an eigenvalue λ of A the same one in h·λ.
-- If of v̇ = A_vv·v + A_vy·y, ẏ = A_yv·v + A_yy·y three blocks are multiples of the identity, every step is made of the
-  fourth; an eigenvalue κ of it makes the step of two numbers in which κ stands in the fourth's place.
+- A step of ṡ = A·s by a method that treats both blocks alike is a polynomial in h·A; its eigenvalues are that polynomial of h·λ.
+- If three of the four blocks in v̇ = A_vv·v + A_vy·y, ẏ = A_yv·v + A_yy·y are multiples of the identity, every step is a
+  function of the fourth. Each eigenvalue κ of the fourth gives a step of two numbers, with κ in place of that block.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Rates(NamedTuple):
 
     Attributes:
         values: shape (n,); a pair stands with its positive angle first.
-        decided: whether they are known to double precision, or well enough to tell what grows.
+        decided: whether they are known to double precision, or well enough to decide which modes grow.
     """
 
     values: Complex
@@ -198,7 +198,7 @@ def _turning(z: complex) -> Array:
 
 
 def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -> Part:
-    """Two numbers, or those of a pair, in which an eigenvalue stands in the place of a block."""
+    """A part of two numbers, or of two pairs, with an eigenvalue in place of a block."""
     one = np.eye(2) if value.imag else np.eye(1)
     rows = [[one * (m or 0.0) for m in row] for row in multiples]
     rows[i][j] = _turning(value) if value.imag else value.real * one

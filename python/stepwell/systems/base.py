@@ -1,4 +1,4 @@
-"""What every system says of itself."""
+"""The base class of all systems."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class System(Value, ABC):
         second_order: whether ẏ is v times a number, so that ÿ = a(t, y) if no force depends on v.
         velocity_term: the term that depends on the velocity, or None.
         linear: whether the rates are linear in v, y and the inputs.
-        complex_step: whether the reference is right on numbers with an infinitesimal imaginary part, which is the quickest way to
-            its derivatives; those of others come from their tape.
+        complex_step: whether the reference is correct for numbers with an infinitesimal imaginary part, which is the fastest way
+            to its derivatives; those of other systems come from their tape.
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
-        control: what keeps its energy, if anything does; ``integrate`` puts it there.
+        control: the control or projection of its energy, or None; ``integrate`` sets it.
     """
 
     kernel: ClassVar[str]
@@ -69,12 +69,12 @@ class System(Value, ABC):
 
     @property
     def uncontrolled(self) -> System:
-        """The same system without what controls it."""
+        """The same system without its control."""
         return self if self._free is None else self._free
 
     @abstractmethod
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
 
     def __repr__(self) -> str:
         said = self.said() + ([] if self.control is None else [repr(self.control)])
@@ -82,10 +82,10 @@ class System(Value, ABC):
 
     @abstractmethod
     def given(self, batch: Shape) -> dict[str, Any]:
-        """What describes it, for states of that batch shape: the arguments of its reference class beside the step.
+        """Its parameters by name, for states of that batch shape: the arguments of its reference class except the step.
 
-        A word, a whole number, an array (its own axes first, then those of the batch), a signal, a list of signals, or None for
-        what is not there. The core takes the same under the same names.
+        Each is a word, a whole number, an array (its own axes first, then those of the batch), a signal, a list of signals, or
+        None if it was not given. The core takes the same under the same names.
         """
 
     def alone(self, h: float, batch: Shape) -> Any:
@@ -93,22 +93,22 @@ class System(Value, ABC):
         return self.reference(h, **self.given(batch))
 
     def scaled(self, h: float, batch: Shape) -> Any:
-        """The NumPy reference of this system and of what controls it, scaled to the step h, for states of that batch shape."""
+        """The NumPy reference of this system with its control, scaled to the step h, for states of that batch shape."""
         s = self.alone(h, batch)
         return s if self.control is None else self.control.around(s, h)
 
     def parameters(self, batch: Shape) -> Given:
-        """This system and what controls it, as the core takes them."""
+        """The parameters of this system and of its control, in the form that the core takes."""
         given = self.given(batch)
         return flat(given if self.control is None else given | self.control.given(), batch)
 
     def named(self, name: str, index: Shape) -> str:
-        """What a number among those that describe the system is called: the name of an argument, and where in it."""
+        """The name of a number among the parameters: that of an argument, and the index in it."""
         return f"{name}[{','.join(map(str, index))}]" if index else name
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """What the core can record beside the states, with the shape of each."""
+        """The quantities that the core can record beside the states, with the shape of each."""
         return {}
 
     def energy(self, v: Array, y: Array) -> Array:
@@ -120,7 +120,7 @@ class System(Value, ABC):
         raise UnsupportedError(f"energy: {self!r} has no energy of its own; compute what you mean by it from v and y")
 
     def recordable(self, name: str, v: Array, y: Array, dt: float) -> Array:
-        """A quantity of states of a run with that step, the same to the bit as if it had been recorded."""
+        """A quantity computed from the states of a run with that step, with the same bits as if it had been recorded."""
         if name not in self.quantities:
             return self.energy(v, y)
         return np.asarray(self.alone(dt, y.shape[len(self.y_shape) :]).record(name, v, y))
@@ -134,16 +134,16 @@ class System(Value, ABC):
         raise UnsupportedError(f"z: {self!r} has no auxiliary outputs")
 
     def check_time(self, last: float) -> None:
-        """Raise if the system's inputs make no sense up to a time."""
+        """Raise if an input of the system is not defined up to a time."""
         for given in self.given_inputs().values():
             given.check(last)
 
     def doubt(self, y: Array) -> str | None:
-        """Why the rates mean nothing at some of these coordinates, in words, or None."""
+        """A message if the rates are meaningless at some of these coordinates, or None."""
         return None
 
     def sized(self, *states: Any) -> System:
-        """The same system for states of these shapes; only a system that leaves its size open minds."""
+        """The same system for states of these shapes; this matters only for a system whose size is not fixed yet."""
         return self
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Self:
@@ -182,7 +182,7 @@ class System(Value, ABC):
     # What the transition-matrix form and the analysis ask of a linear system.
 
     def given_inputs(self) -> dict[str, Input]:
-        """The inputs that it was given, by name."""
+        """Its inputs by name, without those that were not given."""
         return {}
 
     @property
@@ -194,7 +194,7 @@ class System(Value, ABC):
         return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
 
     def without_inputs(self) -> System:
-        """The same system, left to itself."""
+        """The same system without inputs."""
         return self
 
     def with_pulse(self, name: str, values: Array, interval: float) -> System:
@@ -226,7 +226,7 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
     for name, value in given.items():
         if value is None:
             continue
-        if type(value) is np.ndarray:  # as most are: each case below takes its time
+        if type(value) is np.ndarray:  # the most frequent case, first because the others take longer
             entries.append((name, rows(value, batch)))
             continue
         match value:

@@ -14,13 +14,13 @@ from .base import System, aligned
 
 
 class Chain(System):
-    """n masses between two walls, joined by n + 1 springs; mass i of block shape (n,) is displaced by y from its rest.
+    """n masses between two walls, joined by n + 1 springs. Blocks have shape (n,); y[i] is the displacement of mass i from rest.
 
     Args:
-        n: how many masses, one or more.
-        stiffness: of the springs: one number, or an array with the n + 1 springs (or 1, for all) along its first axis and the
-            batch along the others. A first or last spring of no stiffness leaves that end of the chain free.
-        mass: of the masses, likewise, with n (or 1) along its first axis.
+        n: number of masses, one or more.
+        stiffness: stiffness of the springs: one number, or an array with the n + 1 springs (or 1, for all) along its first axis
+            and the batch along the others. A first or last spring of stiffness 0 leaves that end of the chain free.
+        mass: the masses, likewise, with n (or 1) along the first axis.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -41,7 +41,7 @@ class Chain(System):
         self.batch = _checks.batch_shape({"stiffness": self.stiffness.shape[1:], "mass": self.mass.shape[1:]})
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         return [str(self.n)]
 
     def given(self, batch: Shape) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from .._value import Value
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import Constant, Held, Sine
 
-#: Beyond this angle a floating-point number cannot tell one part of a period from another.
+#: Beyond this angle the spacing of floating-point numbers is too coarse to locate a time within a period.
 LAST_ANGLE = 2.0**50
 
 
@@ -50,15 +50,15 @@ class Sinusoid(Value):
 
 
 class Sampled(Value):
-    """Samples, each held until the next; the first also before it, the last also after it.
+    """Samples, each held until the next (zero-order hold); the first also holds before its time, the last one for ever.
 
     Args:
         values: the samples along the first axis, the batch along the others.
         interval: time from one sample to the next.
         start: time of the first sample.
 
-    A time that misses a sample's instant by less than a millionth of the interval, as t = t0 + k·dt may by rounding, counts
-    as that instant.
+    A time that falls short of a sample's time by less than a millionth of the interval, as t = t0 + k·dt may by rounding, already
+    gets that sample.
     """
 
     def __init__(self, values: Any, interval: Any, start: Any = 0.0) -> None:
@@ -78,7 +78,7 @@ class Sampled(Value):
         return bool((self.values == self.values[0]).all())
 
     def check(self, last: float) -> None:
-        """Samples make sense at any time."""
+        """Do nothing: samples are defined at any time."""
 
     def signal(self) -> Constant | Held:
         """The reference signal."""
@@ -89,12 +89,12 @@ Input = Sinusoid | Sampled
 
 
 def as_input(argument: str, value: Any) -> Input | None:
-    """An input from what users give: a constant is one sample, held forever."""
+    """An input from the argument of a user: a constant is one sample, held forever."""
     if value is None or isinstance(value, (Sinusoid, Sampled)):
         return value
     return Sampled(_checks.numbers(argument, value)[np.newaxis], interval=1.0)
 
 
 def signal(given: Input | None) -> Constant | Held | Sine | None:
-    """The reference signal of what may be given."""
+    """The reference signal of an input, or None."""
     return None if given is None else given.signal()

@@ -19,19 +19,19 @@ from .inputs import Input, Sampled, as_input
 class LinearSystem(System):
     """ṡ = A·s + B·x(t), with auxiliary outputs z = C·s + D·x(t): the state space equations of the document's §3.
 
-    The state s has n numbers in an order of yours. Some of them stand in the block v, which methods such as False Euler advance
-    first, the others in the block y: ``velocities`` says which. The blocks have shapes (velocities,) and (n − velocities,);
+    The state s has n numbers in the order that you choose. Some of them form the block v, which methods such as False Euler
+    advance first, the others form the block y: see ``velocities``. The blocks have shapes (velocities,) and (n − velocities,);
     either may be empty.
 
     Args:
-        A: shape (n, n, *batch), in one per unit of time.
-        B: shape (n, m, *batch), what m inputs do; None for no inputs. With an A of two axes also a column (n,) for one input.
-        C: shape (r, n, *batch), r auxiliary outputs; None for none. With an A of two axes also a row (n,) for one output.
-        D: shape (r, m, *batch), what the inputs add to the outputs; None for nothing. For one of each also a number.
-        x: the inputs, a sequence of m: each a number, an array over the batch, ``Sinusoid``, ``Sampled``, or None for zero. One
-            input may stand for itself. None if all are zero.
-        velocities: the states in the block v: how many of the first, or a sequence of indices in the order that they shall have
-            in the block; the others, in their order, are the block y. By default the first n // 2.
+        A: state matrix, shape (n, n, *batch), in one per unit of time.
+        B: input matrix, shape (n, m, *batch); None for no inputs. If A has two axes, a column (n,) is accepted for one input.
+        C: output matrix, shape (r, n, *batch); None for no outputs. If A has two axes, a row (n,) is accepted for one output.
+        D: feedthrough matrix, shape (r, m, *batch); None for zero. A number is accepted for one input and one output.
+        x: the inputs, a sequence of m: each a number, an array over the batch, ``Sinusoid``, ``Sampled``, or None for zero. A
+            single input need not be in a sequence. None if all are zero.
+        velocities: the states in the block v: a number, for the first so many, or a sequence of indices in the order of the
+            block; the other states, in their order, are the block y. By default the first n // 2.
 
     Attributes:
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
@@ -76,7 +76,7 @@ class LinearSystem(System):
         self._find_order()
 
     def _find_order(self) -> None:
-        """See in A and B whether ẏ is v times a number, and whether v̇ depends on v."""
+        """Find from A and B whether ẏ is v times a number, and whether v̇ depends on v."""
         v, y = list(self.velocities), list(self.coordinates)
         speeds, n = self.A[y][:, v], len(v)
         unit = np.eye(n).reshape(n, n, *(1,) * (self.A.ndim - 2))
@@ -89,16 +89,16 @@ class LinearSystem(System):
         self.velocity_term = "velocities in the rows of v" if self.A[v][:, v].any() else None
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
         return [f"{len(self.A)} states", f"{self.v_shape[0]} of them velocities", f"{m} inputs", f"{r} outputs"]
 
     def given_inputs(self) -> dict[str, Input]:
-        """The inputs that it was given, by name."""
+        """Its inputs by name, without those that were not given."""
         return {name: given for name, given in zip(self.input_names, self.x, strict=True) if given is not None}
 
     def without_inputs(self) -> LinearSystem:
-        """The same system, left to itself."""
+        """The same system without inputs."""
         return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
 
     def with_pulse(self, name: str, values: Array, interval: float) -> LinearSystem:

@@ -23,15 +23,15 @@ class NBody(System):
     |---|---|---|
     | ``"logarithmic"`` | G·m·m/r, as the document prints it | G·m·m·ln r |
     | ``"newton"`` | G·m·m/r² | −G·m·m/r |
-    | ``"printed"`` | G·m·m/r | −G·m·m/r, which the document prints with it and which belongs to the other |
+    | ``"printed"`` | G·m·m/r | −G·m·m/r, the document's potential, which belongs to Newton's force instead |
 
     Args:
-        masses: one for each body, shape (bodies,) or (bodies, *batch), zero or more. A body without mass is pulled and does
-            not pull.
-        force: named after its potential.
-        G: constant of gravity, above zero; broadcasts over the batch.
-        softening: length ε that is added to distances, r² + ε², so that bodies may meet; broadcasts.
-        dim: 2 or 3; if None, what the state's shape says.
+        masses: one for each body, shape (bodies,) or (bodies, *batch), zero or more. A body without mass is attracted but does
+            not attract.
+        force: the force and its potential, one of the table.
+        G: gravitational constant, above zero; broadcasts over the batch.
+        softening: length ε, which replaces distances r by √(r² + ε²) so that bodies may meet; broadcasts.
+        dim: 2 or 3; if None, taken from the shape of the state.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -65,7 +65,7 @@ class NBody(System):
         self.v_shape = self.y_shape = (len(self.masses), dim)
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
         softening = [f"softening={self.softening}"] * bool(self.softening.any())
@@ -136,7 +136,7 @@ class NBody(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """What can be recorded, with the shape of each; what they are stands in the reference."""
+        """The quantities that can be recorded, with the shape of each; the reference defines them."""
         return {name: each.shape(self.y_shape[1]) for name, each in reference.QUANTITIES.items()}
 
     def energy(self, v: Array, y: Array) -> Array:

@@ -19,7 +19,7 @@ class Oscillator(System):
     Args:
         omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch.
         damping: damping ratio D, without a unit; broadcasts. None leaves the term out.
-        x: input that the spring pulls towards: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
+        x: input, the point to which the spring pulls: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
         a: acceleration by an external force, likewise.
         form: ``"canonical"``, where v is the velocity divided by ω₀ and the phase diagram is a circle, or ``"physical"``, where
             v is the velocity.
@@ -48,11 +48,11 @@ class Oscillator(System):
         )
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         return [*shown(omega=self.omega, damping=self.damping, x=self.x, a=self.a), f"form={self.form!r}"]
 
     def given_inputs(self) -> dict[str, Input]:
-        """The inputs that it was given, by name."""
+        """Its inputs by name, without those that were not given."""
         if self.x is None and self.a is None:
             return {}
         return {name: given for name, given in (("x", self.x), ("a", self.a)) if given is not None}
@@ -69,7 +69,7 @@ class Oscillator(System):
         return 0.5 * (v * v + (self.omega * self.omega) * (y * y))
 
     def without_inputs(self) -> Oscillator:
-        """The same oscillator, left to itself."""
+        """The same oscillator without inputs."""
         return Oscillator(self.omega, self.damping, form=self.form)
 
     def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:

@@ -19,7 +19,7 @@ from ..reference.traced import Tracer
 from .base import TINY, Given, System, aligned, flat, shown
 from .inputs import Input, Sampled, Sinusoid
 
-#: What the function is given as, among the names of parameters; none of these can be called so.
+#: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
 FOUND_LATER = ("_core", "_bounds", "_met")
@@ -30,11 +30,11 @@ LONGEST_GUESS = 32
 
 
 class OwnSystem(System):
-    """A system of equations of one's own: what a function decorated by ``stepwell.system`` returns."""
+    """A system of your own equations: calling a function that is decorated by ``stepwell.system`` returns one."""
 
     kernel = "equations"
     reference = Reference
-    #: What keeps an invariant as a part of the rates, if anything does.
+    #: The control that keeps an invariant as a part of the rates, or None.
     push: Control | None = None
 
     def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
@@ -121,7 +121,7 @@ class OwnSystem(System):
                 f"{self.definition.name}: no state of the declared shape {self.definition.shape[1]} fits what was given: "
                 + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
             )
-        # What a function of an array says when it is given a number is not what is wrong with it.
+        # The error of a function of arrays that is run with a number would be misleading.
         raise next((error for error in refused if not error.of_shape), refused[0])
 
     def _fits(self, shapes: dict[str, Shape]) -> bool:
@@ -130,13 +130,13 @@ class OwnSystem(System):
         return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
 
     def _candidates(self, shapes: dict[str, Shape]) -> Iterator[tuple[Shape, Shape]]:
-        """Shapes of v and y that the function may be written for, the least first."""
+        """Shapes of v and y that the function may be written for, the shortest first."""
         declared_v, declared_y = self.definition.shape
         v, y = shapes.get("v", ()), shapes.get("y", ())
         if self.definition.blocks == 2:
             pairs = [(v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1)]
         elif not (v or y):
-            # Nothing is said of the state: a number, or the shortest vector.
+            # The state is not known: a number, or the shortest vector.
             shortest = [(), *((n,) for n in range(1, LONGEST_GUESS + 1))]
             whole = declared_y is not None and None not in declared_y
             sizes: list[Shape] = [tuple(n or 1 for n in declared_y)] if whole and declared_y is not None else shortest
@@ -151,7 +151,7 @@ class OwnSystem(System):
                 yield v_shape, y_shape
 
     def _bound(self, v_shape: Shape, y_shape: Shape) -> OwnSystem:
-        """The same system for blocks of these shapes; the function is traced, twice to see that it always does the same."""
+        """The same system for blocks of these shapes; the function is traced twice, to check that it always does the same."""
         if (known := self._bounds.get((v_shape, y_shape))) is not None:
             return known
         definition = self.definition
@@ -168,7 +168,7 @@ class OwnSystem(System):
         return bound
 
     def _trace(self) -> None:
-        """Run the function with symbols, twice to see that it always does the same; a control is a part of the rates."""
+        """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
         equations, definition = self.equations, self.definition
         assert equations is not None
         plain = copy.copy(self)
@@ -199,10 +199,10 @@ class OwnSystem(System):
         self.velocity_term = "forces that do" if self._core.reads_v else None
 
     def _known(self) -> OwnSystem:
-        """The same system, of which the shapes of its blocks are known."""
+        """The same system with known shapes of its blocks."""
         return self if self.equations is not None else self.sized()
 
-    # ---- what the core and the reference take
+    # ---- for the core and the reference
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """The function, and parameters by name."""
@@ -224,7 +224,7 @@ class OwnSystem(System):
         return [(RATES, bound._core), *flat(given | ({} if self.control is None else self.control.given()), batch)]
 
     def _retraced(self) -> OwnSystem:
-        """With its operations, which a copy from a file has not."""
+        """With its operations, which an unpickled copy lacks."""
         known = self._known()
         if known._core is None:
             known._trace()
@@ -264,7 +264,7 @@ class OwnSystem(System):
         return self._keeping(self._invariant_of(control), control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
     def _invariant_of(self, control: Any) -> str:
-        """The name of the invariant that a control is for."""
+        """The name of the invariant that a control keeps."""
         if isinstance(control, EnergyControl):
             raise UnsupportedError(
                 f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "

@@ -15,15 +15,15 @@ from .inputs import LAST_ANGLE, Input, as_input, signal
 
 
 class Pendulum(System):
-    """ÿ + 2Dω₀ẏ + ω₀²·sin y = a(t), a rod that swings or turns; y is its angle from below in radians and v the angular velocity.
+    """ÿ + 2Dω₀ẏ + ω₀²·sin y = a(t), a rod that swings or turns; y is its angle in rad, 0 hanging down, v its angular velocity.
 
     Args:
         omega: ω₀ of small swings in radians per unit of time, above zero: √(g/l); broadcasts over the batch.
         damping: damping ratio D of small swings, without a unit; broadcasts. None leaves the term out.
-        a: angular acceleration from outside: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
+        a: external angular acceleration: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
 
-    An angle is not brought back into one turn. The sine is that of the core up to 2⁵⁰ rad, and means nothing beyond;
-    a run that keeps such an angle warns of it.
+    The angle is not reduced to one turn. Its sine is accurate up to 2⁵⁰ rad and meaningless beyond;
+    a run that saves such an angle gives an ``AccuracyWarning``.
 
     Raises:
         ArgumentError: what is wrong with which argument.
@@ -45,7 +45,7 @@ class Pendulum(System):
         )
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         return shown(omega=self.omega, damping=self.damping, a=self.a)
 
     def given_inputs(self) -> dict[str, Input]:
@@ -57,7 +57,7 @@ class Pendulum(System):
         return {"omega": self.omega, "damping": self.damping, "a": signal(self.a)}
 
     def doubt(self, y: Array) -> str | None:
-        """That an angle is too large for a sine."""
+        """A message if an angle is too large for its sine to be known."""
         with np.errstate(invalid="ignore"):
             beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > LAST_ANGLE)])
         return (
@@ -67,6 +67,6 @@ class Pendulum(System):
         )
 
     def energy(self, v: Array, y: Array) -> Array:
-        """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest below."""
+        """Energy per moment of inertia, ½v² + ω₀²(1 − cos y), which is 0 at rest hanging down."""
         half = trig.sin(0.5 * np.asarray(y))
         return np.asarray(0.5 * (v * v) + (2.0 * (self.omega * self.omega)) * (half * half))  # 1 − cos y loses digits near 0

@@ -1,4 +1,4 @@
-"""The restricted problem of three bodies."""
+"""The planar circular restricted three-body problem."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .base import System, shown
 
 
 class RestrictedThreeBody(System):
-    """A body without mass in the plane of two that circle each other, seen from the frame that turns with them.
+    """The planar circular restricted three-body problem: a body without mass near two that circle each other, in their frame.
 
-    The unit of length is their distance, that of mass their sum, and a turn of the frame takes 2π: the heavy body, of mass
-    1 − μ, stands at (−μ, 0) and the light one, of mass μ, at (1 − μ, 0). Blocks have shape (2,).
+    The unit of length is the distance of the two, that of mass their total mass, and a turn of the frame takes 2π. The heavy
+    body, of mass 1 − μ, is at rest at (−μ, 0) and the light one, of mass μ, at (1 − μ, 0). Blocks have shape (2,).
 
     ẍ = x + 2ẏ − (1 − μ)(x + μ)/r₁³ − μ(x − 1 + μ)/r₂³, ÿ = y − 2ẋ − (1 − μ)y/r₁³ − μy/r₂³
 
     Args:
-        mu: μ, the light body's share of the mass, above 0 and below 1; broadcasts over the batch. The moon's share of earth and
-            moon, as Arenstorf took it, if not given.
+        mu: μ, the light body's fraction of the mass, above 0 and below 1; broadcasts over the batch. By default the moon's
+            fraction of earth and moon, as Arenstorf used it.
 
     Raises:
         ArgumentError: what is wrong with ``mu``.
@@ -44,7 +44,7 @@ class RestrictedThreeBody(System):
         self.batch = self.mu.shape
 
     def said(self) -> list[str]:
-        """What its repr says of its arguments."""
+        """Its arguments, for its repr."""
         return shown(mu=self.mu)
 
     def given(self, batch: Shape) -> dict[str, Any]:
@@ -52,7 +52,7 @@ class RestrictedThreeBody(System):
         return {"mu": self.mu}
 
     def energy(self, v: Array, y: Array) -> Array:
-        """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, which the motion keeps; no other energy is kept here."""
+        """Jacobi's integral, ½|v|² − ½(x² + y²) − (1 − μ)/r₁ − μ/r₂, the only energy that the motion conserves in this frame."""
         with np.errstate(all="ignore"):
             across = y[1] * y[1]
             from_heavy, from_light = y[0] + self.mu, (y[0] - 1.0) + self.mu

@@ -1,6 +1,6 @@
 //! Bodies that attract each other: the forces, and the order in which sums over pairs and over bodies are made.
 //!
-//! The order is the same however many bodies there are and whoever computes them: see the core's `systems/nbody.rs`.
+//! The rule for the order is the same in all code that computes them: see the core's `systems/nbody.rs`.
 
 use crate::{functions::log, number::Number};
 

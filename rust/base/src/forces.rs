@@ -10,7 +10,8 @@ use crate::{
     isa::{Level, Task, with_isa},
 };
 
-/// Distances k from one to another, `LANES` apart. Each chunk of bodies meets all of a group before the next does.
+/// A group of distances k, from one to another, `LANES` apart. All pairs of a chunk of bodies in a group are computed before those of
+/// the next chunk.
 pub type Distances = (usize, usize);
 
 type Chunk = [f64; SIDE];
@@ -79,7 +80,7 @@ impl Round {
     }
 }
 
-/// What bodies collect from the partners after them and before them, the latter over two rounds, and their potential.
+/// Sums of the forces on bodies from the partners after them and before them, the latter over two rounds, and their potential.
 pub struct Sums {
     after: Aligned,
     before: Aligned,
@@ -124,7 +125,7 @@ struct Partners<const D: usize> {
 }
 
 impl<const D: usize> Bodies<D> {
-    /// Meets a chunk of partners; `met` has no bits where nobody meets.
+    /// Adds the forces of a chunk of partners; `met` is a mask, with no bits for pairs that do not count.
     #[inline(always)]
     fn meet<const LAW: u8, const ENERGY: bool>(&mut self, p: &mut Partners<D>, soft: f64, met: Option<&[u64; SIDE]>) {
         let mut d = [[0.0; SIDE]; D];
@@ -352,7 +353,7 @@ pub struct Meeting<'a> {
     pub sums: &'a mut Sums,
     /// Whether to add to what is there.
     pub more: bool,
-    /// When set, nothing more is done, and what was done is of no use.
+    /// When set, the kernel returns early with unfinished sums.
     pub stop: &'a AtomicBool,
     /// h times the potential of each body.
     pub potential: &'a mut [f64],
@@ -361,7 +362,7 @@ pub struct Meeting<'a> {
 }
 
 impl Kernel {
-    /// The bodies meet; their potential is found beside the forces if `energy`.
+    /// Computes the forces, and with `energy` the potential too.
     pub fn meet(self, energy: bool, meeting: Meeting) {
         match (self.dim, self.law, energy) {
             (2, Law::Newton, false) => self.by::<2, NEWTON, false>(meeting),

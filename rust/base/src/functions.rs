@@ -1,12 +1,12 @@
 //! Functions of one number, the same to the last bit in Rust and in the reference: sine and natural logarithm.
 //!
-//! **Sine.** A libm's differs between machines. This one reduces by π in two parts (Cody and Waite) to [−π/2, π/2], where one odd
-//! polynomial serves. Up to 10⁶ rad it is within 1 ulp of 1; beyond, its error stays below the one that the rounding of the argument
-//! itself makes. Arguments past 2⁵⁰ are garbage in, garbage out, huge numbers included; callers refuse them.
+//! **Sine.** That of libm differs between machines. This one reduces by π in two parts (Cody and Waite) to [−π/2, π/2], where one odd
+//! polynomial suffices. Up to 10⁶ rad the error is within 1 ulp of 1; beyond, it stays below the effect of rounding the argument.
+//! For arguments past 2⁵⁰ the result is meaningless and may be huge; callers refuse them.
 //!
 //! **Logarithm.** A normal number above zero is 2ᵏ·(1 + f) with 1 + f between √½ and √2; ln(1 + f) is fdlibm's polynomial in
-//! s = f/(2 + f). The error stays below 1 ulp. Zero, subnormal numbers, infinity and NaN give garbage: whoever asks has found r² = 0
-//! before.
+//! s = f/(2 + f). The error stays below 1 ulp. For zero, subnormal numbers, infinity and NaN the result is meaningless: callers
+//! detect r² = 0 before.
 
 #![allow(clippy::excessive_precision, reason = "the coefficients as fdlibm prints them")]
 
@@ -14,9 +14,9 @@ use crate::number::Number;
 
 /// 1/π
 const PER_HALF_TURN: f64 = std::f64::consts::FRAC_1_PI;
-/// 1.5·2⁵²: adding it rounds to an integer, which then stands in the low bits.
+/// 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits.
 const MAGIC: f64 = 6755399441055744.0;
-/// π in two parts; the first has 33 bits, so that n times it is exact for n < 2²⁰.
+/// π in two parts; the first has 33 bits, so that its product with n is exact for n < 2²⁰.
 const PI: [f64; 2] = [3.1415926534682512, 1.2154201013012384e-10];
 /// sin r = r + r³·(S₀ + z·(S₁ + …)), z = r²: the polynomial of least error on [−π/2, π/2], 2.4e-19, with coefficients rounded one
 /// after the other and the rest fitted again.
@@ -40,14 +40,15 @@ pub fn sin<N: Number>(x: N) -> N {
     let r = (x - n * N::of(PI[0])) - n * N::of(PI[1]);
     let z = r * r;
     let w = z * z;
-    // Odd and even powers apart: half the wait of one chain. The largest term comes last, or the error would grow by a sixth.
+    // Separate sums of odd and even powers have half the latency of one chain. The largest term is added last; otherwise the error
+    // would be a sixth larger.
     let odd = s(1) + w * (s(3) + w * (s(5) + w * s(7)));
     let even = s(2) + w * (s(4) + w * s(6));
     let sine = r + (r * z) * (s(0) + z * (odd + z * even));
     sine.xor_bits(y.shift_up(63)) // sin(r + nπ) = (−1)ⁿ·sin r
 }
 
-/// ln 2 in two parts; the first has 33 bits, so that k times it is exact.
+/// ln 2 in two parts; the first has 33 bits, so that its product with k is exact.
 const LN2: [f64; 2] = [6.93147180369123816490e-01, 1.90821492927058770002e-10];
 /// ln((1 + s)/(1 − s)) = 2s + s·(L₀z + L₁z² + …), z = s²
 const L: [f64; 7] = [
@@ -59,11 +60,11 @@ const L: [f64; 7] = [
     1.531383769920937332e-01,
     1.479819860511658591e-01,
 ];
-/// √½, cut: the mantissa is taken from √½ to √2.
+/// The high bits of √½: mantissas are taken between √½ and √2.
 const HALF_ROOT: u64 = 0x3FE6_A09E_0000_0000;
 const TO_ONE: u64 = 0x3FF0_0000_0000_0000 - HALF_ROOT;
 const MANTISSA: u64 = 0x000F_FFFF_FFFF_FFFF;
-/// 2⁵², whose low bits hold a whole number.
+/// 2⁵²: or-ing an integer below 2⁵² into its low bits gives 2⁵² plus that integer.
 const TWO_52: u64 = 0x4330_0000_0000_0000;
 
 /// ln x

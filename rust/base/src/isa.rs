@@ -1,4 +1,4 @@
-//! Run-time CPU dispatch. The project's `unsafe` stands here and in the core's `kernel/pages.rs`.
+//! Run-time CPU dispatch. The project's `unsafe` code is here and in the core's `kernel/pages.rs`.
 //!
 //! A wheel is built for the oldest CPU of its platform. Loops that are not written at run time, such as those of the interpreter, are
 //! therefore compiled once per CPU level, and the level is chosen when a run begins. No level contracts to FMA by itself or reorders, so all
@@ -6,7 +6,7 @@
 
 use std::{ffi::OsString, fmt};
 
-/// What an environment variable asks for and this machine does not have, or nobody knows.
+/// An environment variable names a level that is unknown or that this machine does not have.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownLevel {
     /// Which variable.
@@ -68,7 +68,7 @@ impl Level {
     pub fn here(self) -> bool {
         match self {
             Level::Baseline => true,
-            // Whatever has the one has the other, but for a few CPUs of one maker.
+            // CPUs with the one have the other, except for a few models.
             Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             Level::Avx512 => {
                 is_x86_feature_detected!("avx512f")

@@ -1,4 +1,4 @@
-//! Numbers: what a step is written over.
+//! The numbers over which a step is written.
 //!
 //! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with the core's symbols they write the
 //! tape.
@@ -8,9 +8,9 @@ use std::{
     ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
 };
 
-/// A number, or what stands for one.
+/// A number, or a symbol for one.
 ///
-/// What is not here is not in a step: no `if` on a number, no operation that two machines might round differently.
+/// A step can use only these operations: no `if` on a number, no operation that two machines might round differently.
 pub trait Number:
     nalgebra::Scalar
     + Copy
@@ -24,10 +24,10 @@ pub trait Number:
     + SubAssign
     + MulAssign
 {
-    /// A truth about numbers.
+    /// The result of a comparison.
     type Truth: Copy + BitAnd<Output = Self::Truth> + BitOr<Output = Self::Truth> + Not<Output = Self::Truth>;
 
-    /// A number that is known beforehand.
+    /// A constant.
     fn of(x: f64) -> Self;
     /// √x
     #[must_use]
@@ -66,9 +66,9 @@ pub trait Number:
         Self::choose(y.below(self), self, y)
     }
 
-    /// Held between two constants; a NaN stays one.
+    /// Clamped between two constants; a NaN stays one.
     #[must_use]
-    fn held(self, least: f64, most: f64) -> Self {
+    fn clamped(self, least: f64, most: f64) -> Self {
         let (least, most) = (Self::of(least), Self::of(most));
         let x = Self::choose(self.below(least), least, self);
         Self::choose(most.below(x), most, x)

@@ -1,12 +1,12 @@
-//! What can go wrong in the core, said once.
+//! The errors of the core.
 
-/// Why a run could not be made or did not end.
+/// The reason why a run could not be made or did not finish.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum Error {
     /// The method has no estimate of its error.
     #[error("the method does not estimate its error, so it cannot choose steps to a tolerance")]
     NoEstimate,
-    /// A system that there is not.
+    /// An unknown system.
     #[error("there is no system {name:?}; known: {known}")]
     UnknownSystem {
         /// What was given.
@@ -14,7 +14,7 @@ pub enum Error {
         /// What there is.
         known: String,
     },
-    /// A method that there is not.
+    /// An unknown method.
     #[error("there is no method {name:?}; known: {known}")]
     UnknownMethod {
         /// What was given.
@@ -22,7 +22,7 @@ pub enum Error {
         /// What there is.
         known: String,
     },
-    /// An option of a system that there is not.
+    /// An unknown option of a system.
     #[error("system {system:?} has no kernel for the options {options:?}")]
     Options {
         /// The system's name.
@@ -58,10 +58,10 @@ pub enum Error {
         /// How many it has.
         got: usize,
     },
-    /// A CPU level that this machine does not have or nobody knows.
+    /// A CPU level that is unknown or that this machine does not have.
     #[error(transparent)]
     Level(#[from] stepwell_base::isa::UnknownLevel),
-    /// There is no room for what a run needs.
+    /// A run needs more memory than there is.
     #[error("the system and its workings need {} MiB, which this process cannot have; use a smaller system or fewer threads", bytes >> 20)]
     Memory {
         /// How many bytes it would take.

@@ -7,9 +7,9 @@
 //! * a **system** ([`system::System`], `systems/`) is two blocks, velocities `v` and coordinates `y`, with an increment for each;
 //! * a **method** ([`method::Record`], `steppers/`) is a record and a step, recorded as a [`program`] over blocks;
 //! * a **kernel** ([`kernel::Kernel`]) makes many steps of a tile of members;
-//! * the **driver** ([`run`]) splits a batch into tiles and threads, keeps what was asked for and finds who diverged.
+//! * the **driver** ([`run`]) divides a batch among tiles and threads, saves states and finds members that diverged.
 //!
-//! [`trace`] goes from names to tapes; [`large`] serves systems that are no straight line.
+//! [`trace`] goes from names to tapes; [`large`] steps systems whose step is too long for a tape.
 
 pub use stepwell_base::{bodies, functions, isa};
 

@@ -1,8 +1,8 @@
-//! Methods: what there is to say of one, and what it does to blocks.
+//! Methods: the metadata of each, and its step over blocks.
 
 use crate::program::{Block, Length, Program, Rates, Time};
 
-/// Everything there is to say about a method. Python attributes, `__doc__`, the tables of the docs, the command line, tests,
+/// The metadata of a method. Python attributes, `__doc__`, the tables of the docs, the command line, tests,
 /// charts and benches all read it.
 #[derive(Debug)]
 pub struct Record {
@@ -12,31 +12,31 @@ pub struct Record {
     pub title: &'static str,
     /// Standard names of the same method.
     pub other_names: &'static [&'static str],
-    /// Methods that it is easily taken for.
+    /// Methods with which it is easily confused.
     pub false_friends: &'static [&'static str],
     /// Order of convergence of both blocks.
     pub order: u32,
-    /// What kind of method it is.
+    /// The family of methods to which it belongs.
     pub family: &'static str,
     /// The undamped oscillator is stable for Φ = ω₀T below this; 0 means never.
     pub limit: f64,
-    /// What it asks of a system.
+    /// What it needs from a system.
     pub needs: Needs,
-    /// What it keeps between steps in the place of `v`, if that is something else.
+    /// Its carry: what it keeps between steps in place of `v`, if anything.
     pub carry: Option<Carry>,
-    /// How it estimates the error of a step, if it does: the step can then be chosen to a tolerance.
+    /// Its estimate of the error of a step, if it has one: adaptive steps need it.
     pub estimate: Option<Estimate>,
     /// Section of the document.
     pub section: &'static str,
-    /// Where it comes from.
+    /// Publication.
     pub reference: &'static str,
-    /// What it does, in a few sentences.
+    /// Description, in a few sentences.
     pub about: &'static str,
     /// One step: the new v and y.
     pub step: Blocks,
 }
 
-/// What makes two blocks, one in the place of v and one of y, of a state.
+/// A function from a state to two blocks, one in place of v and one in place of y.
 pub type Blocks = fn(Rates, Time, Length, Block, Block) -> (Block, Block);
 
 /// The method of that name.
@@ -44,7 +44,7 @@ pub fn record(name: &str) -> Option<&'static Record> {
     crate::steppers::RECORDS.iter().copied().find(|record| record.name == name)
 }
 
-/// What a method asks of a system.
+/// What a method needs from a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing beyond the two increments.
@@ -53,7 +53,7 @@ pub enum Needs {
     Acceleration,
 }
 
-/// What a method keeps between steps in the place of the velocity.
+/// What a method keeps between steps in place of the velocity.
 #[derive(Debug)]
 pub struct Carry {
     /// Its name.
@@ -77,7 +77,7 @@ pub struct Estimate {
     pub coarse: Option<Blocks>,
 }
 
-/// A fact about a method, for whoever shows it.
+/// A fact about a method, to be shown.
 #[derive(Debug)]
 pub enum Fact {
     /// Words.
@@ -97,7 +97,7 @@ pub enum Fact {
 }
 
 impl Record {
-    /// All there is to say, by the names that Python has for it. What follows from the step itself is read from its program.
+    /// All metadata, by their names in Python. Those that follow from the step itself are read from its program.
     pub fn facts(&self) -> Vec<(&'static str, Fact)> {
         let program = self.program();
         vec![

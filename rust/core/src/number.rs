@@ -1,4 +1,4 @@
-//! Numbers: what a step is written over.
+//! The numbers over which a step is written.
 //!
 //! A step, a system, a control are written once, over any [`Number`]. With `f64` they compute; with [`Symbol`] they write the tape.
 
@@ -16,7 +16,7 @@ thread_local! {
     static TAPE: RefCell<Tape> = RefCell::new(Tape::default());
 }
 
-/// Runs a function whose symbols write to this tape, and gives back the tape with what the function made.
+/// Runs a function whose symbols write to this tape, and returns the tape with the function's result.
 pub fn record<T>(tape: Tape, f: impl FnOnce() -> T) -> (Tape, T) {
     let outer = TAPE.replace(tape);
     let made = f();
@@ -42,7 +42,7 @@ fn write(op: Op) -> Id {
     TAPE.with_borrow_mut(|tape| tape.push(op))
 }
 
-// nalgebra asks for it. A symbol is equal to another only when both are numbers, so to ask now is a mistake.
+// nalgebra requires it. Whether two symbols are equal is not known while tracing, so calling it is a mistake.
 impl PartialEq for Symbol {
     fn eq(&self, _: &Symbol) -> bool {
         panic!("a symbol has no truth value: choose between two numbers with Number::choose")

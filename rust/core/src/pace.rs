@@ -21,41 +21,41 @@ const CALM_ROOTS: [f64; 2] = [0.562_341_325_190_349_1, 0.749_894_209_332_455_8];
 /// The highest order of an estimate that counts as low.
 const LOW: u32 = 5;
 
-/// What a step moves y by, relative to the longest that y has been, is lost in rounding below this, with some room. So an error of v
-/// that moves y by less is none, however small v is: near a rest v is what rounding leaves of forces that cancel.
+/// A change of y in a step that is smaller than this, relative to the largest length of y so far, is lost in rounding, with some margin. So
+/// an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only rounding.
 const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// That part. A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of such a length: so it must
 /// be long beside the roundings of time, and short beside the motion that follows.
 const PUSHED: f64 = 1.0 / 64.0;
 
-/// Where a member stands, and how it goes on. Steps do not depend on the saved times: a step that passes the next of them is held, not
-/// taken, until the states within it are saved. Each is made by an extra step, from the start of the held one.
+/// The time of a member and the state of its step-size controller. Steps do not depend on the saved times: a step that passes the next
+/// of them is held, not taken, until the states within it are saved. Each is computed by an extra step from the start of the held one.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace<N> {
     /// Its time.
     pub t: N,
     /// The step that it will try next.
     pub h: N,
-    /// The time that is asked for next.
+    /// The next output time.
     pub target: N,
     /// Above zero: the length of the extra step that comes next, to a saved time.
     pub extra: N,
-    /// 1 if the step is known to be good that comes next and passes the target.
+    /// 1 if the next step is held: it was accepted, but passes the target.
     pub held: N,
     /// Tolerated error of a step, relative to the length of a block.
     pub relative: N,
-    /// Tolerated error beside the relative one.
+    /// Tolerated error in addition to the relative one.
     pub absolute: N,
-    /// 1 if the length that counts is the longest that a block has been so far, 0 if it is that of now.
+    /// 1 if errors are relative to the largest length of a block so far, 0 if they are relative to its present length.
     pub lasts: N,
-    /// The squares of the longest that v and y have been so far.
+    /// The squares of the largest lengths of v and y so far.
     pub longest: [N; 2],
     /// The time of the start.
     pub begin: N,
-    /// No step is longer than this while inputs change from sample to sample, so that none is passed over,
+    /// The longest step while inputs change from sample to sample, so that none is skipped,
     pub interval: N,
-    /// which is until then.
+    /// and the time until which they do.
     pub until: N,
     /// The sixteenth root of the last accepted error, or its thirty-second.
     pub before: N,
@@ -71,7 +71,7 @@ pub struct Pace<N> {
     pub error: N,
 }
 
-/// What comes next: the length of the step, whether it is an extra one, and whether there is a step of the run itself to try.
+/// The next attempt: the length of the step, whether it is an extra one, and whether there is a step of the run itself to try.
 #[derive(Clone, Copy, Debug)]
 pub struct Outlook<N: Number> {
     /// How long the step is.
@@ -88,7 +88,7 @@ impl Pace<f64> {
         self.outlook(budget).runs
     }
 
-    /// Whether the time that is asked for next is within the held step.
+    /// Whether the next output time is within the held step.
     pub fn holds(&self) -> bool {
         self.held > 0.0 && self.target < self.t + self.h
     }
@@ -231,7 +231,7 @@ impl<N: Number> Pace<N> {
     fn tolerated(&self, step: N, old: [N; 2], new: [N; 2]) -> [N; 2] {
         let zero = N::of(0.0);
         let longer = |a: N, b: N| N::choose(a.below(b), b, a);
-        // What has been at zero so far and is pushed now is as long as the push would have made it in a part of the time since.
+        // A block at zero so far on which a force sets in counts as long as that force would have made it in a part of the time since.
         let since = N::of(PUSHED) * ((self.t + step - self.begin) / step);
         let since2 = longer(N::of(1.0), since * since);
         let rested = (self.longest[0] + self.longest[1]).at_most(zero);
@@ -250,7 +250,7 @@ impl<N: Number> Pace<N> {
     fn decided(&self, high: bool, r2: N, new: [N; 2], outlook: Outlook<N>) -> (Pace<N>, N::Truth) {
         let number = N::of;
         let Outlook { step, is_extra, runs } = outlook;
-        // Lengths whose squares overflow tolerate anything, so they count as not finite.
+        // Lengths whose squares overflow would tolerate any error, so they count as not finite.
         let r2 = N::choose((new[0] + new[1]).below(number(f64::INFINITY)), r2, number(f64::INFINITY));
         let good = r2.at_most(number(1.0)); // NaN is not
         let floored = N::choose(number(TINY_SQUARE).below(r2), r2, number(TINY_SQUARE));

@@ -1,8 +1,8 @@
 //! The step program: a method, recorded over blocks.
 //!
-//! A method says which value of which block is used; what a block is made of is not its concern. So it is run once with
-//! [`Block`]s that only write down what is done with them: rates, sums, products with numbers. The program is then carried out over
-//! vectors of numbers or of symbols ([`Program::run`]; that is how it becomes a tape), or over long rows on the heap (`large/`).
+//! A method says which value of which block is used, whatever a block is made of. So it is run once with
+//! [`Block`]s that only record the operations on them: rates, sums, products with numbers. The program is then executed over
+//! vectors of numbers or of symbols ([`Program::run`]; the latter gives a tape), or over long rows on the heap (`large/`).
 
 use std::{
     cell::RefCell,
@@ -62,7 +62,7 @@ impl Time {
 /// One entry of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Entry {
-    /// The block in the place of v at the start of the step.
+    /// The v slot at the start of the step: v, or the carry.
     V,
     /// The coordinates at the start of the step.
     Y,
@@ -90,7 +90,7 @@ impl Entry {
         }
     }
 
-    /// What tells it from others. Numbers are compared by their bits.
+    /// Its key for equality. Numbers are compared by their bits.
     fn key(self) -> (u8, u64, u32, u32) {
         match self {
             Entry::V => (0, 0, 0, 0),
@@ -167,7 +167,7 @@ impl Rates {
     }
 }
 
-/// What a method does to blocks, in order.
+/// The operations of a method on blocks, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     /// The entries, each after what it reads.
@@ -177,7 +177,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Records what a method does.
+    /// Records the operations of a method.
     pub fn record(method: impl FnOnce(Rates, Time, Length, Block, Block) -> Vec<Block>) -> Program {
         let outer = RECORDING.take();
         let (v, y) = (write(Entry::V), write(Entry::Y));
@@ -186,12 +186,12 @@ impl Program {
         Program { entries: recording.entries, results }
     }
 
-    /// How often the rate of v is asked for.
+    /// Number of evaluations of the rate of v.
     pub fn evaluations(&self) -> usize {
         self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..))).count()
     }
 
-    /// Times within a step at which the rates are asked for, as shares of the step, ascending.
+    /// Times within a step at which the rates are evaluated, as fractions of the step, ascending.
     ///
     /// `of_y`: those of ẏ count too; of a second-order system it does not depend on the time.
     pub fn nodes(&self, of_y: bool) -> Vec<f64> {
@@ -208,7 +208,7 @@ impl Program {
         nodes
     }
 
-    /// Carries the program out over vectors of numbers, and gives its results.
+    /// Executes the program over vectors of numbers, and returns its results.
     pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
         let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
         for entry in &self.entries {

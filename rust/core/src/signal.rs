@@ -1,4 +1,4 @@
-//! Inputs: what drives a system from outside, as a function of time.
+//! Inputs: functions of time that drive a system.
 
 use crate::{functions::sin, number::Number};
 

@@ -1,4 +1,4 @@
-//! What is to be stepped, as it is given: words, whole numbers, rows of parameters and tables of samples, each by its name.
+//! The description of a system: words, whole numbers, rows of parameters and tables of samples, each by its name.
 
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ pub struct Table<'a> {
     pub interval: f64,
 }
 
-/// Names of what is given, and how much of it there is: all that a step depends on but for the numbers themselves.
+/// Names and sizes of the parameters and inputs: all that a tape depends on, without their values.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Given {
     /// The system's name: its file in `systems/`.

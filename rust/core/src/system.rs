@@ -28,7 +28,7 @@ pub trait System<N: Number> {
 
     /// The velocity whose increment of `y` is `d`: undoes `dy` in a second-order system, where ẏ is v times a number.
     ///
-    /// Methods that ask for an acceleration use it; no other system needs it.
+    /// Methods that need an acceleration use it; other systems need not define it.
     fn velocity(&self, d: &Block<N>) -> Block<N> {
         d.map(|_| N::of(f64::NAN))
     }
@@ -53,13 +53,13 @@ pub trait System<N: Number> {
         (v, y)
     }
 
-    /// What it has added up since it was made, if it adds anything up.
+    /// Its tally, the sum over the steps since it was made, if it has one.
     fn tally(&self) -> Option<N> {
         None
     }
 }
 
-/// What [`System::energies`] gives.
+/// The result of [`System::energies`].
 #[derive(Clone, Debug)]
 pub struct Energies<N: Number> {
     /// h·v̇
@@ -70,7 +70,7 @@ pub struct Energies<N: Number> {
     pub whole: N,
 }
 
-/// What [`System::gradient`] gives.
+/// The result of [`System::gradient`].
 #[derive(Clone, Debug)]
 pub struct Gradient<N: Number> {
     /// ∂E/∂v
@@ -90,17 +90,17 @@ pub struct Shape {
     pub y: usize,
 }
 
-/// Everything that the core knows of a kind of system: its file in `systems/` holds one as `KIND`.
+/// The properties of a kind of system: its file in `systems/` has one as `KIND`.
 pub struct Kind {
     /// The name of its file.
     pub name: &'static str,
-    /// How large the blocks are, or what is wrong with what was given.
+    /// The size of the blocks, or an error for wrong parameters.
     pub shape: fn(&Given) -> Result<Shape, Error>,
-    /// The term that depends on the velocity, if there is one: methods that ask for an acceleration refuse it.
+    /// The term that depends on the velocity, if there is one: methods that need an acceleration refuse it.
     pub velocity_term: fn(&Given) -> Option<&'static str>,
     /// Quantities that can be recorded, and how many numbers each has. The `energy` is among them if it can be controlled.
     pub quantities: fn(&Given) -> Vec<(String, usize)>,
-    /// About how many operations an evaluation of both rates takes: of many, a step becomes no tape.
+    /// Approximate number of operations of both rates: with many, a step is not a single tape.
     pub operations: fn(&Given) -> usize,
     /// The rates of one large member, where they are written by hand.
     pub long: Option<Long>,
@@ -111,9 +111,9 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// How large the blocks are, or why a system of this kind cannot be made of what was given, or not be stepped by the method.
+    /// The size of the blocks, or an error if the parameters are wrong or the method cannot step the system.
     ///
-    /// Whatever passes here can be made and stepped.
+    /// A system that passes this check can be made and stepped.
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
         controls::check(self, given)?;

@@ -7,7 +7,7 @@ use crate::program::{Block, Length, Rates, Time};
 pub struct Tableau {
     /// Times of the stages, as shares of the step.
     pub nodes: &'static [f64],
-    /// Weights of the increments that each stage looks at.
+    /// Weights of the earlier increments in each stage.
     pub rows: &'static [&'static [f64]],
 }
 

@@ -1,4 +1,4 @@
-//! From a system and a method to tapes: what a run needs of them, cut by how often it changes.
+//! Traces a system and a method to the tapes of a run, split by how often their values change.
 
 use std::{
     collections::HashMap,
@@ -9,7 +9,7 @@ use std::{
 use crate::{
     controls,
     error::Error,
-    large::{Facts, STRAIGHT, group::Courses, tapes::Rated},
+    large::{Facts, MAX_TAPE_OPERATIONS, group::Courses, tapes::Rated},
     method::Record,
     number::{Number, Symbol, record},
     pace::{Pace, attempt},
@@ -21,7 +21,7 @@ use crate::{
     tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
 };
 
-/// What makes a step.
+/// The kind of step.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum How {
     /// A method, by its name, started in its `choice`-th way.
@@ -43,7 +43,7 @@ pub enum How {
     },
 }
 
-/// What a tape is made for.
+/// The key of a tape.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Scene {
     /// What is given.
@@ -52,7 +52,7 @@ pub struct Scene {
     pub how: How,
     /// Quantities that are recorded beside states.
     pub record: Vec<String>,
-    /// Whether steps are computed with fused multiply-adds: see [`fuse`]. What is recorded is not.
+    /// Whether steps are computed with fused multiply-adds: see [`fuse`]. Recorded quantities are not.
     pub fused: bool,
 }
 
@@ -64,7 +64,8 @@ pub struct Tapes {
     pub start: Option<Stage>,
     /// Turns what the method carries into velocities.
     pub finish: Option<Stage>,
-    /// A step that tells the velocities before it behind the next state, for a run that keeps all of them; none if the state has them.
+    /// A step that also returns the velocities before it, after the next state, for a run that saves all of them; None if the state has
+    /// them already.
     pub shown: Option<Stage>,
     /// The recorded numbers, behind v and y.
     pub record: Option<Stage>,
@@ -72,18 +73,18 @@ pub struct Tapes {
     pub written: Counts,
 }
 
-/// What is known of a scene. What takes long to find is found when it is asked for first.
+/// The properties and tapes of a scene. Expensive ones are found on first use.
 pub struct Traced {
     scene: Scene,
     /// How large the blocks are.
     pub shape: Shape,
-    /// Whether the system adds something up, in a number of the state behind v and y.
+    /// Whether the system has a tally, a sum over the steps in a number of the state behind v and y.
     pub tally: bool,
     /// How many numbers are recorded.
     pub recorded: usize,
-    /// Whether the method carries something else than v between steps.
+    /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
-    /// About how many operations the rates take, and a step.
+    /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
     /// By what is known of rates.
@@ -131,7 +132,7 @@ pub(crate) fn method(name: &str) -> Result<&'static Record, Error> {
     crate::method::record(name).ok_or_else(|| Error::UnknownMethod { name: name.to_owned(), known: known() })
 }
 
-/// How large the blocks of a scene are, or why its system cannot be made of what was given, or not be stepped so.
+/// The size of the blocks of a scene, or an error if its parameters are wrong or the method cannot step it.
 pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
     match how {
         How::Matrix { .. } => {
@@ -282,7 +283,7 @@ pub(crate) fn cut(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
 }
 
-/// About how many operations the rates of a scene take, and a step.
+/// Approximate numbers of operations of the rates of a scene and of a step.
 fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), Error> {
     Ok(match how {
         How::Matrix { nodes } => {
@@ -306,8 +307,8 @@ impl Scene {
         Cache::find(CACHE.get_or_init(Mutex::default), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
-            if self.fused && operations.1 > STRAIGHT {
-                return Err(Error::TooLongToFuse { operations: operations.1, most: STRAIGHT });
+            if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
@@ -326,18 +327,18 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            Ok((traced, operations.1.min(4 * STRAIGHT)))
+            Ok((traced, operations.1.min(4 * MAX_TAPE_OPERATIONS)))
         })
     }
 }
 
-/// Operations of a step that take longer than a user who wants to stop should wait, or nearly so.
-const LONG_STEP: usize = 1 << 24;
+/// Operations of a step from which on it may take so long that Ctrl-C must be answered within it.
+const LONG_STEP_OPERATIONS: usize = 1 << 24;
 
 impl Traced {
     /// Whether a step of so many members may take long.
     pub fn is_long(&self, members: usize) -> bool {
-        self.operations.1.saturating_mul(members) >= LONG_STEP
+        self.operations.1.saturating_mul(members) >= LONG_STEP_OPERATIONS
     }
 
     /// How many steps of so many members have that many operations; one or more.
@@ -420,11 +421,11 @@ impl Scene {
     }
 }
 
-/// Operations of all that is kept in a cache, at most: about 50 bytes each on the tape, and at most as much again, for each
-/// interleaved vector, as machine code. When something new would pass it, what was there is forgotten.
-const MOST_OPERATIONS: usize = 200_000;
+/// The most operations of all tapes in a cache: about 50 bytes each on the tape, and at most as much again, for each interleaved vector,
+/// as machine code. When a new entry would exceed it, the cache is emptied first.
+const MAX_CACHED_OPERATIONS: usize = 200_000;
 
-/// Rates, by the system and what is recorded of it: methods have them in common.
+/// The cache of rates, by the system and its recorded quantities; all methods share it.
 fn rated() -> &'static Mutex<RatedCache> {
     static CACHE: OnceLock<Mutex<RatedCache>> = OnceLock::new();
     CACHE.get_or_init(Mutex::default)
@@ -444,9 +445,9 @@ impl<K, V> Default for Cache<K, V> {
 }
 
 impl<K: Clone + Eq + Hash, V> Cache<K, V> {
-    /// What belongs to a key; it is made, with its number of operations, if it is not there.
+    /// The value of a key. If it is missing, `make` makes it and returns it with its number of operations.
     fn find(cache: &Mutex<Self>, key: &K, make: impl FnOnce() -> Result<(V, usize), Error>) -> Result<Arc<V>, Error> {
-        // A thread that panicked while it held the lock has left a map that is whole: entries are made outside.
+        // A thread that panicked while it held the lock has left the map intact: entries are made outside the lock.
         let lock = || cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = lock().known.get(key) {
             return Ok(Arc::clone(known));
@@ -454,7 +455,7 @@ impl<K: Clone + Eq + Hash, V> Cache<K, V> {
         let (made, size) = make()?;
         let made = Arc::new(made);
         let mut cache = lock();
-        if cache.operations + size > MOST_OPERATIONS {
+        if cache.operations + size > MAX_CACHED_OPERATIONS {
             *cache = Cache::default();
         }
         cache.operations += size;

@@ -1,5 +1,5 @@
-//! Kernels that must not fall off a cliff, by their instructions and not by the clock: the loop of a written kernel is read back and
-//! held against what the step computes.
+//! Kernels must not become slow: this is tested by their instructions and not by the clock. The loop of a kernel is read back and
+//! compared with the operations of the step.
 #![cfg(target_arch = "x86_64")]
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -35,7 +35,7 @@ fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) ->
 
 type Last = (Vec<f64>, Vec<f64>, Vec<i64>);
 
-/// The last v and y from v = 0 and y = 1, and who diverged when.
+/// The last v and y from v = 0 and y = 1, and the steps at which members diverged.
 fn last(plan: &Plan) -> Result<Last, Error> {
     let (mut v, mut y, mut bad) = (vec![0.0; plan.members], vec![0.0; plan.members], vec![-1; plan.members]);
     let arrays =
@@ -97,8 +97,8 @@ fn a_batch_of_any_size_is_its_members() {
 }
 
 #[test]
-fn the_first_bad_step_is_exact_on_both_sides_of_a_look() {
-    // Steps 1023, 1024 and 1025 stand around the first look; growth is chosen so that members overflow there.
+fn the_first_bad_step_is_exact() {
+    // Growth is chosen so that members overflow at steps 1024 and 1025, among others.
     let omega: Vec<f64> = (0..400).map(|i| 2.10 + f64::from(i) * 2e-4).collect();
     let (_, _, bad) = last(&plan(oscillators(&omega, "false_euler"), 1.0, 3000, 400, 1)).unwrap();
     assert!(bad.contains(&1024) && bad.contains(&1025));

@@ -37,6 +37,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![false; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
+        equations: None,
     }
 }
 

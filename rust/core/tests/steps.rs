@@ -81,6 +81,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![true; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
+        equations: None,
     }
 }
 
@@ -290,7 +291,7 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
         let (v, y) = state.split_at(n * dim);
         for (name, size) in (kind.quantities)(&given) {
             let p = Parameters { given: &given, h: 0.5, numbers: parameters.clone(), sample };
-            let made = quantity(kind.numbers, &p, name, v, y);
+            let made = quantity(kind.numbers, &p, &name, v, y);
             assert_eq!(made.len(), size, "{name}");
             let (tape, symbols) = record(Tape::default(), || {
                 let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
@@ -302,7 +303,7 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
                 };
                 let symbols: Vec<Symbol> = (0..2 * (n * dim) as u32).map(|i| Symbol::new(Op::State(i))).collect();
                 let (v, y) = symbols.split_at(n * dim);
-                quantity(kind.symbols, &p, name, v, y)
+                quantity(kind.symbols, &p, &name, v, y)
             });
             let roots: Vec<Id> = symbols.into_iter().map(|symbol| symbol.0).collect();
             let bits: Vec<u64> = made.iter().map(|number| number.to_bits()).collect();

@@ -98,8 +98,8 @@ struct ArraysOf<'py> {
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills what is kept. Whether somebody diverged, now or
-/// before.
+/// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills the arrays of saved states. Returns whether
+/// some member diverged, now or before.
 #[pyfunction]
 fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
     let rows = model.rows(py)?;
@@ -133,12 +133,12 @@ fn filled<'a, D: Dimension>(array: &'a mut Option<PyReadwriteArray<'_, f64, D>>)
     array.as_mut().map_or(Ok(&mut []), |array| Ok(array.as_slice_mut()?))
 }
 
-/// The times of the states that a run keeps.
+/// The times of the saved states of a run.
 #[pyfunction]
 fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
     let clock = Clock { t0: plan.t0, h: plan.dt };
     let numbers = t.as_slice_mut()?;
-    // Whole numbers up to 2⁵³ are exact, so that they can be counted as what they are multiplied as, several at once.
+    // Whole numbers up to 2⁵³ are exact as floats, so the step numbers can be counted as floats, several at once.
     let every = plan.every.unwrap_or(plan.steps) as f64;
     let ahead: [f64; 16] = std::array::from_fn(|i| i as f64 * every);
     for (i, chunk) in numbers.chunks_mut(ahead.len()).enumerate() {
@@ -196,7 +196,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
-/// Runs without the GIL, tells how far it is and hears Ctrl-C.
+/// Runs without the GIL, reports progress and answers Ctrl-C.
 fn interruptible(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
@@ -237,7 +237,7 @@ pub fn kinds_of<'py>(py: Python<'py>, counts: &Counts) -> PyResult<Bound<'py, Py
     Ok(d)
 }
 
-/// A body's operations, and the places of what comes of them.
+/// A body's operations, and the indices of its results.
 fn body_of(body: &Body) -> (Vec<Operation>, Vec<usize>) {
     let operations = body.ops.iter().map(|op| operation(*op, |operand| operand as usize)).collect();
     (operations, body.next.iter().map(|id| *id as usize).collect())
@@ -272,7 +272,7 @@ fn split_of<'py>(py: Python<'py>, split: &Split) -> PyResult<Bound<'py, PyDict>>
 /// A name, the places of operands, and a time or a factor.
 type BlockOperation = (&'static str, Vec<usize>, f64);
 
-/// What a method does to blocks: names, operands, times or factors, and the places of the results; see `_core.pyi`.
+/// The operations of a method on blocks: names, operands, times or factors, and the indices of the results; see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (method, *, attempts=false))]
 fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<usize>)> {
@@ -303,7 +303,7 @@ fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
 }
 
-/// What a step becomes, traced and compiled anew for so many members: see `_core.pyi`.
+/// The tape and machine code of a step, made anew for so many members: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
 fn compiled<'py>(
@@ -346,7 +346,7 @@ fn compiled<'py>(
     Ok(Some(d))
 }
 
-/// By what a step is made that is too long for one tape; None if it is one: see `_core.pyi`.
+/// How a step that is too long for one tape is computed; None if it is one tape: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
 fn in_parts(

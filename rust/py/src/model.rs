@@ -47,7 +47,7 @@ impl Equations {
     }
 }
 
-/// What is given under a name: a word, a whole number, rows of a parameter, samples with their start and interval, or rates.
+/// The value of a name: a word, a whole number, rows of a parameter, samples with their start and interval, or rates.
 enum Value {
     Word(String),
     Whole(usize),

@@ -1,4 +1,4 @@
-//! Tapes in Python: symbols that stand for numbers, so that what Python computes can be held against what the core traces.
+//! Tapes in Python: with symbols in place of numbers the reference's step is traced, to be compared with the core's.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -151,7 +151,7 @@ impl Symbol {
     fn floor(&self) -> Symbol {
         self.on(Op::Floor)
     }
-    /// Comparisons are values; what is equal is asked for by `equals`, since == is asked for a truth.
+    /// Comparisons are values. Equality has the method `equals`, since Python needs a truth from ==.
     fn __richcmp__(&self, other: Value, op: CompareOp) -> PyResult<Symbol> {
         match op {
             CompareOp::Lt => self.with(&other, Op::Less),

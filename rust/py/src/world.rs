@@ -19,7 +19,7 @@ use crate::{
 
 /// How the arrays are reached.
 enum Arrays {
-    /// A few numbers are copied in and out: that takes a third of the time of asking for leave to write.
+    /// A few numbers are copied in and out, which takes a third of the time of borrowing the arrays for writing.
     Few { buffers: (PyBuffer<f64>, PyBuffer<f64>), copies: (Vec<f64>, Vec<f64>) },
     /// Many are stepped where they are.
     Many { v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>> },
@@ -55,7 +55,7 @@ const LAST_STEP: i64 = 1 << 53;
 pub struct World {
     loop_: Mutex<Loop>,
     clock: Clock,
-    /// Where it stands, for whoever asks while it is being stepped.
+    /// The step number, for other threads to read while it is being stepped.
     step: AtomicI64,
 }
 
@@ -65,18 +65,18 @@ struct Loop {
 }
 
 impl Loop {
-    /// `n` steps; long ones let other threads run, and look for Ctrl-C.
+    /// `n` steps; long calls let other threads run and check for Ctrl-C.
     fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
         let Loop { world, arrays } = self;
         arrays.with(py, |v, y| {
-            let Some(patience) = world.patience() else {
+            let Some(steps_between_checks) = world.steps_between_checks() else {
                 let result = interruptible(py, None, |monitor| world.step_in_background(n, v, y, monitor));
                 at.store(world.step_number(), Relaxed);
                 return result;
             };
-            while n > patience {
-                py.detach(|| world.step(patience, v, y));
-                n -= patience;
+            while n > steps_between_checks {
+                py.detach(|| world.step(steps_between_checks, v, y));
+                n -= steps_between_checks;
                 at.store(world.step_number(), Relaxed);
                 py.check_signals()?;
             }
@@ -152,7 +152,7 @@ impl World {
         self.alone(|of| of.advance(py, n, &self.step))
     }
 
-    /// What the method carries in the place of v, by rows; None if the next step begins with v itself.
+    /// The carry, by rows; None if the next step begins with v itself.
     fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let carry = self.alone(|Loop { world, arrays }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
         Ok(carry.map(|carry| carry.into_pyarray(py)))
@@ -172,14 +172,14 @@ impl World {
 }
 
 impl World {
-    /// Does something unless somebody else is at it. To wait would be to wait for ever: whoever steps may wait for the GIL.
+    /// Does something unless another thread is stepping the world. Waiting could deadlock: that thread may be waiting for the GIL.
     fn alone<R>(&self, act: impl FnOnce(&mut Loop) -> PyResult<R>) -> PyResult<R> {
         match self.loop_.try_lock() {
             Ok(mut of) => act(&mut of),
             Err(TryLockError::WouldBlock) => {
                 Err(error_of("BusyError", "the world is being stepped by another thread; one at a time may do that".to_owned()))
             }
-            // A panic within a step: what the slots hold is of no use any more.
+            // After a panic within a step the slots are not valid any more.
             Err(TryLockError::Poisoned(_)) => {
                 Err(error_of("BusyError", "a step of this world broke off; make a new one".to_owned()))
             }

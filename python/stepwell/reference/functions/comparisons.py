@@ -1,7 +1,7 @@
-"""Comparisons by name, as NumPy has them; true of no NaN but ``not_equal``.
+"""Comparisons by name, as in NumPy; with a NaN all are false except ``not_equal``.
 
-Of symbols, ``==`` is an error, and where arrays of symbols are compared by ``<``, NumPy asks for the truth of each element. These
-do neither. What they give is joined by ``&``, ``|`` and ``~``, and goes into ``where``.
+``==`` of symbols is an error, and so is ``<`` of arrays of symbols, since NumPy asks for the truth of each element. These
+functions accept both. Their results are combined by ``&``, ``|`` and ``~``, and used in ``where``.
 """
 
 from __future__ import annotations

@@ -42,14 +42,14 @@ EXP2 = (
     7.073924586475366e-09,
     4.456232717843695e-10,
 )
-#: Up to the first eˣ is 0 and up to the second eˣ − 1 is −1, rounded; from the last on both are infinite.
+#: Up to the first number eˣ rounds to 0, up to the second eˣ − 1 rounds to −1; from the last on both are infinite.
 UNDERFLOW_UNTIL, MINUS_ONE_UNTIL, OVERFLOW_FROM = -746.0, -40.0, 710.0
 #: Up to the first a power of 2 is 0, from the second on it is infinite.
 LOWEST_POWER_OF_TWO, HIGHEST_POWER_OF_TWO = -1080.0, 1025.0
 
 
 def held(x: Any, least: float, most: float) -> Any:
-    """X held between two constants; a NaN stays one."""
+    """X limited to two constants; a NaN remains one."""
     x = where(x < least, least, x)
     return where(most < x, most, x)
 
@@ -92,10 +92,10 @@ def expm1(x: Any) -> Any:
     """Exponential of x less 1, eˣ − 1, also where that is small."""
     y = held(x, MINUS_ONE_UNTIL, OVERFLOW_FROM)
     p = reduced(y)
-    # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); of n = 1024 half a 2¹⁻ⁿ is still to be had.
+    # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); for n = 1024 half of 2¹⁻ⁿ is still a number.
     one, one_rest = fast_sum(1.0, -0.5 * power_of_two(1.0 - p.n))
     s, lost = fast_sum(one, p.upper)
-    # Just above ln 2/2 it matters that r was rounded.
+    # Just above ln 2/2 the rounding error of r matters.
     rest = p.rest + (p.r * ((p.upper - p.r) - p.lower) + one_rest)
     value = scaled(s + (lost + rest), p.n, y < 0.25)  # small y are not halved: they may be subnormal
     return either_bits(value, sign_of(x))

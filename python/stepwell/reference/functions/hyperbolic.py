@@ -80,12 +80,12 @@ def cosh(x: Any) -> Any:
 
 @elementary
 def tanh(x: Any) -> Any:
-    """Hyperbolic tangent of x: e²ˣ − 1 by e²ˣ + 1, each to more than 53 bits."""
+    """Hyperbolic tangent of x: (e²ˣ − 1)/(e²ˣ + 1), each to more than 53 bits."""
     y = magnitude(x)
     p = exponential(2.0 * where(y > TANH_ONE_FROM, TANH_ONE_FROM, y))
     inverse = power_of_two(-p.n)
     pairs = []
-    for part in (-inverse, inverse):  # e²ˣ − 1 and e²ˣ + 1, over 2ⁿ
+    for part in (-inverse, inverse):  # e²ˣ − 1 and e²ˣ + 1, divided by 2ⁿ
         one, one_rest = fast_sum(1.0, part)
         s, lost = fast_sum(one, p.upper)
         pairs.append(fast_sum(s, lost + (p.rest + one_rest)))

@@ -82,11 +82,11 @@ def arctan(x: Any) -> Any:
 
 @elementary
 def arctan2(y: Any, x: Any) -> Any:
-    """Angle of the point (x, y), from −π to π; of zeros and infinities as in C."""
+    """Angle of the point (x, y), from −π to π; zeros and infinities as in C."""
     sign, up, right = sign_of(x), magnitude(y), magnitude(x)
     swap = right < up
     a, b = where(swap, up, right), where(swap, right, up)
-    # To where products are exact unless the angle is 0 or subnormal, and away from zero by less than can be seen.
+    # Scaled so that products are exact unless the angle is 0 or subnormal, and moved from zero by less than affects the result.
     scale = where(a < 2.0**100, 2.0**900, where(a > 2.0**1000, 2.0**-60, 1.0))
     # Of two infinities the angle is π/4.
     endless = equal(a, INFINITY)
@@ -97,7 +97,7 @@ def arctan2(y: Any, x: Any) -> Any:
 
 
 def half_angle(x: Any) -> tuple[Any, Any, Any]:
-    """What arcsin x and arccos x have in common: whether |x| is above 1/2, and an angle in two parts.
+    """The common part of arcsin x and arccos x: whether |x| is above 1/2, and an angle in two parts.
 
     The angle is arcsin |x| if |x| is at most 1/2, and else arcsin √((1 − |x|)/2), which is half of arccos |x|. Its first part is
     its sine, cut to 26 bits if that is a root.

@@ -68,14 +68,14 @@ def reduced(x: Any, *, normal: bool = False) -> Reduced:
 
 
 def at_the_ends(x: Any, value: Any) -> Any:
-    """A logarithm where x is positive and finite; −∞ of zero, NaN of negative numbers, ∞ and NaN as they are."""
+    """A logarithm where x is positive and finite; −∞ for zero, NaN for negative numbers, ∞ and NaN unchanged."""
     value = where(x < INFINITY, value, x)
     return where(x > 0.0, value, where(equal(x, 0.0), -INFINITY, NAN))
 
 
 @elementary
 def log(x: Any) -> Any:
-    """Natural logarithm of x, subnormal numbers included; −∞ of zero, NaN of what is below (fdlibm's algorithm).
+    """Natural logarithm of x, subnormal numbers included; −∞ for zero, NaN for negative numbers (fdlibm's algorithm).
 
     Example:
         >>> print(log(2.0))
@@ -87,7 +87,7 @@ def log(x: Any) -> Any:
 
 @elementary
 def log1p(x: Any) -> Any:
-    """Natural logarithm of 1 + x, also where x is small; −∞ of −1, NaN of what is below."""
+    """Natural logarithm of 1 + x, accurate also where x is small; −∞ for −1, NaN below."""
     u = 1.0 + x
     one = u - x
     lost = (1.0 - one) + (x - (u - one))  # 1 + x = u + lost (Knuth)

@@ -1,7 +1,7 @@
-"""What the elementary functions are made of: the operations that arrays and the symbols of a tape both have.
+"""The operations of the elementary functions: those that arrays and the symbols of a tape both have.
 
-``elementary`` turns a function of such values into one of whatever users give. Inside it all values are arrays of float64, or
-all are symbols; so no operation has to mind numbers of Python. Sums, products, quotients and comparisons are operators.
+``elementary`` wraps a function of such values so that it accepts all that users may pass. Inside it all values are arrays of
+float64, or all are symbols; none is a number of Python. Sums, products, quotients and comparisons are operators.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..marks import mark
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: Functions that users know by another name, and what is made of products alone, whose derivatives are theirs.
+#: Functions without a mark: those with another name for users, and those of products alone, which are differentiated as such.
 NAMES, UNMARKED = {"any_power": "power"}, {"of", "deg2rad", "rad2deg"}
 #: Of a number's bits: its sign, and all others.
 SIGN, NOT_SIGN = 1 << 63, (1 << 63) - 1
@@ -41,7 +41,7 @@ def lifted(symbol: Any, name: str, value: Any) -> Any:
 
 
 def as_array(name: str, value: Any) -> Any:
-    """A list as an array, all else as it is."""
+    """A list as an array, any other value unchanged."""
     if not isinstance(value, (list, tuple)):
         return value
     try:
@@ -51,7 +51,7 @@ def as_array(name: str, value: Any) -> Any:
 
 
 def shape_of(names: Sequence[str], given: Sequence[Any]) -> tuple[int, ...]:
-    """The shape that all have together."""
+    """The shape to which all broadcast."""
     shapes = [each.shape if isinstance(each, np.ndarray) else () for each in given]
     try:
         return np.broadcast_shapes(*shapes)
@@ -68,8 +68,8 @@ def one_by_one(given: Sequence[Any]) -> bool:
 def elementary(f: F) -> F:
     """A function of symbols, of numbers, and of arrays of either, which broadcast.
 
-    Beside a symbol, numbers become symbols of its tape. What is not finite is computed with like any number, without a warning.
-    Symbols are marked as this function of others, for whoever differentiates, if its name is one that users know.
+    If any argument is a symbol, numbers become symbols of its tape. Infinities and NaN are treated like any number, without a
+    warning. If users know the function by this name, its symbols are marked as its values, for differentiation.
     """
     signature = inspect.signature(f)
     names = tuple(signature.parameters)
@@ -103,7 +103,7 @@ def _number(bits: Any) -> Any:
 
 
 def where(truth: Any, yes: Any, no: Any) -> Any:
-    """One of two numbers, as a comparison says."""
+    """One of two numbers, chosen by a comparison."""
     return truth.choose(yes, no) if is_symbol(truth) else np.where(truth, yes, no)
 
 

@@ -1,4 +1,4 @@
-"""Arithmetic with more than 53 bits, without fused multiply-adds, and what many functions begin or end with.
+"""Arithmetic with more than 53 bits, without fused multiply-adds, and common first and last parts of functions.
 
 A number of about 106 bits is the sum of two, of which the second is at most half a unit in the last place of the first.
 """
@@ -33,7 +33,7 @@ def halves(x: Any) -> tuple[Any, Any]:
 
 
 def fast_sum(x: Any, y: Any) -> tuple[Any, Any]:
-    """Sum, rounded, and what was rounded away (Dekker); the exponent of x is at least that of y, or x is 0."""
+    """Sum, rounded, and its rounding error (Dekker); the exponent of x is at least that of y, or x is 0."""
     s = x + y
     return s, (x - s) + y
 

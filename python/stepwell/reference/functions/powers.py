@@ -43,7 +43,7 @@ TWO_THIRDS_LOG2_E = (0.9617967009544373, -7.028461650952758e-09, 0.9617966939259
 INFINITY, NAN = float("inf"), float("nan")
 #: Whole and half exponents up to this size are products.
 LARGEST_PRODUCT = 16
-#: An exponent of this size makes 0 or infinity of all numbers but 1: log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹.
+#: With an exponent of this size the power is 0 or infinity for all numbers except 1: log₂(1 ± 2⁻⁵³) times it is beyond ±2⁹.
 LARGEST_EXPONENT = 2.0**64
 
 
@@ -58,7 +58,7 @@ def log2_in_two(x: Any) -> tuple[Any, Any]:
     s1, _ = halves(s)
     s2 = inverse * ((f - s1 * total) - s1 * total_rest)
     s = s1 + s2
-    # s·(3 + s² + s⁴·P(s²)), where 3 + s² is to be had exactly.
+    # s·(3 + s² + s⁴·P(s²)), where 3 + s² must be exact.
     z, z1 = s * s, s1 * s1
     rest = (z * z) * polynomial(z, LOG_LONG) + s2 * (s1 + s)
     t1 = and_bits((3.0 + z1) + rest, UPPER)
@@ -108,7 +108,7 @@ def _product(x: Any, n: int) -> Any:
 
 @functools.cache
 def _known_power(exponent: float) -> Any:
-    """The function of x that takes it to a whole or half power."""
+    """The function that raises x to a whole or half power."""
     whole = int(abs(exponent))
 
     @elementary
@@ -128,9 +128,9 @@ def power(x: Any, y: Any) -> Any:
 
     Args:
         x: a number, a symbol or an array.
-        y: the same. If it is a number of Python or NumPy, whole or half a whole one, and from −16 to 16, the power is a product:
-            xⁿ is that of those of x, x², x⁴, … whose exponents add up to n, the smallest first; then comes √x, if y is not whole;
-            and 1 is divided by all that if y is negative. An array is no such number.
+        y: the same. If it is a number of Python or NumPy, and a multiple of ½ from −16 to 16, the power is a product: xⁿ is the
+            product of those of x, x², x⁴, … whose exponents add up to n, the smallest first; it is then multiplied by √x if y is
+            not whole, and 1 is divided by it if y is negative. For an array of exponents this does not hold.
 
     Returns:
         The power, at zeros, infinities and NaN as C's ``pow``, except that the square root of −∞ is NaN.

@@ -12,13 +12,13 @@ INFINITY = float("inf")
 #: 2⁵²: its low bits hold a whole number.
 TWO_52 = 4503599627370496.0
 TWO_52_BITS = 0x4330000000000000
-#: What a third of the upper 32 bits of |x| is taken from, so that these are bits of x^(−1/3) with an error of 3.5 % at most.
+#: This minus a third of the upper 32 bits of |x| gives the upper bits of x^(−1/3), with an error of at most 3.5 %.
 CUBE_START = 1430185000.0
 
 
 @elementary
 def sqrt(x: Any) -> Any:
-    """Square root of x, correctly rounded; −0 of −0, NaN of what is below.
+    """Square root of x, correctly rounded; −0 for −0, NaN for negative numbers.
 
     Example:
         >>> print(sqrt(2.0))
@@ -35,7 +35,7 @@ def square(x: Any) -> Any:
 
 @elementary
 def cbrt(x: Any) -> Any:
-    """Cube root of x, by x^(−1/3), which Newton's method finds without a division, and one step to more than 53 bits."""
+    """Cube root of x, from x^(−1/3) by Newton's method, which needs no division, and a last step to more than 53 bits."""
     y = magnitude(x)
     small = y < 2.0**-900
     a = where(small, y * 2.0**300, y)

@@ -50,7 +50,7 @@ def trunc(x: Any) -> Any:
 
 @elementary
 def round(x: Any) -> Any:
-    """The whole number nearest to x; of two the even one."""
+    """The whole number nearest to x; the even one if two are equally near."""
     y = magnitude(x)
     return either_bits(choose(y < TWO_52, (y + TWO_52) - TWO_52, y), sign_of(x))
 
@@ -63,13 +63,13 @@ def abs(x: Any) -> Any:
 
 @elementary
 def sign(x: Any) -> Any:
-    """−1, 0 or 1, as x is; NaN of NaN."""
+    """−1, 0 or 1, the sign of x; NaN for a NaN."""
     return choose(x < 0.0, -1.0, choose(x > 0.0, 1.0, x + 0.0))
 
 
 @elementary
 def copysign(x: Any, y: Any) -> Any:
-    """|x| with the sign of y, zeros included. The sign of a NaN that was computed is not promised, and so neither is this."""
+    """|x| with the sign of y, zeros included. The sign of a computed NaN may differ between machines, so y must not be one."""
     return either_bits(magnitude(x), sign_of(y))
 
 
@@ -86,15 +86,15 @@ def maximum(x: Any, y: Any) -> Any:
 
 
 def clip(x: Any, low: Any, high: Any) -> Any:
-    """X held between two bounds: ``minimum(maximum(x, low), high)``."""
+    """X limited to two bounds: ``minimum(maximum(x, low), high)``."""
     return minimum(maximum(x, low), high)
 
 
 @elementary
 def mod(x: Any, y: Any) -> Any:
-    """What remains of x after whole multiples of y, with the sign of y, as ``x % y`` in Python.
+    """The remainder of x after subtraction of whole multiples of y, with the sign of y, as ``x % y`` in Python.
 
-    Exact, where that is a number of 53 bits, as long as |x/y| is below 2⁵²; NaN beyond.
+    Exact if it has at most 53 bits and |x/y| is below 2⁵²; NaN from there on.
 
     Example:
         >>> print(mod(-7.0, 3.0))
@@ -125,7 +125,7 @@ def where(condition: Any, x: Any, y: Any) -> Any:
         y: the same.
 
     Returns:
-        The elements of one or the other, of the shape that all three have together.
+        The elements of one or the other, of the shape to which all three broadcast.
 
     Raises:
         DTypeError: the condition is not made of truths, or x or y not of numbers.

@@ -1,9 +1,9 @@
 """Sine, cosine and tangent.
 
 The argument is reduced by n·π/2 to r in [−π/4, π/4] (Cody and Waite), with π/2 in four parts. n times each of the first three is
-exact for n < 2²⁴, so what remains of x near a multiple of π/2 is right to its own last bits, and a tail beyond them is kept. Of r
-both sine and cosine are computed, by polynomials as in fdlibm's kernels, and one of them is taken: a step that asks for both pays
-little more than for one. ``docs/coefficients.py`` finds the coefficients.
+exact for n < 2²⁴, so r is accurate to its own last bits even near a multiple of π/2, and a tail beyond them is kept. Both sine
+and cosine of r are computed, by polynomials as in fdlibm's kernels, and one of them is chosen: a step that needs both costs
+little more than a step that needs one. ``docs/coefficients.py`` finds the coefficients.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ COS = (
 )
 #: π/180 and 180/π.
 DEGREE, RADIAN = 0.017453292519943295, 57.29577951308232
-#: The number of which only the lowest bit is set.
+#: The number with only the lowest bit set.
 ODD = 2.0**-1074
-#: Beyond it an argument is further from its neighbours than 1/8 of a radian, and has no sine worth the name.
+#: Beyond this an argument is more than 1/8 of a radian from its neighbours, and its sine means nothing.
 LARGEST_ANGLE = 2.0**50
 
 

@@ -9,11 +9,11 @@ from ..types import Array
 
 
 class Equations:
-    """The rates are what ``rates`` makes of the time, the state and what the system is given by name.
+    """The rates as ``rates`` computes them from the time, the state, and parameters and inputs by name.
 
     ``rates`` runs the user's function over arrays whose last axes are those of the batch. Under a control both rates are pushed
     along the gradient of an invariant I, by −gain·(I − target)·∇I/|∇I|², so that I − target decays as exp(−gain·t) (Baumgarte
-    1972); in the limited form by as much as backward Euler, gain/(1 + h·gain), for which no gain is too large.
+    1972); the limited form uses gain/(1 + h·gain), as backward Euler would, for which no gain is too large.
     """
 
     def __init__(self, h: float, /, **given: Any) -> None:
@@ -31,7 +31,7 @@ class Equations:
         return rates[0] - push * along[0], rates[1] - push * along[1]
 
     def _push(self, v: Array, y: Array) -> Any:
-        """By how much of the gradient both rates are pushed; by nothing where it is zero."""
+        """The multiple of the gradient that is added to both rates; zero where the gradient is."""
         square = self.gradient(v, y)[2]
         gain = self.gain[()]
         if self.equations.limited:
@@ -56,7 +56,7 @@ class Equations:
         return self.equations.invariants[self.equations.kept]
 
     def energies(self, v: Array, y: Array) -> tuple[Any, Any, Any]:
-        """Nothing of h·v̇ and of a kinetic energy; h times the invariant that is kept."""
+        """Zero for h·v̇ and for the kinetic energy, and the invariant that is kept, times h."""
         return None, None, self.h * self._invariant().value(v, y, self.given)
 
     def gradient(self, v: Array, y: Array, dv: Any = None) -> tuple[Array, Array, Any]:

@@ -17,7 +17,7 @@ def chain(n: Any = 8, modes: Mapping[int, float] | None = None) -> Scene:
     """Unit masses and springs between two walls, from rest in a sum of normal modes, over ten periods of the slowest.
 
     Mode j swings with ω_j = 2·sin(½πj/(n + 1)) in the shape sin(πij/(n + 1)), i = 1 … n. The default is the slow motion
-    that one looks at, with a little of the fastest mode, which alone decides how large a step may be.
+    that one observes, with a little of the fastest mode, which alone limits the step.
 
     Args:
         n: how many masses, one or more.

@@ -12,7 +12,7 @@ from ...errors import ArgumentError
 from ...systems import NBody
 from ..base import Scene
 
-#: Newton's method from the far end needs this many steps at most, for any eccentricity below 1 that a float can tell.
+#: Newton's method from the far end needs this many steps at most, for any eccentricity that a float can distinguish from 1.
 MAX_ITERATIONS = 100
 
 

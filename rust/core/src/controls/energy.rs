@@ -22,8 +22,8 @@ pub struct Controlled<N: Number> {
     work: Cell<N>,
 }
 
-/// g, the share of the velocity that is taken away, and what that alone takes of the energy, (1 − (1 − g)²)·K; of h times what the energy is
-/// off and h times the kinetic energy.
+/// g, the fraction by which velocities are reduced, and the energy that this removes, (1 − (1 − g)²)·K; from h times the error of the
+/// energy and h times the kinetic energy.
 pub fn push<N: Number>(limited: bool, gain: N, off: N, kinetic: N) -> (N, N) {
     let g = if limited {
         let (one, twice) = (N::of(1.0), N::of(2.0) * gain);

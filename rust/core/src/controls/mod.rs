@@ -1,8 +1,8 @@
-//! What keeps the energy near its target (§12, Appendix D).
+//! Controls and projections, which keep the energy near its target (§12, Appendix D).
 //!
-//! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage of whatever method makes the step,
-//! so it goes with all of them. A *projection* sets the state back onto the energy after the step. Both wrap any system that has
-//! an energy, and are a system themselves. Energies come scaled to the step, as everything does.
+//! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage, so it works with every method.
+//! A *projection* returns the state to the target energy after the step. Both wrap any system that has
+//! an energy, and are a system themselves. Energies are scaled to the step, as everything is.
 //!
 //! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`; or it is
 //! `projection`, with the word `control.way` and the `control.target`.
@@ -22,7 +22,7 @@ pub fn is_given(given: &Given) -> bool {
     !given.word("control").is_empty()
 }
 
-/// What is wrong with the control that is given, if anything is.
+/// An error if the control that is given is wrong.
 pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
     let name = match given.word("control") {
         "" => return Ok(()),
@@ -43,8 +43,8 @@ pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
     given.expect("control.target", 1)
 }
 
-/// A system under the control that is given, or the system itself. The tally starts from this number: h times what control or
-/// projection changed of the energy.
+/// A system under the control that is given, or the system itself. The tally starts from this number: h times the energy that control or
+/// projection added.
 pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
     match p.given.word("control") {
         "energy" => Box::new(energy::Controlled::new(p, system, tally)),
@@ -53,7 +53,7 @@ pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) 
     }
 }
 
-/// √x with x held between ¼ and 4: a factor of velocities between ½ and 2.
+/// √x with x clamped between ¼ and 4: a factor of velocities between ½ and 2.
 fn factor<N: Number>(square: N) -> N {
-    square.held(0.25, 4.0).sqrt()
+    square.clamped(0.25, 4.0).sqrt()
 }

@@ -1,5 +1,5 @@
-//! Back onto the energy after a step: all velocities by one factor, or the least change of the state (Nacozy 1971), which is along
-//! the gradient of the energy, in velocities and coordinates.
+//! Projection onto the target energy after a step: all velocities by one factor, or the least change of the state (Nacozy 1971), which is
+//! along the gradient of the energy, in velocities and coordinates.
 
 use std::cell::Cell;
 
@@ -10,7 +10,7 @@ use crate::{
     system::{Block, Energies, Gradient, System},
 };
 
-/// A system whose states are set back onto their energy.
+/// A system whose states are projected onto the target energy.
 pub struct Projected<N: Number> {
     system: Box<dyn System<N>>,
     h: N,
@@ -20,13 +20,13 @@ pub struct Projected<N: Number> {
     work: Cell<N>,
 }
 
-/// The factor of all velocities, and what it brings of the energy; of h times what the energy is off and h times the kinetic energy.
+/// The factor of all velocities, and the energy that it adds; from h times the error of the energy and h times the kinetic energy.
 pub fn scaling<N: Number>(off: N, kinetic: N) -> (N, N) {
     let factor = factor(N::of(1.0) - off / kinetic);
     (factor, (factor * factor - N::of(1.0)) * kinetic)
 }
 
-/// How far to go back along the gradient of the energy, whose square is this.
+/// The step along the gradient of the energy, from the square of its length.
 pub fn nacozy<N: Number>(off: N, h: N, square: N) -> N {
     (off / h) / square
 }
@@ -38,7 +38,7 @@ impl<N: Number> Projected<N> {
         Projected { system, h: p.h, nacozy, target, work: Cell::new(tally) }
     }
 
-    /// The state set back; `None` if the system has no energy.
+    /// The projected state; `None` if the system has no energy.
     fn back(&self, v: &Block<N>, y: &Block<N>) -> Option<(Block<N>, Block<N>)> {
         let energies = self.system.energies(v, y)?;
         let off = energies.whole - self.target;

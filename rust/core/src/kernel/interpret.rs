@@ -1,7 +1,7 @@
 //! The portable interpreter: operation after operation, each over all lanes of a tile.
 //!
-//! It serves where no machine code may be written, where a run is too short for writing any, and the tests: it is what a kernel
-//! writer is held against.
+//! It is used where machine code is not allowed, where a run is too short for it to be worthwhile, and in the tests, which compare
+//! kernel writers with it.
 
 use std::cell::Cell;
 

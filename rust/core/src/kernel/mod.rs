@@ -1,4 +1,4 @@
-//! From the list of operations to what the machine does: kernels.
+//! Kernels: from the list of operations to code that runs them.
 //!
 //! A kernel makes a number of steps of a tile of lanes, one lane a member. It is interpreted ([`interpret`]) or written as machine
 //! code at run time ([`x86`]); the bits are the same.
@@ -26,9 +26,9 @@ use crate::tape::split::Body;
 pub struct Layout {
     /// Numbers in a vector.
     pub width: usize,
-    /// Vectors that are stepped by one turn of the loop.
+    /// Vectors that are stepped by one iteration of the loop.
     pub block_vectors: usize,
-    /// Turns of the loop that a tile takes.
+    /// Iterations of the loop for a tile.
     pub blocks: usize,
     /// Whether the state stays in registers over all steps.
     pub resident: bool,
@@ -36,7 +36,7 @@ pub struct Layout {
     pub registers: usize,
 }
 
-/// What a kernel works on. Rows are `lanes` numbers long, one for each member, and follow each other.
+/// The data of a kernel. Rows are `lanes` numbers long, one for each member, and follow each other.
 #[derive(Debug)]
 pub struct Tile<'a> {
     /// A row for each number of the state, changed in place.
@@ -74,13 +74,13 @@ pub trait Kernel: Send + Sync {
         0
     }
 
-    /// How many values are spilled at most, because registers do not suffice.
+    /// The most values that are spilled at once because there are not enough registers.
     fn spills(&self) -> usize {
         0
     }
 }
 
-/// Panics unless a tile holds what a body asks for. What is written as machine code relies on it.
+/// Panics unless a tile has the rows that a body reads. Machine code relies on it.
 #[inline]
 pub fn check(body: &Body, lanes: usize, tile: &Tile) {
     assert!(tile.state.len() >= body.next.len() * lanes, "state");

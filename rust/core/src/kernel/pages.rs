@@ -1,7 +1,7 @@
-//! Pages of machine code. All that is unsafe about kernels stands here.
+//! Pages of machine code. All unsafe code of the kernels is in this file.
 //!
 //! A page is writable first and executable then, never both. A system may refuse to make it executable (hardened ones do); then there
-//! is no kernel, and the interpreter serves.
+//! is no kernel, and the interpreter is used.
 
 use super::{Tile, check};
 use crate::tape::split::Body;
@@ -70,15 +70,15 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Code that was written for a frame. It must touch nothing outside, and return: the writers see to that, and the tests that they
-    /// do. None if the system has no pages to give or does not let code be executed.
+    /// Code that was written for a frame. It must not access anything outside the frame, and must return: the writers ensure that, and
+    /// the tests check it. None if the system has no memory left or does not allow executable pages.
     pub(super) fn new(code: &[u8], frame: Frame) -> Option<Pages> {
         let mut map = memmap2::MmapMut::map_anon(code.len()).ok()?;
         map.copy_from_slice(code);
         Some(Pages { map: map.make_exec().ok()?, frame })
     }
 
-    /// Whether the system gives pages and lets them be executed: one is asked for.
+    /// Whether the system allows executable pages, found by trying one.
     pub(super) fn allowed() -> bool {
         memmap2::MmapMut::map_anon(1).and_then(memmap2::MmapMut::make_exec).is_ok()
     }

@@ -20,8 +20,9 @@ impl Uses {
         Uses { first: vec![NONE; values], uses: Vec::new() }
     }
 
-    /// A value is needed. Uses are told from the last to the first; whether this is the last one of its value.
-    pub fn tell(&mut self, value: u32, when: u32) -> bool {
+    /// Adds a use of a value before those already added: uses are given from the last to the first. Returns whether it is the value's
+    /// last use.
+    pub fn add_earlier_use(&mut self, value: u32, when: u32) -> bool {
         let first = &mut self.first[value as usize];
         let is_last = *first == NONE;
         self.uses.push((when, *first));
@@ -29,7 +30,7 @@ impl Uses {
         is_last
     }
 
-    /// The next use after a time, or [`NONE`]. Times asked for never go back.
+    /// The next use after a time, or [`NONE`]. The times of successive calls must not decrease.
     pub fn next(&mut self, value: u32, after: u32) -> u32 {
         let first = &mut self.first[value as usize];
         while *first != NONE {

@@ -1,4 +1,4 @@
-//! A body and what makes its steps: interpreted at first, written as machine code when that pays.
+//! A body with its kernel: interpreted at first, compiled to machine code when that is worthwhile.
 
 use std::sync::{
     OnceLock,
@@ -12,14 +12,14 @@ use super::{
 };
 use crate::{isa::Level, tape::split::Body};
 
-/// What is interpreted before machine code is written, in operations over one lane for each operation of the body: writing an
-/// operation takes about as long as interpreting it so often.
-const INTERPRETED: u64 = 4000;
-/// What the interpreter pays to begin an operation over a row of lanes, in lanes.
-const TO_BEGIN: usize = 10;
+/// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an operation
+/// takes about as long.
+const INTERPRETATIONS_PER_WRITE: u64 = 4000;
+/// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
+const LANES_PER_DISPATCH: usize = 10;
 
-/// Lanes that the interpreter takes at once where nothing else sets their number, of few members and of many: the values of a step stay
-/// in the first cache.
+/// Lanes that the interpreter takes at once where no shape sets their number, for few members and for many: the values of a step stay
+/// in the L1 cache.
 const INTERPRETED_LANES: [usize; 2] = [8, 64];
 
 /// A body, over tiles of one length.
@@ -27,10 +27,10 @@ pub struct Runner {
     body: Body,
     lanes: usize,
     interpreter: Interpreter,
-    /// How it would be written; none where no machine code can be.
+    /// The shape of its machine code; none where there is no machine code.
     shape: Option<Shape>,
     written: OnceLock<Option<Box<dyn Kernel>>>,
-    /// What was done so far, as [`INTERPRETED`] counts it.
+    /// The work interpreted so far, as [`INTERPRETATIONS_PER_WRITE`] counts it.
     done: AtomicU64,
 }
 
@@ -48,7 +48,7 @@ impl Runner {
         Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
-    /// In a shape that was chosen before; interpreted if there is none.
+    /// With a shape that was chosen before; interpreted if there is none.
     pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner {
         let interpreter = Interpreter::new(body, lanes, level);
         Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }
@@ -75,8 +75,8 @@ impl Runner {
         if let Some(Some(written)) = self.written.get() {
             return (written.as_ref(), true);
         }
-        let coming = (steps * (self.lanes + TO_BEGIN)) as u64;
-        let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETED;
+        let coming = (steps * (self.lanes + LANES_PER_DISPATCH)) as u64;
+        let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETATIONS_PER_WRITE;
         match pays.then(|| self.write()).flatten() {
             Some(written) => (written, true),
             None => (&self.interpreter, false),

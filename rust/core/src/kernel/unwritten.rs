@@ -1,4 +1,4 @@
-//! The kernel writer of a machine that has none: everything is interpreted.
+//! The kernel writer for a CPU that has none: everything is interpreted.
 
 use super::{Layout, interpret::Interpreter};
 use crate::{isa::Level, tape::split::Body};
@@ -29,7 +29,7 @@ pub fn choose_long(_: &Body, _: Level, _: usize) -> Option<Shape> {
     None
 }
 
-/// The shape for several steps of rows of so many numbers.
+/// The shape for several steps in one call, over rows of a given length.
 pub fn choose_trail(_: &Body, _: Level, _: usize) -> Option<Shape> {
     None
 }

@@ -14,7 +14,7 @@ use crate::{
     pace::{Pace, judge, length2},
     run::{
         adaptive::{AdaptiveBatch, NO_CLOCK},
-        crew::Stop,
+        workers::Stop,
     },
     spec::Spec,
     trace::{How, Traced, method},
@@ -76,9 +76,9 @@ impl AdaptiveBatch for LargeAdaptive {
         self.pace = pace;
     }
 
-    fn heed(&mut self, stop: &Stop) {
+    fn set_stop_flag(&mut self, stop: &Stop) {
         self.executor.stop = Stop::clone(stop);
-        self.blocks.rates.heed(stop);
+        self.blocks.rates.set_stop_flag(stop);
     }
 
     fn attempt(&mut self, attempts: usize) {

@@ -28,7 +28,7 @@ struct Pull<'a> {
 }
 
 impl Task for Pull<'_> {
-    /// Each mass asks both of its springs: that is quicker than to keep what a spring pulls.
+    /// Each mass computes the forces of both its springs: that is faster than storing the force of each spring.
     #[inline(always)]
     fn run(self) {
         let Pull { stiffness: k, by_mass, y, out } = self;

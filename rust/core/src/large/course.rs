@@ -1,9 +1,9 @@
-//! Courses: what is done to which row of an arena, and when, to carry out a program.
+//! Courses: the schedule of the operations of a program over the rows of an arena.
 //!
-//! A program says what comes of what. Between two rates it only adds and multiplies, number by number, so all of that is one pass over
-//! the rows: it is traced into a tape whose state is the arena, a number for each row, and becomes a kernel like any other. A block is
-//! kept in a row only if a rate reads it, if it is a result, or if it would take long to compute again. A row serves another block as
-//! soon as nobody reads the first any more; the new state goes straight into the rows of the old one where that is so.
+//! A program says which block is computed from which. Between two rates it only adds and multiplies, elementwise, so all of that is one
+//! pass over the rows: it is traced into a tape whose state is the arena, a number for each row, and becomes a kernel like any other. A
+//! block is kept in a row only if a rate reads it, if it is a result, or if it would be expensive to compute again. A row is reused as
+//! soon as its block is not read any more; the new state is written straight into the rows of the old one where that is so.
 
 use std::collections::BTreeSet;
 
@@ -15,8 +15,8 @@ use crate::{
     tape::{Id, Op, Tape, split::split},
 };
 
-/// Operations from which on it is quicker to keep a block than to compute it again.
-const WORTH_A_ROW: usize = 4;
+/// Operations from which on it is faster to keep a block in a row than to compute it again.
+const MIN_OPERATIONS_PER_ROW: usize = 4;
 
 /// The rows of the state, at the start of the step and, if it is the state that is changed, at its end.
 pub const V: usize = 0;
@@ -34,7 +34,7 @@ pub enum Rate {
     Velocity,
 }
 
-/// One thing to be done.
+/// One act of a course.
 pub enum Act {
     /// A rate, from two rows into another. Of [`Rate::Velocity`] the increment is in the row `y`.
     Ask {
@@ -46,7 +46,7 @@ pub enum Act {
         v: usize,
         /// Row of the coordinates.
         y: usize,
-        /// Row of what comes of it.
+        /// Row of the result.
         out: usize,
     },
     /// Both rates of one state.
@@ -55,14 +55,14 @@ pub enum Act {
         at: Time,
         /// Rows of the state.
         state: [usize; 2],
-        /// Rows of what comes of it.
+        /// Rows of the results.
         out: [usize; 2],
     },
     /// One pass over the rows.
     Pass(Box<Stage>),
 }
 
-/// What is done to an arena.
+/// The schedule for an arena.
 pub struct Course {
     /// In order.
     pub acts: Vec<Act>,
@@ -72,10 +72,10 @@ pub struct Course {
     pub results: Vec<usize>,
 }
 
-/// What a course is for.
+/// The purpose of a course.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
-    /// The first two results take the place of the state.
+    /// The first two results replace the state.
     State,
     /// The state stays, and rates are those of a system scaled to a step of 1, stretched to the step.
     Attempt,
@@ -113,7 +113,7 @@ impl Node {
     }
 }
 
-/// Pass k stands before the rates of turn k, which may be asked for side by side; the last pass makes the results.
+/// Pass k comes before the rates of turn k, which are independent of each other; the last pass computes the results.
 struct Plan {
     nodes: Vec<Node>,
     results: Vec<usize>,
@@ -129,7 +129,7 @@ impl Course {
     /// For blocks of that shape; blocks of no numbers are left alone.
     pub fn new(program: &Program, results: &[Block], goal: Goal, facts: Facts, shape: Shape) -> Course {
         let mut plan = Plan::new(program, results, goal, facts, shape);
-        plan.keep_what_is_long();
+        plan.keep_expensive();
         plan.place(goal)
     }
 }
@@ -229,14 +229,14 @@ impl Plan {
         self.nodes[node].operands().map(|operand| self.cost(operand, pass)).fold(1, usize::saturating_add)
     }
 
-    /// Keeps what more than one pass would compute, if that is long.
-    fn keep_what_is_long(&mut self) {
+    /// Keeps blocks that more than one pass would compute, if they are expensive.
+    fn keep_expensive(&mut self) {
         for pass in 0..self.writes.len() {
             loop {
                 let later: BTreeSet<usize> = (pass + 1..self.writes.len()).flat_map(|later| self.work(later).0).collect();
                 let (now, _) = self.work(pass);
                 let twice = now.into_iter().rev().filter(|node| later.contains(node) && self.pass[*node] != Some(pass));
-                let Some(node) = { twice }.find(|node| self.cost(*node, pass) >= WORTH_A_ROW) else { break };
+                let Some(node) = { twice }.find(|node| self.cost(*node, pass) >= MIN_OPERATIONS_PER_ROW) else { break };
                 self.write(node, pass);
             }
         }
@@ -294,7 +294,7 @@ impl Plan {
         for pass in 0..=turns {
             let mut writes: Vec<(usize, usize)> = self.writes[pass].iter().map(|node| (row(*node), *node)).collect();
             if pass == turns && goal == Goal::State {
-                // Results that stand elsewhere come home.
+                // Results in other rows are copied to theirs.
                 let away = [V, Y].into_iter().map(|home| (home, self.results[home]));
                 writes.extend(away.filter(|(home, node)| row(*node) != *home));
             }

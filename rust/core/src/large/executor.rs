@@ -1,4 +1,4 @@
-//! Carries out a course: rates and passes over an arena.
+//! Executes a course: rates and passes over an arena.
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -9,8 +9,8 @@ use super::{
 use crate::{
     isa::Level,
     run::{
-        crew::Stop,
         stage::{Clock, PreparedStage},
+        workers::Stop,
     },
     spec::Spec,
 };
@@ -20,24 +20,29 @@ pub struct Executor {
     /// Of each act its kernel, if it is a pass.
     passes: Vec<Option<PreparedStage>>,
     stride: usize,
-    /// When set, what is left is not done.
+    /// When set, the remaining acts are skipped.
     pub stop: Stop,
 }
 
 const VECTOR: usize = 8;
 
-/// How long rows are, with what fills the last vectors.
+/// The length of rows of so many numbers, padded to whole vectors.
 pub fn stride(numbers: usize) -> usize {
-    // Four vectors are interleaved if they can be, for which there must be a multiple of four. Short rows would be half air.
-    const TEAM: usize = 4 * VECTOR;
-    if numbers <= 8 * TEAM {
-        return numbers.next_multiple_of(if numbers <= TEAM { VECTOR } else { 2 * VECTOR }).max(VECTOR);
+    // Four vectors can be interleaved if their number is a multiple of four. Short rows are padded less: they would be half empty.
+    const INTERLEAVED: usize = 4 * VECTOR;
+    if numbers <= 8 * INTERLEAVED {
+        return numbers.next_multiple_of(if numbers <= INTERLEAVED { VECTOR } else { 2 * VECTOR }).max(VECTOR);
     }
-    let mut stride = numbers.next_multiple_of(TEAM);
-    // A read of what is 4096 bytes from where was just written waits for it: rows must not begin at the same place of a page.
-    const PAGE: usize = 512;
-    while numbers >= PAGE && ((stride / TEAM).is_multiple_of(2) || stride % PAGE < 2 * TEAM || stride % PAGE > PAGE - 2 * TEAM) {
-        stride += TEAM;
+    let mut stride = numbers.next_multiple_of(INTERLEAVED);
+    // A load waits for an earlier store whose address differs by a multiple of 4096 bytes: rows must not begin at the same place of a
+    // page.
+    const PAGE_NUMBERS: usize = 512;
+    while numbers >= PAGE_NUMBERS
+        && ((stride / INTERLEAVED).is_multiple_of(2)
+            || stride % PAGE_NUMBERS < 2 * INTERLEAVED
+            || stride % PAGE_NUMBERS > PAGE_NUMBERS - 2 * INTERLEAVED)
+    {
+        stride += INTERLEAVED;
     }
     stride
 }
@@ -45,15 +50,17 @@ pub fn stride(numbers: usize) -> usize {
 impl Executor {
     /// For rows of so many numbers.
     pub fn new(course: &Course, level: Level, stride: usize, clock: &Clock) -> Executor {
-        let nobody = Spec::default();
+        let no_parameters = Spec::default();
         let pass = |act: &Act| match act {
-            Act::Pass(stage) => Some(PreparedStage::with(stage, stage.kit_of(level, stride), &nobody, clock, f64::INFINITY)),
+            Act::Pass(stage) => {
+                Some(PreparedStage::with(stage, stage.kit_of(level, stride), &no_parameters, clock, f64::INFINITY))
+            }
             Act::Ask { .. } | Act::Both { .. } => None,
         };
         Executor { passes: course.acts.iter().map(pass).collect(), stride, stop: Stop::default() }
     }
 
-    /// Carries it out at time t, with the step h. Attempts are that long, too.
+    /// Executes it at time t, with the step h, which is also the step of an attempt.
     pub fn run(&mut self, course: &Course, rates: &mut dyn Rates, sizes: [usize; 2], t: f64, h: f64, arena: &mut [f64]) {
         let stride = self.stride;
         for (act, pass) in course.acts.iter().zip(&mut self.passes) {

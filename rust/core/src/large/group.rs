@@ -11,13 +11,13 @@ use crate::{
     error::Error,
     isa::Level,
     program::{Block, Program},
-    run::{aligned::Aligned, crew::Stop, group::Group, stage::Clock},
+    run::{aligned::Aligned, group::Group, stage::Clock, workers::Stop},
     spec::Spec,
     system::Shape,
     trace::{How, method},
 };
 
-/// What a method does to blocks, for one kind of rates.
+/// The courses of a method, for one kind of rates.
 pub struct Courses {
     /// A step, or an attempt at one.
     pub step: Course,
@@ -94,7 +94,7 @@ impl Blocks {
     }
 }
 
-/// Members of a system whose rates are asked for one by one.
+/// Members of a large system, stepped by a course that calls their rates.
 pub struct LargeGroup {
     blocks: Blocks,
     clock: Clock,
@@ -102,7 +102,7 @@ pub struct LargeGroup {
     start: Option<Executor>,
     finish: Option<Executor>,
     recorded: usize,
-    /// Whether what was taken from the first member serves all.
+    /// Whether the parameters taken for the first member hold for all.
     prepared: bool,
     stop: Stop,
 }
@@ -138,18 +138,18 @@ impl Group for LargeGroup {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        // What all members have in common is taken once: a large matrix takes longer to take than a step.
+        // Parameters that all members share are copied once: copying a large matrix takes longer than a step.
         if !std::mem::replace(&mut self.prepared, spec.is_common()) {
             self.blocks.rates.prepare(spec, first, count);
         }
         self.blocks.rates.tally_mut().fill(0.0);
     }
 
-    fn heed(&mut self, stop: &Stop) {
+    fn set_stop_flag(&mut self, stop: &Stop) {
         for executor in [Some(&mut self.step), self.start.as_mut(), self.finish.as_mut()].into_iter().flatten() {
             executor.stop = Stop::clone(stop);
         }
-        self.blocks.rates.heed(stop);
+        self.blocks.rates.set_stop_flag(stop);
         self.stop = Stop::clone(stop);
     }
 

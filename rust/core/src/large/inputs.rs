@@ -34,7 +34,7 @@ impl Inputs {
     pub fn new(spec: &Spec, member: usize) -> Inputs {
         let given = &spec.given;
         let numbers = spec.rows.iter().map(|row| row.at(member)).collect();
-        // Samples are looked up below: here is nobody who knows the tables.
+        // `fill` looks samples up in the tables, which `Parameters` does not have here.
         let p = Parameters { given, h: 1.0, numbers, sample: |_, _| f64::NAN };
         let signal = |i: usize| p.signal(&format!("inputs[{i}]")).unwrap_or(Signal::Constant(f64::NAN));
         let samples = spec.tables.iter().map(|table| Samples {

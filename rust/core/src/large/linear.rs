@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use super::{Asked, Facts, Rates, inputs::Inputs, panels::Panels};
 use crate::{
     isa::{Level, Task, with_isa},
-    run::crew::Stop,
+    run::workers::Stop,
     spec::Spec,
     system::Shape,
 };
@@ -60,7 +60,7 @@ impl<const N: usize> Task for Times<'_, N> {
 }
 
 impl Linear {
-    fn look(&mut self, t: f64) {
+    fn update_inputs(&mut self, t: f64) {
         if self.time != t {
             self.inputs.fill(t, &mut self.x);
             self.time = t;
@@ -84,24 +84,24 @@ impl Rates for Linear {
         self.time = f64::NAN;
     }
 
-    fn heed(&mut self, stop: &Stop) {
+    fn set_stop_flag(&mut self, stop: &Stop) {
         self.stop = Stop::clone(stop);
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t);
+        self.update_inputs(t);
         let task = Times { products: [(&self.of_v, out)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        self.look(t);
+        self.update_inputs(t);
         let task = Times { products: [(&self.of_y, out)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }
 
     fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
-        self.look(t);
+        self.update_inputs(t);
         let task = Times { products: [(&self.of_v, dv), (&self.of_y, dy)], parts: [v, y, &self.x], stop: &self.stop };
         with_isa!(self.level, |isa| isa.run(task));
     }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     isa::{Level, Task, with_isa},
-    run::{aligned::Aligned, crew::Stop, group::Group, stage::Clock},
+    run::{aligned::Aligned, group::Group, stage::Clock, workers::Stop},
     spec::Spec,
     system::Shape,
     trace::How,
@@ -29,7 +29,7 @@ pub struct Matrix {
     u: Vec<f64>,
     state: Aligned,
     next: Aligned,
-    /// Whether what was taken from the first member serves all.
+    /// Whether the parameters taken for the first member hold for all.
     prepared: bool,
     stop: Stop,
 }
@@ -39,7 +39,7 @@ impl Matrix {
     pub fn new(spec: &Spec, shape: Shape, how: &How, level: Level, clock: &Clock) -> Matrix {
         let nodes: Vec<f64> = match how {
             How::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
-            How::Method { .. } | How::Attempts { .. } => Vec::new(), // no matrix form, and nobody asks
+            How::Method { .. } | How::Attempts { .. } => Vec::new(), // not the matrix form: never called
         };
         let (n, count) = (shape.v + shape.y, spec.given.whole("inputs"));
         Matrix {
@@ -100,7 +100,7 @@ impl Group for Matrix {
         self.inputs = Inputs::new(spec, first);
     }
 
-    fn heed(&mut self, stop: &Stop) {
+    fn set_stop_flag(&mut self, stop: &Stop) {
         self.stop = Stop::clone(stop);
     }
 
@@ -112,7 +112,7 @@ impl Group for Matrix {
         self.state[..self.shape.v + self.shape.y].split_at_mut(self.shape.v)
     }
 
-    // What a method carries is its own affair: the caller starts and finishes.
+    // The caller converts between velocities and the carry.
     fn start(&mut self, _k: i64) {}
 
     fn advance(&mut self, k: i64, n: i64) {

@@ -1,8 +1,7 @@
-//! Systems that are no straight line: many bodies, long chains, large matrices.
+//! Systems whose step is too long for a tape: many bodies, long chains, large matrices.
 //!
-//! A step of them would be a tape of hundreds of thousands of operations. So the program of the method ([`crate::program`]) is carried
-//! out over blocks that are long rows ([`course`], [`executor`]), and only the rates of the system are asked for as they come
-//! ([`Rates`]). There are two kinds of these:
+//! A step of them would be a tape of hundreds of thousands of operations. So the program of the method ([`crate::program`]) is executed
+//! over blocks that are long rows ([`course`], [`executor`]), and calls the rates of the system ([`Rates`]). There are two kinds of these:
 //!
 //! - [`tapes`]: the rates are tapes of their own, over rows of lanes, a lane for each of several members.
 //! - kernels written by hand, for one member at a time, whose numbers lie side by side: [`bodies`], [`chain`], [`linear`]. A system names
@@ -13,10 +12,10 @@
 pub mod adaptive;
 pub mod bodies;
 pub mod chain;
+pub mod control;
 pub mod course;
 pub mod executor;
 pub mod group;
-pub mod held;
 mod inputs;
 pub mod linear;
 pub mod matrix;
@@ -24,15 +23,15 @@ mod panels;
 pub mod tapes;
 
 use crate::{
-    run::{Machine, crew::Stop},
+    run::{Machine, workers::Stop},
     spec::{Given, Spec},
     system::Shape,
 };
 
-/// Operations of a step from which on it is no tape. Writing the code of one takes about a microsecond, and more would not stay in the cache
-/// of instructions.
-pub const STRAIGHT: usize = 4000;
-/// What a course may take for granted of rates.
+/// The most operations of a step that is a single tape. Writing the code of one operation takes about a microsecond, and longer code would
+/// not stay in the instruction cache.
+pub const MAX_TAPE_OPERATIONS: usize = 4000;
+/// Properties of the rates on which a course relies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facts {
     /// ẏ is v, so that h·ẏ is h·v and no rate of y is asked for.
@@ -43,8 +42,8 @@ pub struct Facts {
 
 /// The rates of some members, times the step for which they were made.
 ///
-/// A block is a row for each of its numbers, each of a number for each lane. What is to be filled may be longer, up to whole vectors of eight:
-/// what stands behind a block is nobody's.
+/// A block is a row for each of its numbers, each of a number for each lane. An output row may be longer, up to whole vectors of eight:
+/// the numbers behind the block are padding.
 pub trait Rates: Send + Sync {
     /// How many members there are.
     fn lanes(&self) -> usize {
@@ -57,13 +56,13 @@ pub trait Rates: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
-    /// Stops within a rate, too, if it may take long.
-    fn heed(&mut self, _stop: &Stop) {}
+    /// Sets the flag at which a rate that may take long stops early.
+    fn set_stop_flag(&mut self, _stop: &Stop) {}
 
     /// h·v̇
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]);
 
-    /// h·ẏ; not asked for in a second-order system.
+    /// h·ẏ; not called for a second-order system.
     fn dy(&mut self, _t: f64, _v: &[f64], _y: &[f64], _out: &mut [f64]) {}
 
     /// Both of one state.
@@ -72,13 +71,13 @@ pub trait Rates: Send + Sync {
         self.dy(t, v, y, dy);
     }
 
-    /// The velocity whose increment of y this is; not asked for in a second-order system.
+    /// The velocity whose increment of y is `d`; not called for a second-order system.
     fn velocity(&mut self, _d: &[f64], _out: &mut [f64]) {}
 
     /// Projects the state after a step onto what should be constant.
     fn project(&mut self, _v: &mut [f64], _y: &mut [f64]) {}
 
-    /// Computes the forces of these coordinates ahead, if the same pass finds the energy and the quantities that will be asked for.
+    /// Computes and caches the forces at these coordinates, if the same pass gives the energy and the quantities that are needed next.
     fn cache_forces(&mut self, _y: &[f64]) {}
 
     /// Fills rows with the recorded quantities of a state.
@@ -94,18 +93,18 @@ pub trait Rates: Send + Sync {
         None
     }
 
-    /// What was added up, a row of lanes or nothing.
+    /// The sums over the steps, such as the work of a control: a row of lanes, or nothing.
     fn tally(&self) -> &[f64] {
         &[]
     }
 
-    /// What was added up, to write.
+    /// The same sums, to write.
     fn tally_mut(&mut self) -> &mut [f64] {
         &mut []
     }
 }
 
-/// What rates are made for.
+/// The request for which rates are made.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked<'a> {
     /// The system.
@@ -123,7 +122,7 @@ pub struct Asked<'a> {
 /// Rates of one member by a kernel that is written by hand.
 #[derive(Clone, Copy)]
 pub struct Long {
-    /// Operations of the rates, or of a step, from which on it is quicker than machine code for one number at a time.
+    /// Operations of the rates, or of a step, from which on it is faster than machine code for one number at a time.
     pub from: (usize, usize),
     /// Operations of the rates from which on it is as fast as tapes for several members side by side.
     pub from_batch: usize,
@@ -133,5 +132,5 @@ pub struct Long {
 
 /// Rates of one member by the kernel of the system, under the control that is given.
 pub fn single(long: Long, asked: &Asked) -> Box<dyn Rates> {
-    held::wrap((long.make)(asked), asked)
+    control::wrap((long.make)(asked), asked)
 }

@@ -1,8 +1,8 @@
 //! Products of a matrix with columns of numbers, summed in the order of the columns.
 //!
-//! A sum in a fixed order is a chain of additions that wait for each other. So some rows are summed at once: their chains run side by
+//! A sum in a fixed order is a chain of additions that wait for each other. So several rows are summed at once: their chains run side by
 //! side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the order in
-//! which they are used; rows of zeros fill the last. No sum changes by that.
+//! which they are used; rows of zeros fill the last panel. They change no sum.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -14,11 +14,11 @@ pub struct Panels {
     filled: usize,
 }
 
-/// Rows of the panels, as many of the first kind as there are, then of the next. An addition takes four cycles: four vectors of eight rows
-/// hide that.
+/// Rows of a panel: as many panels of the first height as possible, then of the next. An addition takes four cycles: four vectors of
+/// eight rows hide that.
 const HEIGHTS: [usize; 3] = [32, 16, 8];
 
-/// How many numbers a product has with those that fill the last panel, which are nobody's.
+/// How many numbers a product has, with the padding of the last panel.
 pub fn filled(rows: usize) -> usize {
     rows.next_multiple_of(HEIGHTS[2])
 }
@@ -82,7 +82,7 @@ impl Panels {
     }
 
     /// `out` = the matrix times the numbers of all parts, one part after the other; it has room for [`filled`] numbers. When `stop` is
-    /// set, nothing more is done, and what was done is of no use.
+    /// set, it returns early with an unfinished result.
     #[inline(always)]
     pub fn times(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
         let rest = panels::<{ HEIGHTS[0] }>(&self.entries, &mut out[..self.filled], parts, stop);

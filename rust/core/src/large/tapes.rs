@@ -1,4 +1,4 @@
-//! Rates as tapes of their own, for several members side by side, or for one where nobody has written a kernel.
+//! Rates as tapes of their own, for several members side by side, or for one member of a system without a hand-written kernel.
 
 use std::sync::Arc;
 
@@ -18,21 +18,21 @@ use crate::{
     trace::{block, cut, ids, kind, parameters},
 };
 
-/// The rates of a system, traced. Their state is v, y, a block for what is made, and a number for what the system adds up.
+/// The rates of a system, traced. Their state is v, y, a block for the result, and a number for the tally.
 pub struct Rated {
     shape: Shape,
     facts: Facts,
-    /// Whether the system adds something up.
+    /// Whether the system has a tally, a sum over the steps.
     tally: bool,
     dv: Option<Stage>,
     dy: Option<Stage>,
     velocity: Option<Stage>,
-    /// Those that say so make the rate of v of their coordinates, too.
+    /// If true, the stage also computes the rate of v at its coordinates.
     project: Option<(Stage, bool)>,
     record: Option<(Stage, bool)>,
 }
 
-/// The numbers of a state before what is made.
+/// The numbers of a state before the result.
 fn before(shape: Shape) -> usize {
     shape.v + shape.y
 }
@@ -42,7 +42,7 @@ fn behind(shape: Shape) -> usize {
     before(shape) + shape.v.max(shape.y)
 }
 
-/// Traces what is made of the system, v and y: a block or none, v and y.
+/// Traces a function of the system, v and y. Its results are a block or none, v and y.
 fn rate(
     kind: &Kind,
     given: &Given,
@@ -154,8 +154,8 @@ pub struct TapeRates {
     state: Aligned,
     /// The state of what is recorded.
     record_state: Vec<f64>,
-    /// The rate of v of these coordinates is known until others are asked for.
-    at_hand: bool,
+    /// Whether `known` is the rate of v at the coordinates `y`.
+    is_known: bool,
     y: Vec<f64>,
     known: Vec<f64>,
 }
@@ -183,7 +183,7 @@ impl TapeRates {
             record: rated.record.as_ref().map(|(stage, _)| load(stage)),
             state: Aligned::new((behind(rated.shape) + 1) * lanes),
             record_state: vec![0.0; record_state * lanes],
-            at_hand: false,
+            is_known: false,
             y: Vec::new(),
             known: Vec::new(),
             rated,
@@ -236,11 +236,11 @@ impl Rates for TapeRates {
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        if self.at_hand && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits()) {
+        if self.is_known && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits()) {
             out[..self.known.len()].copy_from_slice(&self.known);
             return;
         }
-        self.at_hand = false;
+        self.is_known = false;
         self.set_state(if self.rated.facts.reads_v { v } else { &[] }, y);
         if let (Some(prepared), Some(stage)) = (&mut self.dv, &self.rated.dv) {
             prepared.advance_at(stage, t, &mut self.state);
@@ -282,7 +282,7 @@ impl Rates for TapeRates {
             keep(&mut self.y, new_y);
             keep(&mut self.known, &made[..sizes.0]);
         }
-        self.at_hand = gives;
+        self.is_known = gives;
     }
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
@@ -298,7 +298,7 @@ impl Rates for TapeRates {
         if *gives {
             keep(&mut self.y, y);
             keep(&mut self.known, dv);
-            self.at_hand = true;
+            self.is_known = true;
         }
     }
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    crew::Stop,
     stage::{Clock, PreparedStage},
+    workers::Stop,
 };
 use crate::{
     error::Error,
@@ -38,8 +38,8 @@ pub trait AdaptiveBatch: Send {
     /// So many attempts of every lane that runs.
     fn attempt(&mut self, attempts: usize);
 
-    /// Stops within an attempt, too, if it may take long.
-    fn heed(&mut self, _stop: &Stop) {}
+    /// Sets the flag at which an attempt that may take long stops early.
+    fn set_stop_flag(&mut self, _stop: &Stop) {}
 }
 
 /// Members of a system whose whole attempt is one tape.

@@ -1,13 +1,13 @@
-//! The driver: many members, some threads, what to keep, and who diverged.
+//! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
 use std::{sync::Arc, thread, time::Instant};
 
 use super::{
     Machine, Model,
     columns::{Columns, cut},
-    crew::{self, Crew, POLL, Stop},
     group::Group,
     stage::Clock,
+    workers::{self, POLL, Stop, Workers},
 };
 use crate::{error::Error, spec::Row, trace::Traced};
 
@@ -60,7 +60,7 @@ pub struct Arrays<'a> {
     pub first_bad: &'a mut [i64],
 }
 
-/// The step, counted from the first, after which a run keeps its `i`-th state.
+/// The step, counted from the first, after which a run saves its `i`-th state.
 pub fn save(steps: i64, every: Option<i64>, i: usize) -> i64 {
     every.map_or(steps, |every| every.max(1).saturating_mul(i as i64).min(steps))
 }
@@ -70,17 +70,19 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
     every.map_or(1, |every| steps.div_euclid(every.max(1)) + i64::from(steps % every.max(1) != 0) + 1) as usize
 }
 
-/// Steps between two looks at the clock, and at whether everything is finite, at most; and about how many numbers are stepped until the
-/// first look, and between later ones at most.
-const LOOK: i64 = 1 << 14;
-const FIRST: i64 = 1 << 19;
-const PATIENCE: i64 = 1 << 23;
-/// Who has more numbers than that begins with one step, and shows how long it takes: a step of many bodies costs more than they tell.
-const LARGE: i64 = 1 << 16;
-/// Where somebody diverged between two looks is found by as many looks in between, and so on.
-const LOOKS_BETWEEN: i64 = 16;
-/// Numbers × steps below which a second thread costs more than it brings.
-const WORTH_A_THREAD: f64 = 3e6;
+/// The most steps between two checks of the clock and of whether all states are finite.
+const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 14;
+/// Numbers × steps until the first check, about.
+const NUMBERS_TO_FIRST_CHECK: i64 = 1 << 19;
+/// Numbers × steps between two later checks, at most.
+const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
+/// A group of more numbers than this is first checked after one step, to see how long that takes: the cost of a step of many bodies
+/// grows faster than their numbers.
+const LARGE_MEMBER_NUMBERS: i64 = 1 << 16;
+/// If a member diverged between two checks, the steps between them are repeated with so many checks in between, and so on.
+const RETRACE_INTERVALS: i64 = 16;
+/// Numbers × steps below which a second thread costs more time than it saves.
+const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
 
 /// One thread's share of the members, as slices of every row.
 struct Part<'a> {
@@ -98,8 +100,8 @@ pub(crate) fn expect(what: &'static str, expected: usize, got: usize) -> Result<
     if expected == got { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
 }
 
-/// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the share that is done;
-/// when it answers no, the run ends soon.
+/// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the fraction that is done;
+/// when it returns false, the run ends soon.
 pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
@@ -130,15 +132,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = match plan.machine.threads {
-        0 if work < WORTH_A_THREAD => 1,
+        0 if work < MIN_NUMBER_STEPS_FOR_THREADS => 1,
         0 => thread::available_parallelism().map_or(1, usize::from),
         n => n,
     };
     let threads = threads.min(groups).max(1);
     plan.model.room(traced.shape, threads)?;
-    // A group alone may have all threads for itself; it knows whether they pay.
+    // A single group may use all threads; it decides whether they are worthwhile.
     let machine = Machine { threads: if groups == 1 { plan.machine.threads } else { 1 }, ..plan.machine };
-    // Several shares a thread, so that one that is late does not keep the others waiting.
+    // Several shares per thread, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { groups.min(threads * 4) };
     let shares: Vec<usize> = (0..shares)
         .map(|i| {
@@ -162,13 +164,12 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         (first, left) = (first + count, later);
     }
 
-    let crew = Crew { threads, background: traced.is_long(lanes), total, stop: Stop::default() };
-    let worker = || Worker::new(plan, &traced, machine, &crew.stop);
-    crew::share(parts, &crew, monitor, worker(), || Ok(worker()), Worker::part)
+    let workers = Workers { threads, background: traced.is_long(lanes), total, stop: Stop::default() };
+    let worker = || Worker::new(plan, &traced, machine, &workers.stop);
+    workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots and the tally when everybody was last looked at, and room for what is carried while the v slot holds velocities and for what
-/// is recorded.
+/// Both slots and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded quantities.
 #[derive(Default)]
 struct Good {
     v: Vec<f64>,
@@ -201,7 +202,7 @@ impl<'a> Worker<'a> {
     fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
         let make = |members| -> Result<_, Error> {
             let mut group = self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
-            group.heed(self.stop);
+            group.set_stop_flag(self.stop);
             Ok(group)
         };
         if left >= lanes {
@@ -226,7 +227,7 @@ impl<'a> Worker<'a> {
             let mut good = std::mem::take(&mut self.good);
             let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
-            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, looked: plan.first };
+            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, checked: plan.first };
             let ran = job.run(go_on);
             self.good = good;
             if !ran {
@@ -238,8 +239,8 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// How many steps are made between two looks, now and at most, and when the last one was.
-struct Looks {
+/// How many steps are made between two checks, now and at most, and when the last one was.
+struct Checks {
     piece: i64,
     longest: i64,
     began: Instant,
@@ -256,7 +257,7 @@ struct Job<'a, 'b> {
     count: usize,
     good: &'a mut Good,
     /// The step of the state that is remembered there.
-    looked: i64,
+    checked: i64,
 }
 
 /// Copies the rows of a group into those from the `at`-th on, as far as there are any.
@@ -302,9 +303,13 @@ impl Job<'_, '_> {
         self.remember(plan.first);
 
         let mut k = plan.first;
-        let longest = (PATIENCE / numbers).clamp(1, LOOK);
-        let first = if numbers > LARGE { 1 } else { (FIRST / numbers).clamp(1, LOOK) };
-        let mut looks = Looks { piece: first, longest, began: Instant::now() };
+        let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
+        let first = if numbers > LARGE_MEMBER_NUMBERS {
+            1
+        } else {
+            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL)
+        };
+        let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
         let trail = if keeps_all { self.group.trail(&plan.model.spec, self.part.first + self.from, self.count) } else { 0 };
@@ -312,14 +317,14 @@ impl Job<'_, '_> {
         while i < kept(plan.steps, plan.every) {
             let until = plan.first + save(plan.steps, plan.every, i);
             while k < until {
-                let n = (until - k).min(self.looked + looks.piece - k);
+                let n = (until - k).min(self.checked + checks.piece - k);
                 self.group.advance(k, n);
                 k += n;
-                if !self.look_if_due(k, &mut looks, go_on) {
+                if !self.check_if_due(k, &mut checks, go_on) {
                     return false;
                 }
             }
-            let room = (self.looked + looks.piece).min(plan.first + plan.steps) - k;
+            let room = (self.checked + checks.piece).min(plan.first + plan.steps) - k;
             let steps = trail as i64;
             if trail == 0 || steps > room || k % steps != 0 || !self.save_trail(i, k, trail) {
                 self.save(i, k);
@@ -327,11 +332,11 @@ impl Job<'_, '_> {
                 continue;
             }
             (i, k) = (i + trail, k + steps);
-            if !self.look_if_due(k, &mut looks, go_on) {
+            if !self.check_if_due(k, &mut checks, go_on) {
                 return false;
             }
         }
-        let left = k - self.looked;
+        let left = k - self.checked;
         if left > 0 && self.is_suspect() {
             self.retrace(k);
         }
@@ -343,16 +348,16 @@ impl Job<'_, '_> {
         true
     }
 
-    /// Looks at step `k` at who diverged, if it is time; whether to go on.
-    fn look_if_due(&mut self, k: i64, looks: &mut Looks, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
-        let done = k - self.looked;
-        if done < looks.piece {
+    /// Checks at step `k` which members diverged, if a check is due; false if the run is to end.
+    fn check_if_due(&mut self, k: i64, checks: &mut Checks, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
+        let done = k - self.checked;
+        if done < checks.piece {
             return true;
         }
-        self.look(k);
+        self.check(k);
         let now = Instant::now();
-        looks.piece = if now - looks.began > POLL { (looks.piece / 2).max(1) } else { looks.longest.min(4 * looks.piece) };
-        looks.began = now;
+        checks.piece = if now - checks.began > POLL { (checks.piece / 2).max(1) } else { checks.longest.min(4 * checks.piece) };
+        checks.began = now;
         go_on((done * self.count as i64) as u64)
     }
 
@@ -377,8 +382,9 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Keeps the state at step `k`, which is the `i`-th to be kept, and those that follow, and makes the steps. Where a velocity that is made
-    /// of what is carried is not finite, nothing is done, and the answer is no: who and when is found step by step.
+    /// Makes the steps of a trail from step `k`, and saves the states before each; the first is the `i`-th saved state. If a velocity that
+    /// is computed from the carry is not finite, the old state is restored and nothing is saved, and false is returned: then the steps are
+    /// made one by one, to find which member diverged and at which step.
     fn save_trail(&mut self, i: usize, k: i64, steps: usize) -> bool {
         let lanes = self.group.lanes();
         let (p, q) = (self.plan.v.len(), self.plan.y.len());
@@ -425,13 +431,13 @@ impl Job<'_, '_> {
         for (good, now) in [(&mut self.good.v, v), (&mut self.good.y, y), (&mut self.good.tally, self.group.tally())] {
             keep(good, now);
         }
-        self.looked = k;
+        self.checked = k;
     }
 
     /// Whether a member that was finite so far has a number in its slots that is not below this size.
     fn any_new(&self, size: f64) -> bool {
         let (v, y) = self.group.slots();
-        // Who it is is asked only if there is one.
+        // Members are searched one by one only if some number is not below.
         !(all_below(v, size) && all_below(y, size)) && (0..self.count).any(|l| self.is_new(l, size))
     }
 
@@ -442,14 +448,14 @@ impl Job<'_, '_> {
         self.part.first_bad[self.from + l] < 0 && !(all_below(v) && all_below(y))
     }
 
-    /// Infinities and NaN stay in the slots, so it is enough to look now and then. Velocities that are made of what a method carries may
-    /// be infinite and finite again, but only of numbers that are [`HUGE`].
+    /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a method's carry
+    /// may be infinite and later finite again, but only if its numbers are [`HUGE`].
     fn is_suspect(&self) -> bool {
         let most = if self.carries { HUGE * self.plan.clock.h.min(1.0) } else { f64::INFINITY };
         self.any_new(most)
     }
 
-    fn look(&mut self, k: i64) {
+    fn check(&mut self, k: i64) {
         if self.is_suspect() {
             self.retrace(k);
         } else {
@@ -457,9 +463,9 @@ impl Job<'_, '_> {
         }
     }
 
-    /// Finds out who diverged since the last look and when, and looks at step `k`, in whose state the group is.
+    /// Finds which members diverged since the last check and at which step, and checks step `k`, in whose state the group is.
     fn retrace(&mut self, k: i64) {
-        let steps = k - self.looked;
+        let steps = k - self.checked;
         if steps == 1 {
             self.note(k);
             self.finish(k);
@@ -469,22 +475,22 @@ impl Job<'_, '_> {
             self.unfinish();
             return self.remember(k);
         }
-        // Back to the last look, and on in shorter pieces.
+        // Back to the last check, and on in shorter pieces.
         let (v, y) = self.group.slots_mut();
         v.copy_from_slice(&self.good.v);
         y.copy_from_slice(&self.good.y);
         self.group.tally_mut().copy_from_slice(&self.good.tally);
-        let piece = (steps as u64).div_ceil(LOOKS_BETWEEN as u64) as i64;
-        let mut at = self.looked;
+        let piece = (steps as u64).div_ceil(RETRACE_INTERVALS as u64) as i64;
+        let mut at = self.checked;
         while at < k {
             let n = piece.min(k - at);
             self.group.advance(at, n);
             at += n;
-            self.look(at);
+            self.check(at);
         }
     }
 
-    /// Notes who has a number in the slots that is not finite after step `k`.
+    /// Notes the members with a number in the slots that is not finite after step `k`.
     fn note(&mut self, k: i64) {
         for l in 0..self.count {
             if self.is_new(l, f64::INFINITY) {
@@ -499,7 +505,7 @@ fn is_below(x: f64, size: f64) -> bool {
     x.abs() < size
 }
 
-/// Whether all numbers are. All of a chunk are looked at, which is vector code.
+/// Whether all numbers are smaller. All numbers of a chunk are compared, which is vector code.
 fn all_below(numbers: &[f64], size: f64) -> bool {
     numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)))
 }
@@ -509,7 +515,7 @@ fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
     to.extend_from_slice(numbers);
 }
 
-/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method that carries something
-/// else are looked at after every step. The difference of two coordinates over the step overflows only beyond 2¹⁰²³ times the step, so that
-/// such a one between two looks at smaller numbers would have to grow by 2⁶⁰ and shrink again within [`LOOK`] steps.
+/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method with a carry are
+/// checked after every step. The difference of two coordinates divided by the step overflows only beyond 2¹⁰²³ times the step. To miss
+/// that between two checks, it would have to grow by 2⁶⁰ and shrink again within [`DIVERGENCE_CHECK_INTERVAL`] steps.
 const HUGE: f64 = f64::from_bits((1023 + 960) << 52);

@@ -7,7 +7,7 @@ use super::{
     adaptive::AdaptiveBatch,
     batch::expect,
     columns::{Columns, cut},
-    crew::{self, Crew, GoOn, Stop},
+    workers::{self, GoOn, Stop, Workers},
 };
 use crate::{error::Error, pace::Pace, spec::Row, trace::Traced};
 
@@ -20,7 +20,7 @@ pub struct Plan<'a> {
     pub machine: Machine,
     /// Times to keep the state at, ascending.
     pub at: &'a [f64],
-    /// Where members stand at the start, by rows, in the order of [`Pace::numbers`].
+    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`].
     pub paces: Vec<Row<'a>>,
     /// The most attempts of a member.
     pub budget: i64,
@@ -41,32 +41,33 @@ pub enum Status {
     Budget = 2,
     /// A step no longer moves the time.
     Underflow = 3,
-    /// As `Underflow`, because nothing finite came of any step.
+    /// As `Underflow`, because no step, however short, gave a finite state.
     NotFinite = 4,
 }
 
 /// What a run fills: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
-    /// The states at the asked times; NaN from where a member stopped.
+    /// The states at the output times; NaN from where a member stopped.
     pub saved_v: &'a mut [f64],
     /// Likewise the coordinates.
     pub saved_y: &'a mut [f64],
-    /// Rows of the state where members stand at the end, v and y: that before the step in which the last time is.
+    /// Rows of the members' states at the end, v and y: those before the step that contains the last output time.
     pub state: &'a mut [f64],
-    /// Where they stand, by rows.
+    /// Their paces at the end, by rows.
     pub paces: &'a mut [f64],
     /// One row: the status.
     pub status: &'a mut [i64],
 }
 
-/// Attempts between two checks of the lanes, and while some make extra steps; of a large member a single one, which may take long.
-const LOOK: usize = 16;
-const SHORT_LOOK: usize = 4;
-/// Numbers of a lane above which it is large.
-const LARGE: usize = 1000;
-/// Members below which a second thread costs more than it brings, for a small system.
-const WORTH_A_THREAD: usize = 256;
+/// Attempts between two checks of the lanes.
+const ATTEMPTS_BETWEEN_CHECKS: usize = 16;
+/// The same while some lanes make extra steps.
+const ATTEMPTS_WITH_EXTRA_STEPS: usize = 4;
+/// Numbers of a lane above which it is checked after every attempt, which may take long.
+const LARGE_MEMBER_NUMBERS: usize = 1000;
+/// Members of a small system below which a second thread costs more time than it saves.
+const MIN_MEMBERS_FOR_THREADS: usize = 256;
 
 struct Part<'a> {
     first: usize,
@@ -103,13 +104,13 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let mine = worker()?;
     let lanes = mine.group.lanes();
     let threads = match plan.machine.threads {
-        0 if lanes > 1 && b < WORTH_A_THREAD => 1,
+        0 if lanes > 1 && b < MIN_MEMBERS_FOR_THREADS => 1,
         0 => thread::available_parallelism().map_or(1, usize::from),
         n => n,
     };
     let threads = threads.min(b.div_ceil(lanes)).max(1);
     plan.model.room(traced.shape, threads)?;
-    // Few shares, since lanes run empty at the end of each; but some, so that one that is late does not keep the others waiting.
+    // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
     let mut status = cut(arrays.status, b, &shares).into_iter();
@@ -124,8 +125,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         }
         first += count;
     }
-    let crew = Crew { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
-    crew::share(parts, &crew, monitor, mine, worker, Worker::part)
+    let workers = Workers { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
+    workers::share(parts, &workers, monitor, mine, worker, Worker::part)
 }
 
 /// Which member of the part a lane steps, and which of the saved times is next.
@@ -146,7 +147,7 @@ impl<'a> Worker<'a> {
         let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
         let machine = Machine { threads, ..plan.machine };
         let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
-        group.heed(stop);
+        group.set_stop_flag(stop);
         Ok(Worker { plan, group })
     }
 
@@ -170,14 +171,14 @@ impl<'a> Worker<'a> {
             // A member that makes an extra step makes only that before the next check.
             let (taken, extra) =
                 assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
-            let look = if numbers > LARGE || 2 * extra > taken {
+            let attempts = if numbers > LARGE_MEMBER_NUMBERS || 2 * extra > taken {
                 1
             } else if extra > 0 {
-                SHORT_LOOK
+                ATTEMPTS_WITH_EXTRA_STEPS
             } else {
-                LOOK
+                ATTEMPTS_BETWEEN_CHECKS
             };
-            self.group.attempt(look);
+            self.group.attempt(attempts);
             if !go_on(0) {
                 return Err(Error::Interrupted);
             }

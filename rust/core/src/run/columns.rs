@@ -2,7 +2,7 @@
 
 use ndarray::{ArrayViewMut2, Axis};
 
-/// Some columns of an array of rows. It takes no more room however many rows there are, so that a run may keep every step.
+/// Some columns of an array of rows. Its size does not depend on the number of rows, so that a run may save every step.
 pub(crate) struct Columns<'a, T>(ArrayViewMut2<'a, T>);
 
 impl<T> Columns<'_, T> {

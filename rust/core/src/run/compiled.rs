@@ -1,4 +1,4 @@
-//! What a step becomes on this machine, and how long that takes: for benches, tests and explanations.
+//! The machine code of a step and the time to make it: for benches, tests and explanations.
 
 use std::time::{Duration, Instant};
 
@@ -29,7 +29,7 @@ pub struct Compiled {
     pub lanes: usize,
     /// How long its machine code is; zero where it is interpreted.
     pub bytes: usize,
-    /// How many values it keeps beside at most, because registers do not suffice.
+    /// The most values that are spilled at once because there are not enough registers.
     pub spills: usize,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
@@ -40,7 +40,7 @@ pub struct Compiled {
 /// Why a step is interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpreted {
-    /// At this level no machine code is written: this CPU has none, or it was asked for.
+    /// At this level no machine code is written: this CPU has no writer, or the interpreter was requested.
     Level,
     /// The system does not let pages be executed.
     Pages,
@@ -102,14 +102,14 @@ impl Model<'_> {
         }))
     }
 
-    /// By what a step is made that is too long for one tape, about how many operations it has, and how many members go together: by tapes
-    /// of the rates ("rates"), by a kernel for one member that is written by hand ("hand"), or by one for products of matrices ("matrix").
-    /// None if it is one tape. `paced`: at adaptive steps.
+    /// How a step that is too long for one tape is computed, its approximate number of operations, and how many members are stepped
+    /// together: by tapes of the rates ("rates"), by a hand-written kernel for one member ("hand"), or by one for products of matrices
+    /// ("matrix"). None if it is one tape. `paced`: for adaptive steps.
     pub fn in_parts(&self, machine: Machine, members: usize, paced: bool) -> Result<Option<(&'static str, usize, usize)>, Error> {
         let traced = self.traced()?;
         let steps = if paced { 0.0 } else { f64::INFINITY };
         let mut way = self.way(&traced, machine, members, steps);
-        if paced && !matches!(way, Way::Tape | Way::Map) {
+        if paced && !matches!(way, Way::Tape | Way::Matrix) {
             way = match (way, self.way(&traced, machine, 1, steps)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => Way::Long(long),
                 _ => Way::Rates(1),
@@ -117,10 +117,10 @@ impl Model<'_> {
         }
         Ok(match way {
             Way::Tape => None,
-            Way::Map if paced => None,
+            Way::Matrix if paced => None,
             Way::Rates(lanes) => Some(("rates", traced.operations.1, lanes)),
             Way::Long(_) => Some(("hand", traced.operations.1, 1)),
-            Way::Map => Some(("matrix", traced.operations.1, 1)),
+            Way::Matrix => Some(("matrix", traced.operations.1, 1)),
         })
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    crew::Stop,
     stage::{Clock, Kit, Numbers, PreparedStage, Stage},
+    workers::Stop,
 };
 use crate::{
     error::Error,
@@ -18,7 +18,7 @@ use crate::{
 /// Members stepped together.
 ///
 /// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
-/// method carries between steps, which is the velocity for all but the methods that say otherwise in their record.
+/// method carries between steps: the velocity, unless its record names another carry.
 pub trait Group: Send + Sync {
     /// How many members it steps together.
     fn lanes(&self) -> usize;
@@ -26,11 +26,11 @@ pub trait Group: Send + Sync {
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
-    /// Compiles now what would be compiled later, when it pays: for real-time loops.
+    /// Compiles now instead of after some interpreted steps: for real-time loops.
     fn compile_now(&mut self) {}
 
-    /// Stops within a step, too, if it may take long.
-    fn heed(&mut self, _stop: &Stop) {}
+    /// Sets the flag at which a step that may take long stops early.
+    fn set_stop_flag(&mut self, _stop: &Stop) {}
 
     /// Both slots.
     fn slots(&self) -> (&[f64], &[f64]);
@@ -44,13 +44,14 @@ pub trait Group: Send + Sync {
     /// `n` steps from step `k`.
     fn advance(&mut self, k: i64, n: i64);
 
-    /// How many steps of these members, who were prepared before, can be made at once so that all states between are seen; none if that is
-    /// not quicker than step by step.
+    /// How many steps of these members, which were prepared before, one call of [`Group::advance_on_trail`] makes; 0 if that is not faster
+    /// than step by step.
     fn trail(&mut self, _spec: &Spec, _first: usize, _count: usize) -> usize {
         0
     }
 
-    /// So many steps from step `k`, a multiple of them: the velocities before each, one after the other, and behind them the coordinates.
+    /// Makes that many steps from step `k`, a multiple of their number. Returns the velocities before each step, then the coordinates
+    /// before each step.
     fn advance_on_trail(&mut self, _k: i64) -> &[f64] {
         &[]
     }
@@ -64,17 +65,17 @@ pub trait Group: Send + Sync {
     /// Records the present state, whose v slot is finished: rows of lanes.
     fn record(&mut self, rows: &mut [f64]);
 
-    /// What the system adds up over the steps, a row of lanes or nothing.
+    /// The sums over the steps, such as the work of a control: a row of lanes, or nothing.
     fn tally(&self) -> &[f64];
 
-    /// What the system adds up, to write.
+    /// The same sums, to write.
     fn tally_mut(&mut self) -> &mut [f64];
 }
 
 /// A stage outside the steps (start, finish or record), over a state of its own.
 struct SideStage {
     prepared: PreparedStage,
-    /// The state, with what the stage makes behind it.
+    /// The state, followed by the results of the stage.
     state: Vec<f64>,
 }
 
@@ -84,7 +85,7 @@ impl SideStage {
         SideStage { prepared, state: vec![0.0; stage.split.body.next.len() * lanes] }
     }
 
-    /// Runs the stage once over a state, and gives what it makes of it.
+    /// Runs the stage once over a state, and returns that with the results.
     fn run(&mut self, stage: &Stage, clock: &Clock, k: i64, from: &[f64]) -> &[f64] {
         let shared = from.len().min(self.state.len());
         self.state[..shared].copy_from_slice(&from[..shared]);
@@ -101,7 +102,7 @@ pub struct Lanes {
     level: Level,
     clock: Clock,
     step: PreparedStage,
-    /// The same with the velocities, where it is asked for by a run that keeps all of them.
+    /// A step that also returns the velocities, for a run that saves all of them.
     shown: Option<PreparedStage>,
     start: Option<SideStage>,
     finish: Option<SideStage>,

@@ -1,4 +1,4 @@
-//! The driver: many members, some threads, what to keep, and who diverged. It knows nothing of the systems that it steps.
+//! The driver: shares members among threads, saves states, finds divergence. It does not depend on the systems that it steps.
 
 pub use stepwell_base::aligned;
 pub mod adaptive;
@@ -6,9 +6,9 @@ pub mod batch;
 pub mod chosen;
 mod columns;
 pub mod compiled;
-pub mod crew;
 pub mod group;
 pub mod stage;
+pub mod workers;
 pub mod world;
 
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::{
     error::Error,
     isa::Level,
     large::{
-        self, Asked, Long, Rates, STRAIGHT,
+        self, Asked, Long, MAX_TAPE_OPERATIONS, Rates,
         adaptive::LargeAdaptive,
         group::LargeGroup,
         matrix::Matrix,
@@ -33,7 +33,7 @@ use crate::{
     trace::{How, Scene, Traced},
 };
 
-/// What to step, and how.
+/// The system to step and the way to step it.
 #[derive(Clone, Debug)]
 pub struct Model<'a> {
     /// The system with its numbers.
@@ -52,12 +52,12 @@ pub struct Machine {
 }
 
 impl Model<'_> {
-    /// An error if there is no room for what so many threads keep of a system beside the results. To ask is quicker than to stop in the
-    /// middle, where nobody could go on.
+    /// An error if there is no memory for what so many threads keep of a system beside the results. This is checked before the run,
+    /// because an allocation that fails in the middle would abort the process.
     pub fn room(&self, shape: system::Shape, threads: usize) -> Result<(), Error> {
         let samples = self.spec.tables.iter().map(|table| table.samples.len()).sum::<usize>();
-        let given = (self.spec.rows.len() + samples).saturating_mul(OF_A_PARAMETER);
-        let bytes = (shape.v + shape.y).saturating_mul(OF_A_NUMBER).saturating_add(given).saturating_mul(threads);
+        let given = (self.spec.rows.len() + samples).saturating_mul(BYTES_PER_PARAMETER);
+        let bytes = (shape.v + shape.y).saturating_mul(BYTES_PER_NUMBER).saturating_add(given).saturating_mul(threads);
         let has_room = bytes < UNCHECKED_BYTES || Vec::<u8>::new().try_reserve_exact(bytes).is_ok();
         if has_room { Ok(()) } else { Err(Error::Memory { bytes }) }
     }
@@ -67,25 +67,33 @@ impl Model<'_> {
         self.scene.traced()
     }
 
-    /// By what so many members are stepped, if so many steps of members are to be made in all.
+    /// How so many members are stepped, if `steps` steps of members are to be made in all.
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let single = members == 1;
         if self.scene.fused {
-            return Way::Tape; // what is fused is decided on the tape of the whole step
+            return Way::Tape; // operations are fused on the tape of the whole step
         }
         if let How::Matrix { .. } = &self.scene.how {
-            // Kernels for one member use whole vectors for it, so some of them are as quick as a vector of members.
-            return if rates >= if members <= ALONE { SINGLE_MAP } else { MAP } { Way::Map } else { Way::Tape };
+            // Kernels for one member fill whole vectors with it, so a few members one by one are as fast as a vector of them.
+            return if rates >= if members <= MAX_SEQUENTIAL_MEMBERS { SINGLE_MATRIX_OPERATIONS } else { MATRIX_OPERATIONS } {
+                Way::Matrix
+            } else {
+                Way::Tape
+            };
         }
         let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
-        let large = step > STRAIGHT;
-        // Tapes of rates are traced and written before they are quicker, unless they are there from before.
-        let pays = || steps * (step / rates.max(1)) as f64 > (WORTH_A_TAPE * rates) as f64 || traced.is_rated();
+        let large = step > MAX_TAPE_OPERATIONS;
+        // Tapes of rates must first be traced and compiled, which takes time, unless that was done before.
+        let pays = || steps * (step / rates.max(1)) as f64 > (MIN_EVALUATIONS_PER_OPERATION * rates) as f64 || traced.is_rated();
         let is_long = |long: Long| rates >= long.from.0 || step >= long.from.1;
         match long {
             Some(long) if single && is_long(long) => Way::Long(long),
-            Some(long) if large && (rates >= long.from_batch || members <= ALONE && is_long(long) || !pays()) => Way::Long(long),
+            Some(long)
+                if large && (rates >= long.from_batch || members <= MAX_SEQUENTIAL_MEMBERS && is_long(long) || !pays()) =>
+            {
+                Way::Long(long)
+            }
             _ if large => Way::Rates(if single { 1 } else { tapes::lanes(machine.level) }),
             _ => Way::Tape,
         }
@@ -96,7 +104,7 @@ impl Model<'_> {
         Ok(match self.way(traced, machine, members, steps) {
             Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
             Way::Rates(lanes) => lanes,
-            Way::Long(_) | Way::Map => 1,
+            Way::Long(_) | Way::Matrix => 1,
         })
     }
 
@@ -116,7 +124,7 @@ impl Model<'_> {
         let (spec, shape, level) = (&self.spec, traced.shape, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, steps) {
             Way::Tape => return Ok(Box::new(Lanes::new(traced, spec, level, members, clock)?)),
-            Way::Map => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
+            Way::Matrix => return Ok(Box::new(Matrix::new(spec, shape, &self.scene.how, level, clock))),
             Way::Long(long) => large::single(long, &self.asked(traced, machine, clock.h)),
             Way::Rates(lanes) => Box::new(TapeRates::new(traced.rated()?, spec, level, lanes, clock)),
         };
@@ -134,7 +142,7 @@ impl Model<'_> {
     ) -> Result<Box<dyn AdaptiveBatch>, Error> {
         let (spec, level) = (&self.spec, machine.level);
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
-            Way::Tape | Way::Map => return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?)),
+            Way::Tape | Way::Matrix => return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?)),
             // Rates are asked for at one time, so a large member goes alone.
             way => match (way, self.way(traced, machine, 1, 0.0)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::single(long, &self.asked(traced, machine, NO_CLOCK.h)),
@@ -146,13 +154,14 @@ impl Model<'_> {
     }
 }
 
-/// Bytes that a thread keeps of each number of a state at most, DOP853's stages among them, and of each parameter or sample.
-const OF_A_NUMBER: usize = 160;
-const OF_A_PARAMETER: usize = 32;
-/// Up to so many bytes it is not checked whether there is room.
+/// The most bytes that a thread keeps for each number of a state, including the stages of DOP853.
+const BYTES_PER_NUMBER: usize = 160;
+/// The most bytes that a thread keeps for each parameter or sample.
+const BYTES_PER_PARAMETER: usize = 32;
+/// Less memory than this is not checked.
 const UNCHECKED_BYTES: usize = 1 << 24;
 
-/// By what a group is stepped.
+/// How a group is stepped.
 #[derive(Clone, Copy)]
 enum Way {
     /// One tape for the whole step.
@@ -162,14 +171,14 @@ enum Way {
     /// A kernel that is written by hand, for a single member.
     Long(Long),
     /// A large matrix.
-    Map,
+    Matrix,
 }
 
-/// Operations of the matrix form from which on a kernel that is written by hand is faster than a tape: of a single member, and of
-/// several, one by one.
-const SINGLE_MAP: usize = 2 * 9 * 9;
-const MAP: usize = 2 * 24 * 24;
-/// Tapes of rates pay from so many evaluations for each of their operations on, by all members together.
-const WORTH_A_TAPE: usize = 1;
+/// Operations of the matrix form from which on a hand-written kernel is faster than a tape, for a single member.
+const SINGLE_MATRIX_OPERATIONS: usize = 2 * 9 * 9;
+/// The same for several members, one by one.
+const MATRIX_OPERATIONS: usize = 2 * 24 * 24;
+/// Tapes of rates are worth compiling from so many evaluations, by all members together, for each of their operations on.
+const MIN_EVALUATIONS_PER_OPERATION: usize = 1;
 /// Up to so many members of a large system are as fast one by one as side by side.
-const ALONE: usize = 4;
+const MAX_SEQUENTIAL_MEMBERS: usize = 4;

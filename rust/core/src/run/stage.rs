@@ -39,17 +39,17 @@ pub struct Kit {
     trail: OnceLock<Option<Trail>>,
 }
 
-/// Several steps at once that show the states between, for a run that keeps them all: see [`Body::trail`].
+/// Several steps in one call that also return the states between, for a run that saves them all: see [`Body::trail`].
 struct Trail {
     runner: Runner,
     steps: usize,
 }
 
-/// Operations of a trail, at most: its code has to stay in the cache of instructions.
+/// The most operations of a trail, so that its code stays in the instruction cache.
 const TRAIL_OPERATIONS: usize = 2000;
-/// Numbers that it shows, at most: they have to stay in the cache until they are copied to where they are kept.
+/// The most numbers that a trail returns: they must stay in the cache until they are copied to the saved states.
 const TRAIL_NUMBERS: usize = 1 << 14;
-/// Steps of a trail at least, and at most. They divide those of a table.
+/// The fewest and the most steps of a trail. They divide the number of steps of a table.
 const TRAIL_STEPS: [usize; 2] = [4, 64];
 
 impl Trail {
@@ -335,7 +335,8 @@ impl PreparedStage {
         self.kit.trail.get_or_init(make).as_ref().map_or(0, |trail| trail.steps)
     }
 
-    /// The steps of a trail from step `k`, a multiple of them: the velocities before each, one after the other, then likewise the coordinates.
+    /// Makes the steps of a trail from step `k`, a multiple of their number. Returns the velocities before each step, then the
+    /// coordinates before each step.
     pub fn advance_on_trail(&mut self, stage: &Stage, clock: &Clock, k: i64, state: &mut [f64]) -> &[f64] {
         let kit = Arc::clone(&self.kit);
         let Some(Some(trail)) = kit.trail.get() else { return &[] };

@@ -1,12 +1,12 @@
-//! A prepared real-time loop over arrays that belong to somebody else.
+//! A prepared real-time loop over arrays that the caller owns.
 
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::{
     Machine, Model,
-    crew::{self, Crew, GoOn, Stop},
     group::Group,
     stage::Clock,
+    workers::{self, GoOn, Stop, Workers},
 };
 use crate::error::Error;
 
@@ -41,17 +41,17 @@ pub struct World {
     members: usize,
     sizes: (usize, usize),
     carries: bool,
-    /// What was last written, if the method carries something else than v: if the arrays differ, somebody moved the bodies.
+    /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
     written: (Vec<f64>, Vec<f64>),
-    /// Whether the slots hold what was last written.
+    /// Whether the slots belong to the arrays as last written.
     is_written: bool,
     step: i64,
-    /// How many steps are made between two looks at whether to stop; none if a single one may take long.
-    patience: Option<i64>,
+    /// Steps between two checks of whether to stop; none if a single step may take long.
+    steps_between_checks: Option<i64>,
     stop: Stop,
 }
 
-/// How often a world is stepped is unknown; it is made for many steps.
+/// How often a world will be stepped is unknown; kernels are chosen for many steps.
 const UNKNOWN_STEPS: f64 = f64::INFINITY;
 
 fn load(array: &[f64], members: usize, share: (usize, usize), slot: &mut [f64], lanes: usize) {
@@ -70,7 +70,7 @@ fn store(array: &mut [f64], members: usize, share: (usize, usize), slot: &[f64],
     }
 }
 
-fn same(array: &[f64], written: &[f64]) -> bool {
+fn equal_bits(array: &[f64], written: &[f64]) -> bool {
     array.iter().zip(written).all(|(a, w)| a.to_bits() == w.to_bits())
 }
 
@@ -79,7 +79,7 @@ impl World {
     pub fn new(model: &Model, clock: Clock, machine: Machine, members: usize, step: i64) -> Result<Self, Error> {
         let traced = model.traced()?;
         model.room(traced.shape, 1)?;
-        let patience = (!traced.is_long(members)).then(|| traced.steps_of(members, PATIENCE));
+        let steps_between_checks = (!traced.is_long(members)).then(|| traced.steps_of(members, OPERATIONS_BETWEEN_CHECKS));
         let stop = Stop::default();
         let mut shares = Vec::new();
         let mut first = 0;
@@ -90,9 +90,13 @@ impl World {
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
             group.compile_now();
-            group.heed(&stop);
+            group.set_stop_flag(&stop);
             let before = std::array::from_fn(|_| {
-                if patience.is_none() { (group.slots().0.to_vec(), group.slots().1.to_vec()) } else { Default::default() }
+                if steps_between_checks.is_none() {
+                    (group.slots().0.to_vec(), group.slots().1.to_vec())
+                } else {
+                    Default::default()
+                }
             });
             shares.push(Share { group, first, count, before });
             first += count;
@@ -100,7 +104,7 @@ impl World {
         let sizes = (traced.shape.v * members, traced.shape.y * members);
         let carries = traced.carries;
         let written = if carries { (vec![0.0; sizes.0], vec![0.0; sizes.1]) } else { Default::default() };
-        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, patience, stop })
+        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop })
     }
 
     /// How many numbers each array holds.
@@ -119,16 +123,16 @@ impl World {
     }
 
     /// How many steps are made in some milliseconds; none if a single one may take long, and is for [`World::step_in_background`].
-    pub fn patience(&self) -> Option<i64> {
-        self.patience
+    pub fn steps_between_checks(&self) -> Option<i64> {
+        self.steps_between_checks
     }
 
     /// Whether these arrays are not what the slots hold.
     fn is_moved(&self, v: &[f64], y: &[f64]) -> bool {
-        !(self.is_written && same(v, &self.written.0) && same(y, &self.written.1))
+        !(self.is_written && equal_bits(v, &self.written.0) && equal_bits(y, &self.written.1))
     }
 
-    /// What the method carries in the place of `v`, as rows of one number per member; none if the next step begins with `v` itself.
+    /// The carry of the method, as rows of one number per member; none if the next step begins with `v` itself.
     pub fn carry(&self, v: &[f64], y: &[f64]) -> Option<Vec<f64>> {
         if self.is_moved(v, y) {
             return None;
@@ -140,7 +144,7 @@ impl World {
         Some(carry)
     }
 
-    /// Goes on with what was carried when the arrays were these.
+    /// Continues with the carry that belongs to these arrays.
     pub fn carry_on(&mut self, carry: &[f64], v: &[f64], y: &[f64]) {
         if self.carries && carry.len() == self.sizes.0 {
             let members = self.members;
@@ -173,8 +177,8 @@ impl World {
         self.step = until;
     }
 
-    /// As `step`, by another thread. When the monitor, which is called on this one, answers no, the world stays at the last step that
-    /// was made whole or, where its velocities would take long to find, at the one before.
+    /// As `step`, by another thread. The monitor is called on this one. When it returns false, the world stays at the last complete
+    /// step or, where its velocities would take long to compute, at the one before.
     pub fn step_in_background(
         &mut self,
         n: i64,
@@ -183,9 +187,11 @@ impl World {
         monitor: &mut dyn FnMut(f64) -> bool,
     ) -> Result<(), Error> {
         self.stop.store(false, Relaxed);
-        let crew = Crew { threads: 1, background: true, total: n as f64, stop: Stop::clone(&self.stop) };
-        let nobody_else = || Err(Error::Interrupted);
-        crew::share(vec![()], &crew, monitor, (self, v, y), nobody_else, |(world, v, y), (), go_on| world.steps(n, v, y, go_on))
+        let workers = Workers { threads: 1, background: true, total: n as f64, stop: Stop::clone(&self.stop) };
+        let no_other_worker = || Err(Error::Interrupted);
+        workers::share(vec![()], &workers, monitor, (self, v, y), no_other_worker, |(world, v, y), (), go_on| {
+            world.steps(n, v, y, go_on)
+        })
     }
 
     fn steps(&mut self, n: i64, v: &mut [f64], y: &mut [f64], go_on: GoOn) -> Result<(), Error> {
@@ -217,9 +223,9 @@ impl World {
             self.step = from + n;
             return Ok(());
         }
-        // The arrays are still those of the start. To bring them to where the slots are takes, of a method that carries something else
-        // than v, a rate there, which cannot be stopped. Systems whose rates take long keep the last that they found: that of the
-        // step made last, so it is the state before that step that can be shown at once.
+        // The arrays are still those of the start. For a method with a carry, v at the state of the slots takes a rate there, which
+        // cannot be stopped. Systems with slow rates keep the last rate that they computed, which is that of the start of the last
+        // step. So the state before that step is the one that can be returned at once.
         let back = usize::from(self.carries && 0 < made && made < n);
         for Share { group, before, .. } in &mut self.shares {
             let (v, y) = &before[back];
@@ -239,7 +245,7 @@ impl World {
     fn publish(&mut self, k: i64, v: &mut [f64], y: &mut [f64]) -> bool {
         let members = self.members;
         if self.carries {
-            // The array of what was written last serves to keep what is carried meanwhile.
+            // The array of the velocities last written stores the carry meanwhile.
             self.is_written = false;
             for Share { group, first, count, .. } in &mut self.shares {
                 store(&mut self.written.0, members, (*first, *count), group.slots().0, group.lanes());
@@ -265,5 +271,5 @@ impl World {
     }
 }
 
-/// Operations that take some milliseconds.
-const PATIENCE: usize = 1 << 25;
+/// Operations between two checks of whether to stop: some milliseconds.
+const OPERATIONS_BETWEEN_CHECKS: usize = 1 << 25;

@@ -20,8 +20,8 @@ pub const RECORD: Record = Record {
     estimate: Some(Estimate { order: 5, error, coarse: None }),
     section: "§12",
     reference: "E. Fehlberg, Low-order classical Runge-Kutta formulas with stepsize control, NASA TR R-315 (1969)",
-    about: "RK-Fehlberg with local extrapolation: the same six evaluations, going on with the fifth-order result. It too pumps \
-            energy into an undamped oscillator, r₁² = 1 + 0.0018·Φ⁶, and damps it only for Φ between 2.046 and 3.607.",
+    about: "RK-Fehlberg with local extrapolation: the same six evaluations, advancing with the fifth-order result. It too adds \
+            energy to an undamped oscillator, r₁² = 1 + 0.0018·Φ⁶, and damps it only for Φ between 2.046 and 3.607.",
     step,
 };
 

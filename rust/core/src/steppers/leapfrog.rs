@@ -17,8 +17,8 @@ pub const RECORD: Record = Record {
     section: "§7",
     reference: "L. Verlet, Phys. Rev. 159 (1967) 98; E. Hairer, C. Lubich, G. Wanner, Acta Numerica 12 (2003) 399",
     about: "False Euler with a half kick at the start: between steps it carries the velocity of half a step ago, v − ½h·a. v and \
-            y of a saved state belong to the same instant, and both are of second order, for one rate evaluation a step. Forces \
-            that depend on v are refused, since no v of the force's instant is known when it is asked for.",
+            y of a saved state belong to the same time, and both are of second order, for one function evaluation a step. Forces \
+            that depend on v are refused, since v at the time of the force is not known when the force is evaluated.",
     step,
 };
 

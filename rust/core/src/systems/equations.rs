@@ -1,6 +1,6 @@
 //! A user's own equations: the rates as operations, from the state, the parameters, the inputs and the time.
 //!
-//! They come from a function that was run once with symbols. Run again over any kind of number, they are a system like others.
+//! They come from a function that was run once with symbols. Evaluated over any kind of number, they are a system like others.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -12,7 +12,7 @@ use crate::{
     tape::{Id, Op, eval},
 };
 
-/// What the core knows of it. Given: the equations, and what their leaves are numbered by.
+/// The record of the system. It is given the equations, and the numbering of their leaves.
 pub const KIND: Kind = Kind {
     name: "equations",
     shape,
@@ -47,9 +47,9 @@ pub struct Equations {
     dy: Option<Vec<Id>>,
     /// Quantities of a state, each one number, by name.
     quantities: Vec<(String, Id)>,
-    /// What a projection keeps.
+    /// The invariant that a projection keeps.
     kept: Option<Invariant>,
-    /// What tells it from others, found once: steps are looked up by what they are made of.
+    /// A digest that distinguishes it from others, computed once: traced steps are found by it.
     digest: u64,
 }
 
@@ -82,7 +82,7 @@ impl Equations {
         Equations { ops, dv, dy, quantities, kept, digest: hasher.finish() }
     }
 
-    /// The same without operations that nothing asks for.
+    /// The same without operations whose result is not used.
     #[must_use]
     pub fn without_the_rest(self) -> Equations {
         let needed = self.needed(&self.roots().collect::<Vec<_>>());
@@ -109,7 +109,7 @@ impl Equations {
         self.kept.is_some()
     }
 
-    /// All values that are asked for.
+    /// All values that are needed.
     fn roots(&self) -> impl Iterator<Item = Id> {
         let kept = self.kept.iter().flat_map(|kept| kept.along_v.iter().chain(&kept.along_y).chain([&kept.value, &kept.square]));
         self.dv.iter().chain(self.dy.iter().flatten()).chain(self.quantities.iter().map(|(_, id)| id)).chain(kept).copied()
@@ -125,7 +125,7 @@ impl Equations {
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
     }
 
-    /// Which operations these values are made of.
+    /// Which operations these values depend on.
     fn needed(&self, roots: &[Id]) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
         roots.iter().for_each(|id| needed[*id as usize] = true);
@@ -175,7 +175,7 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     Ok(equations.shape())
 }
 
-/// A number that any operation can make.
+/// A number on which every operation is defined.
 trait Operand: Number {
     fn made(op: Op, operands: [Self; 3]) -> Self;
 }
@@ -225,7 +225,7 @@ impl<N: Operand> Own<N> {
         let mut made: Vec<N> = Vec::with_capacity(needed.len());
         for (op, needed) in self.equations.ops.iter().zip(needed) {
             let (operands, n) = op.operands();
-            // What is not needed is not there: nothing that is needed reads it.
+            // Operations that are not needed are left out: no needed one reads them.
             let value = match *op {
                 _ if !needed => t,
                 Op::State(i) if (i as usize) < v.len() => v[i as usize],

@@ -6,9 +6,9 @@
 //! | `newton` | 1/r³ | −G·m·m/r |
 //! | `printed` | 1/r² | −G·m·m/r, which belongs to the other force |
 //!
-//! Body i meets body i + k for k = 1 … n/2, counted round the circle, so every pair comes once. What a body gets from partners
-//! after it and before it is summed apart, the latter over two rounds (body n + j is body j), so that no index wraps where bodies
-//! are taken side by side. The order of these sums is the same however many there are and whoever computes them.
+//! Body i is paired with body i + k (modulo n) for k = 1 … n/2, so every pair comes once. The forces from partners after a body and
+//! from those before it are summed separately, the latter over two rounds (body n + j is body j), so that no index wraps where bodies
+//! are taken side by side. The order of these sums depends on the number of bodies only, not on the code that computes them.
 
 use stepwell_base::bodies::{LANES, Law, meeting, partners};
 

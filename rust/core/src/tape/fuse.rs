@@ -1,21 +1,20 @@
 //! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
 //!
-//! It is done on the tape and not by a compiler, so it is done in the same places for everybody. A product is fused into the sum or the
-//! difference that it is a term of if
+//! The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is fused into the sum or the
+//! difference of which it is a term if
 //!
 //! - nothing else reads it, so that it vanishes, and
-//! - it depends on the state. What depends on parameters and the time alone is computed before the steps for all of them, or once a step for
-//!   all members, and costs nothing in the hot loop. Which members have what in common decides nothing here: a result must not depend on
+//! - it depends on the state. Values that depend on parameters and the time alone are computed once before the steps, or once a step for
+//!   all members, and cost nothing in the hot loop. Whether members share a parameter has no influence: a result must not depend on
 //!   the batch.
 //!
-//! Of two such products the one of the higher [`ranks`] is fused. A rank says where a value stands in what is computed, and nothing of the
-//! order in which a tape was written: whoever writes down the same step fuses the same products.
+//! Of two such products the one of the higher [`ranks`] is fused. The rank of a value depends on the graph of operations alone, not on the
+//! order in which the tape was written: both languages fuse the same products.
 
 use super::{Id, Op, Tape, print::named};
 
-/// A number for each value that is needed. Values of fewer operations one after the other come before those of more; equally deep ones are
-/// sorted by the name of the operation, by what it is given, and by the ranks of its operands, the lower one first where they may change
-/// places.
+/// A number for each value that is needed. Values are sorted by the depth of their graph; equally deep ones by the name of the operation,
+/// by its constants, and by the ranks of its operands, which are sorted where the operation commutes.
 fn ranks(ops: &[Op], needed: &[bool]) -> Vec<u32> {
     let mut depths: Vec<usize> = Vec::with_capacity(ops.len());
     for op in ops {

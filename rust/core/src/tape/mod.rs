@@ -1,10 +1,10 @@
-//! The tape: what a step computes, as a straight list of operations.
+//! The tape: the operations of a step, as a straight-line program.
 //!
-//! A step is run once with symbols instead of numbers ([`crate::number::Symbol`]), and writes what it does to the tape. An operation
-//! that is there already is not written again, and what can be said exactly beforehand is: constants are folded, and an operation
-//! that changes no bit is left out. Whatever a value is, its bits are those of the operations as they were asked for.
+//! A step is run once with symbols instead of numbers ([`crate::number::Symbol`]), which record its operations on the tape. An
+//! operation that is already on the tape is not written again, constants are folded where that is exact, and an operation
+//! that changes no bit is left out. So the bits of every value are those of the operations as the step performs them.
 //!
-//! The only freedom taken is in what a NaN carries: its sign and payload are not promised.
+//! Only the sign and payload of a NaN may differ: they are not promised.
 
 pub mod eval;
 pub mod fuse;
@@ -14,7 +14,7 @@ pub mod split;
 
 use self::quick::QuickMap;
 
-/// A value on a tape, by the number of the operation that makes it.
+/// A value on a tape, by the index of its operation.
 pub type Id = u32;
 
 /// An operation. Comparisons set all bits of a number where they are true, and none where they are false.
@@ -72,7 +72,7 @@ pub enum Op {
     ShiftUp(Id, u32),
     /// Bits moved down by so many places, zeros before them.
     ShiftDown(Id, u32),
-    /// A value in the place of another that is the same: the next state is a number of the present one, or a constant.
+    /// The same value again: where the next state is a number of the present one, or a constant.
     Copy(Id),
     /// Of a body ([`split::Body`]): a number of the member that is the same in every step.
     Row(u32),
@@ -87,7 +87,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// What it reads; the first so many of the three.
+    /// Its operands: the first so many of the three.
     #[inline]
     pub fn operands(self) -> ([Id; 3], usize) {
         use Op::*;
@@ -109,7 +109,7 @@ impl Op {
         }
     }
 
-    /// The same operation of other values.
+    /// The same operation with other operands.
     #[must_use]
     pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
         use Op::*;
@@ -141,19 +141,19 @@ impl Op {
         }
     }
 
-    /// Whether its two operands may change places.
+    /// Whether its two operands may be exchanged.
     pub fn commutes(self) -> bool {
         use Op::*;
         matches!(self, Add(..) | Mul(..) | Equal(..) | And(..) | Or(..) | Xor(..) | AddBits(..))
     }
 
-    /// Whether it is there before anything is computed.
+    /// Whether it is an input of the tape, without operands.
     pub fn is_leaf(self) -> bool {
         self.operands().1 == 0
     }
 }
 
-/// How often each kind of operation occurs. Changes of sign, copies and what sorts bits are not arithmetic.
+/// How often each kind of operation occurs. Changes of sign, copies and bit masks are not arithmetic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Additions and subtractions.
@@ -190,7 +190,7 @@ impl Counts {
     }
 }
 
-/// Operations in the order in which they were asked for first, each once.
+/// Operations in the order in which they were first requested, each once.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     ops: Vec<Op>,
@@ -199,7 +199,7 @@ pub struct Tape {
     not_minus_zero: Vec<bool>,
     /// Of each value: whether it depends on the state.
     of_state: Vec<bool>,
-    /// What was asked for of values that depend on the state, before equal operations were merged.
+    /// Counts of the requested operations on values that depend on the state, before equal ones were merged.
     written: Counts,
 }
 
@@ -211,14 +211,14 @@ impl Tape {
         &self.ops
     }
 
-    /// The operation that makes a value.
+    /// The operation of a value.
     pub fn op(&self, id: Id) -> Op {
         self.ops[id as usize]
     }
 
-    /// A step as it is written down, if these values are its next state: what was asked for of values that depend on the state, before
-    /// equal operations were merged and needless ones left out, and what inputs take that change with the time. What is made of parameters
-    /// alone is made before.
+    /// Counts of the operations of a step as it is written down, if these values are its next state: the operations on values that depend
+    /// on the state, before equal ones were merged and unused ones left out, and those of inputs that change with time. Operations on
+    /// parameters alone are not counted, since they are computed before the steps.
     pub fn written(&self, roots: impl IntoIterator<Item = Id>) -> Counts {
         let mut counts = self.written;
         let mut changes: Vec<bool> = Vec::with_capacity(self.ops.len());
@@ -243,7 +243,7 @@ impl Tape {
         self.keep(Op::Const(x.to_bits()))
     }
 
-    /// Writes an operation, or finds what is equal to it in every bit.
+    /// Writes an operation, or finds a value that is equal to its result in every bit.
     pub fn push(&mut self, op: Op) -> Id {
         let (operands, n) = op.operands();
         if operands[..n].iter().any(|id| self.is_of_state(*id)) {
@@ -263,7 +263,7 @@ impl Tape {
         self.not_minus_zero[id as usize]
     }
 
-    /// 0 + x, of which only x matters.
+    /// 0 + x, returned as x.
     fn behind_zero(&self, id: Id) -> Option<Id> {
         match self.op(id) {
             Op::Add(a, b) if self.bits(a) == Some(0) => Some(b),
@@ -380,7 +380,7 @@ impl Tape {
         }
     }
 
-    /// What an operation of constants gives. A NaN is left to whoever computes.
+    /// The result of an operation on constants; none if it is a NaN, which is computed at run time.
     fn fold(&self, op: Op) -> Option<u64> {
         let ([a, b, c], n) = op.operands();
         if n == 0 || matches!(op, Op::Sample(..) | Op::Gather(_)) {
@@ -402,7 +402,7 @@ impl Tape {
         Tape { ops, seen, not_minus_zero: vec![false; self.ops.len()], of_state, written: self.written }
     }
 
-    /// The values that these need, themselves with them: for each value of the tape whether it is needed.
+    /// For each value of the tape whether these values need it; they need themselves.
     pub fn needed(&self, roots: impl IntoIterator<Item = Id>) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
         for root in roots {

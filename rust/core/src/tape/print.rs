@@ -45,7 +45,7 @@ pub fn line(id: Id, op: Op) -> String {
     format!("%{id} = {is}")
 }
 
-/// What an operation is called, and what it is given beside its operands: the number of a leaf, the bits of a constant, places.
+/// The name of an operation, and its argument besides the operands: the index of a leaf, the bits of a constant, a number of bits.
 pub fn named(op: Op) -> (&'static str, u64) {
     use Op::*;
     match op {

@@ -1,14 +1,14 @@
-//! A quick hash: operations are small and come by the ten thousand, and nobody chooses them to do harm.
+//! A fast hash: operations are small and there are tens of thousands. It need not resist chosen keys.
 
 use std::{
     collections::HashMap,
     hash::{BuildHasherDefault, Hasher},
 };
 
-/// A map with a quick hash.
+/// A map with a fast hash.
 pub type QuickMap<K, V> = HashMap<K, V, BuildHasherDefault<Quick>>;
 
-/// Multiplies what comes together; the high bits know of all of it.
+/// Multiplies and adds: the high bits depend on all of the input.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quick(u64);
 
@@ -32,7 +32,7 @@ impl Hasher for Quick {
         self.write_u64(number as u64);
     }
 
-    // What kind of operation it is comes so.
+    // The discriminant of an enum is hashed by this.
     fn write_isize(&mut self, number: isize) {
         self.write_u64(number as u64);
     }

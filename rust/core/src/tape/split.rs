@@ -1,23 +1,23 @@
-//! What is computed when: once for a run, once for a member, once for a step, or for every member at every step.
+//! Splits a tape by how often its values change: once for a run, once for a member, once for a step, or for every member at every step.
 //!
-//! A tape says what a step computes. Much of it does not change from step to step (Φ = ω₀·h), or not from member to member (the sine
-//! of a drive that all have in common). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
+//! Many values do not change from step to step (Φ = ω₀·h), or not from member to member (the sine of a drive that all
+//! share). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
 //! last of them is in the hot loop.
 
 use std::hash::Hash;
 
 use super::{Id, Op, Tape, quick::QuickMap};
 
-/// Operations over lanes: what an interpreter or a kernel writer takes.
+/// Operations over lanes: the input of the interpreter and of a kernel writer.
 ///
-/// Leaves are `State`, `Row`, `Uniform`, `PerStep`, `Held` and `Const` only. Every operation comes after what it reads, every one is
-/// needed.
+/// Leaves are `State`, `Row`, `Uniform`, `PerStep`, `Held` and `Const` only. Every operation comes after its operands, and every
+/// operation is needed.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Body {
     /// The operations.
     pub ops: Vec<Op>,
-    /// The next value of each number of the state. It is `State(s)` itself if s stays as it is; otherwise no leaf, and of no other
-    /// number of the state as well (a `Copy` stands in where it would be).
+    /// The next value of each number of the state. It is `State(s)` itself if s stays as it is; otherwise it is not a leaf, and not the
+    /// next value of another number of the state as well (where it would be, there is a `Copy`).
     pub next: Vec<Id>,
     /// How many rows of the member it may read.
     pub rows: usize,
@@ -33,7 +33,7 @@ impl Body {
         self.ops[self.next[s] as usize] == Op::State(s as u32)
     }
 
-    /// How many operations are no leaves.
+    /// Number of operations that are not leaves.
     pub fn work(&self) -> usize {
         self.ops.iter().filter(|op| !op.is_leaf()).count()
     }
@@ -70,7 +70,7 @@ impl Body {
         body
     }
 
-    /// Numbers the leaves of a kind in the order in which they are read: memory is quickest so. `list` is what they are.
+    /// Numbers the leaves of a kind in the order in which they are read, for sequential access to memory. `list` has their meaning.
     fn sort_leaves(&mut self, list: &mut Vec<Id>, is: impl Fn(Op) -> bool, leaf: impl Fn(u32) -> Op) {
         let mut order: Vec<Id> = Vec::with_capacity(list.len());
         let mut seen = vec![false; self.ops.len()];
@@ -93,7 +93,7 @@ impl Body {
         }
     }
 
-    /// Puts a copy in the place of a next value that is a leaf or that another number of the state has too.
+    /// Replaces a next value by a copy where it is a leaf or the next value of another number of the state too.
     fn copy_what_is_shared(&mut self) {
         let mut taken = vec![false; self.ops.len()];
         for s in 0..self.next.len() {
@@ -123,9 +123,9 @@ impl Body {
         }
     }
 
-    /// The body of so many steps, one after the other, which shows the states between: behind the numbers of the last state stand the
-    /// velocities before each step, and behind these the coordinates, so many numbers as `sizes` says. Where the body makes more than the
-    /// next state, which has `state` numbers, those are the velocities before a step, and what stands in their place is carried.
+    /// The body of several steps, one after the other, which also returns the states between: after the numbers of the last state come the
+    /// velocities before each step, and then the coordinates before each step; `sizes` has the lengths of both. A state has `state`
+    /// numbers. If the body of a step has further results, these are the velocities before the step, and the v slot holds the carry.
     #[must_use]
     pub fn trail(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
         let mut trail = Body::default();
@@ -189,7 +189,7 @@ pub enum Rank {
     Lane,
 }
 
-/// What a number that is the same for all members is.
+/// The meaning of a number that is the same for all members.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Given {
     /// The step h.
@@ -208,7 +208,7 @@ pub enum Given {
     Lanes,
 }
 
-/// What an entry of the table of the steps is made of.
+/// The meaning of an entry of the table of the steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Entry {
     /// The value itself.
@@ -222,7 +222,7 @@ pub enum Entry {
 /// A tape, cut by how often its values change.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Split {
-    /// What the uniforms of the first three bodies are.
+    /// The meaning of the uniforms of the first three bodies.
     pub given: Vec<Given>,
     /// Which parameters are the rows of `member`.
     pub params: Vec<u32>,
@@ -238,10 +238,10 @@ pub struct Split {
     pub body: Body,
 }
 
-/// A time this fraction of an interval before a sample's instant counts as it: t = t₀ + k·h may miss it by rounding.
+/// From this fraction of an interval before a sample's time on the sample is taken: rounding may put t = t₀ + k·h just before it.
 pub const HOLD_SLACK: f64 = 1e-6;
 
-/// Cuts a tape. `uniform` says which parameters all members have in common, `common` which inputs.
+/// Cuts a tape. `uniform` says which parameters all members share, `common` which inputs.
 pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: impl Fn(u32) -> bool) -> Split {
     let mut tape = tape.clone();
     let next = look_up_samples(&mut tape, next, &uniform);
@@ -250,7 +250,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
     let rank = |id: Id| ranks[id as usize];
     let mut split = Split::default();
 
-    // The hot loop. What is of a lower rank is a leaf to it.
+    // The hot loop. Values of a lower rank are its leaves.
     let (mut rows, mut uniforms, mut entries) = (Vec::new(), Vec::new(), Vec::new());
     // Each value is asked for once, the last of the tape first.
     let number = |list: &mut Vec<Id>, id: Id| {
@@ -312,7 +312,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
     split
 }
 
-/// Things in the order in which they were asked for, each once.
+/// Things in the order of their first request, each once.
 struct Places<T> {
     list: Vec<T>,
     known: QuickMap<T, u32>,
@@ -333,7 +333,7 @@ impl<T: Copy + Eq + Hash> Places<T> {
     }
 }
 
-/// What a step does not know of an input and a run does, as a leaf of a tape that is being cut.
+/// A property of an input that is known for a run but not when a step is traced, as a leaf of a tape that is being cut.
 fn fact(given: Given) -> Op {
     Op::Uniform(match given {
         Given::Start(input) => 5 * input,
@@ -365,7 +365,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
     tape.keep(Op::Select(below, at, last))
 }
 
-/// Where members ask for samples at times of their own, each looks up its sample by itself.
+/// Looks up samples for each member by itself, where members have times of their own.
 fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let old = std::mem::take(tape);
@@ -408,7 +408,7 @@ fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
     ranks
 }
 
-/// Moves a change of sign from a product that is made in every step to the factor that is made once.
+/// Moves a change of sign from a product that is computed in every step to its factor that is computed once.
 fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let needed = tape.needed(next.iter().copied());
@@ -438,8 +438,8 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> 
 }
 
 impl Tape {
-    /// Takes over what another tape holds; gives the place of each of its values. What was decided there, such as which products were
-    /// fused, stays.
+    /// Adds the operations of another tape, and returns the place of each of its values. Decisions that were made there, such as which
+    /// products are fused, remain.
     pub fn take_over(&mut self, other: &Tape) -> Vec<Id> {
         let mut place: Vec<Id> = Vec::with_capacity(other.ops().len());
         for op in other.ops() {

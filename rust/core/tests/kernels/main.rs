@@ -81,7 +81,7 @@ fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
 
-/// A random body in a random shape: how many inputs it was held against the interpreter with.
+/// Compares a random body in a random shape with the interpreter; returns on how many inputs.
 fn one_case(seed: u64, read_code: bool) -> usize {
     let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95));
     let operations = match random.below(8) {
@@ -237,8 +237,8 @@ fn rounding_is_to_nearest_whatever_the_caller_does() {
     assert_eq!(after & OTHER_ROUNDING, OTHER_ROUNDING);
 }
 
-/// The body of several steps that shows the states between has the bits of these steps, interpreted and written: of states that stand
-/// between steps, and of such as are made of them, as velocities are of what is carried.
+/// The body of several steps that returns the states between has the bits of these steps, interpreted and as machine code: for states as
+/// they are between steps, and for velocities that are computed from a carry.
 #[test]
 fn a_trail_has_the_states_of_its_steps() {
     let (mut seen, mut seen_carried) = (0, 0);
@@ -246,14 +246,14 @@ fn a_trail_has_the_states_of_its_steps() {
         let random = &mut Random(seed.wrapping_mul(0xA076_1D64_78BD_642F) ^ 7);
         let (operations, made) = (3 + random.below(40), 1 + random.below(5));
         let body = random::body(random, operations, made);
-        // The last of what is made are velocities that are shown in the place of the first of the state.
+        // The last results are velocities, which are returned in place of the first numbers of the state.
         let carried = random.below(2) * (made / 2);
         let state = made - carried;
         let v = if carried > 0 { carried } else { random.below(state + 1) };
         let y = random.below(state - v + 1);
         let is_whole = |op: &Op| !matches!(op, Op::State(s) if *s as usize >= state);
         if !body.ops.iter().all(is_whole) {
-            continue; // it reads as a number of the state what would be made in a step
+            continue; // it would read a result of the step as a number of the state
         }
         let (lanes, steps) = (random.one_of(&[1, 4, 8]), 1 + random.below(9));
         let trail = body.trail(steps, state, [v, y]);

@@ -189,7 +189,7 @@ pub fn body(random: &mut Random, operations: usize, states: usize) -> Body {
     if random.once_in(5) { body } else { needed(body) }
 }
 
-/// Without what nobody needs.
+/// Without operations whose result is not used.
 fn needed(body: Body) -> Body {
     let mut needed = vec![false; body.ops.len()];
     body.next.iter().for_each(|id| needed[*id as usize] = true);

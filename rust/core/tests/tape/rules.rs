@@ -315,7 +315,7 @@ fn operations_are_counted_before_and_after() {
     let computed = Counts { additions: 2, multiplications: 1, fused: 0, divisions: 1, square_roots: 1, choices: 0, bits: 0 };
     assert_eq!(tape.counts([id]), computed);
     assert_eq!(tape.counts([]), Counts::default());
-    // What nobody needs is on the tape and does not count.
+    // A value that is not used is on the tape but not counted.
     let (x, y) = (tape.push(Op::State(0)), tape.push(Op::State(1)));
     let sum = tape.push(Op::Add(x, y));
     assert_eq!(tape.counts([sum]), Counts { additions: 1, ..Counts::default() });
@@ -379,7 +379,7 @@ fn what_would_not_vanish_or_is_not_of_the_state_is_not_fused() {
         let also: Vec<&str> = Some(also).filter(|also| !also.is_empty()).into_iter().collect();
         assert_eq!(fused(text, &also), text, "{also:?}");
     }
-    // A product of parameters is made before the steps, whoever has them in common.
+    // A product of parameters is computed before the steps, whether members share them or not.
     let mut tape = Tape::default();
     let [x, a, b] = [Op::State(0), Op::Param(0), Op::Param(1)].map(|op| tape.push(op));
     let product = tape.push(Op::Mul(a, b));

@@ -40,7 +40,7 @@ struct Pinned {
     leaves: Vec<(Value, u8)>,
 }
 
-/// How many values are under way at once, and when each is needed last.
+/// How many values are live at once, and when each is needed last.
 struct Pressure {
     most: u32,
     /// Of each value how often it is read.
@@ -80,12 +80,12 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// When the operation at a place of the order is made. One later what it has made goes where it belongs.
+    /// The time of the operation at an index of the order. One later its result goes to its home.
     fn time(place: usize) -> u32 {
         2 * place as u32 + 2
     }
 
-    /// Finds out when each value is needed, and how many are at once if every number of the state has a register.
+    /// Finds when each value is needed, and how many are live at once if every number of the state has a register.
     fn look_ahead(&mut self) -> Pressure {
         let (plan, block_vectors) = (self.plan, self.shape.block_vectors);
         let values = plan.sources.len() * block_vectors;
@@ -100,15 +100,15 @@ impl<'a> Writer<'a> {
             for id in step.of() {
                 let value = self.value(*id, vector);
                 reads[value as usize] += 1;
-                if !self.uses.tell(value, now) {
+                if !self.uses.add_earlier_use(value, now) {
                     continue;
                 }
                 last[value as usize] = now;
-                // When the old number of the state has been read for the last time, the next one is brought to its place.
+                // When the old number of the state has been read for the last time, the next one is moved to its home.
                 if let Source::State(s) = plan.sources[*id as usize]
                     && let Some(next) = plan.next[s as usize].map(|next| self.value(next, vector))
                     && made[next as usize] < now
-                    && self.uses.tell(next, now + 1)
+                    && self.uses.add_earlier_use(next, now + 1)
                 {
                     last[next as usize] = now;
                 }
@@ -137,12 +137,12 @@ impl<'a> Writer<'a> {
         Pressure { most, reads }
     }
 
-    /// Gives registers to what is in use through the whole loop, as far as those that are under way leave any.
+    /// Assigns registers to values that are used through the whole loop, as far as the live values leave any.
     fn share_out(&mut self) -> Pinned {
         let Pressure { most, reads } = self.look_ahead();
         let (plan, block_vectors, resident) = (self.plan, self.shape.block_vectors, self.shape.resident);
         let mut pinned = Pinned::default();
-        // One more than are under way: an operand may have to be loaded. At least five: no instruction asks for more.
+        // One more than the live values: an operand may have to be loaded. At least five: no instruction needs more.
         let needed = (most + 1).max(5);
         if resident {
             for s in (0..plan.next.len()).filter(|s| plan.next[*s].is_some()) {

@@ -1,7 +1,7 @@
 //! The kernel writer for x86-64: a body becomes a vector loop, with AVX-512 or AVX2.
 //!
-//! [`plan`] says which instructions a body is, [`write`] puts values into registers and writes one step, [`loops`] the loops around it,
-//! [`encode`] the bytes. [`Shape`] says how wide and in which order; [`choose`](choose::choose) knows which is quick.
+//! [`plan`] selects instructions, [`write`] assigns registers and writes one step, [`loops`] writes the loops around it, [`encode`] the
+//! bytes. [`Shape`] has the width and the order of the loops; [`choose`](choose::choose) chooses the fastest.
 
 mod choose;
 mod encode;
@@ -26,7 +26,7 @@ pub struct Shape {
     pub width: usize,
     /// Vectors of a block: those that one turn of the loop steps.
     pub block_vectors: usize,
-    /// How many of them are interleaved, operation by operation; so many after so many. All, or fewer where registers are scarce and
+    /// How many of them are interleaved at a time, operation by operation: all, or fewer where registers are scarce and
     /// out-of-order execution overlaps them by itself.
     pub interleaved: usize,
     /// Blocks, which are stepped one after the other.
@@ -52,7 +52,7 @@ impl Shape {
         if self.level == Level::Avx512 { 32 } else { 16 }
     }
 
-    /// How often a number of the pool stands there: AVX-512 can take one for all lanes.
+    /// Copies of each number in the pool: AVX-512 can broadcast a single one to all lanes.
     fn pool_copies(&self) -> usize {
         match (self.level, self.width) {
             (Level::Avx512, _) => 1,
@@ -61,7 +61,7 @@ impl Shape {
         }
     }
 
-    /// Whether this machine has it, and all places of a body in it can be named by 31 bits.
+    /// Whether this machine has it, and all addresses of a body in it fit into 31 bits.
     fn is_possible(&self, body: &Body) -> bool {
         let is_known = match self.width {
             1 | 4 => self.level >= Level::Avx2,
@@ -76,14 +76,14 @@ impl Shape {
             && self.interleaved > 0
             && self.blocks > 0
             && self.level.here()
-            && body.ops.len().saturating_mul(self.block_vectors) < MOST_OPERATIONS
+            && body.ops.len().saturating_mul(self.block_vectors) < MAX_OPERATIONS
             && bytes(&[rows, lanes[0], lanes[1], lanes[2]])
             && bytes(&[body.ops.len() + body.uniforms + body.per_step + 2, self.width.max(2), self.block_vectors])
     }
 }
 
-/// More operations than that are no kernel: jumps could not be named by 31 bits.
-const MOST_OPERATIONS: usize = 1 << 22;
+/// The most operations of a kernel, so that jumps fit into 31 bits.
+const MAX_OPERATIONS: usize = 1 << 22;
 
 /// A kernel as machine code.
 #[derive(Debug)]

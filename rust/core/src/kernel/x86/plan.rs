@@ -1,4 +1,4 @@
-//! From a body to what the machine can do: which instruction an operation is, and where leaves come from.
+//! Instruction selection: the instruction of each operation of a body, and the source of each leaf.
 //!
 //! **To add an operation**, give it a line in [`Plan::doing`]; if it is of a new kind, an arm in `write.rs` as well.
 
@@ -33,12 +33,12 @@ impl Source {
     }
 }
 
-/// What an instruction does, or a few that belong together.
+/// An instruction, or a few that belong together.
 #[derive(Clone, Copy, Debug)]
 pub enum Doing {
-    /// Of two values. Whether they may change places.
+    /// Of two values. Whether they may be exchanged.
     Two(Form, bool),
-    /// Of one, with a byte behind or none.
+    /// Of one, with or without an immediate byte.
     One(Form, Option<u8>),
     /// A product and a sum, rounded once.
     Fused(x::Fused),
@@ -54,7 +54,7 @@ pub enum Doing {
     Copy,
 }
 
-/// An operation: what it does, and of what.
+/// An operation with its operands.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     pub doing: Doing,
@@ -70,7 +70,7 @@ impl Step {
     }
 }
 
-/// A body as the machine sees it.
+/// A body as machine instructions.
 #[derive(Debug)]
 pub struct Plan {
     /// Of each value where it comes from.
@@ -88,7 +88,7 @@ pub struct Plan {
 const LESS: u8 = 0x11;
 const LESS_EQUAL: u8 = 0x12;
 const EQUAL: u8 = 0;
-/// Down, and quietly.
+/// Round down, without raising the inexact flag.
 const FLOOR: u8 = 9;
 
 /// The predicate that says the same of two values in the other order.
@@ -101,7 +101,7 @@ pub fn turned(predicate: u8) -> u8 {
 }
 
 impl Plan {
-    /// None for what is no body: everything here and in the writer relies on its form.
+    /// None if it is not a valid body: everything here and in the writer relies on its form.
     pub fn new(body: &Body, evex: bool) -> Option<Plan> {
         if !is_sound(body) {
             return None;
@@ -172,7 +172,7 @@ impl Plan {
         Some(plan)
     }
 
-    /// What an operation is. Those that depend on their neighbours are not here.
+    /// The instruction of an operation. Those that depend on their neighbours are not here.
     fn doing(op: Op) -> Doing {
         match op {
             Op::Add(..) => Doing::Two(x::ADD, true),
@@ -191,7 +191,7 @@ impl Plan {
             Op::ShiftUp(_, n) => Doing::Shift(x::UP, n as u8),
             Op::ShiftDown(_, n) => Doing::Shift(x::DOWN, n as u8),
             Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => Doing::Compare(predicate(op)),
-            // Those that depend on their neighbours, and what is no operation, come here as what they are at least.
+            // Operations that depend on their neighbours, and leaves, get a default here.
             Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
             Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
             Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
@@ -256,7 +256,7 @@ fn masks(body: &Body) -> Vec<bool> {
     masks
 }
 
-/// Of each value whether it is a comparison that serves one choice only. Both are made together then, by way of a mask register.
+/// For each value whether it is a comparison that is used by one choice only. Both are then computed together, with a mask register.
 fn fused(body: &Body) -> Vec<bool> {
     let mut uses = vec![0u32; body.ops.len()];
     let mut chooses = vec![false; body.ops.len()];

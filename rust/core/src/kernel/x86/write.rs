@@ -1,8 +1,8 @@
 //! One step of the vectors of a block, instruction after instruction.
 //!
-//! A value is in a register, in memory, or both. Leaves are in memory from the start; what is made is spilled to the scratch only when
-//! registers run out. Numbers of the state have a home: a register of their own, or their row. The next value goes there as soon as
-//! the old one is not needed any more: at once if the instruction that makes it is the last to read the old one.
+//! A value is in a register, in memory, or both. Leaves are in memory from the start; a result is spilled to the scratch only when
+//! registers run out. Each number of the state has a home: a register of its own, or its row. The next value goes there as soon as
+//! the old one is not needed any more: at once if the instruction that computes it is the last to read the old one.
 
 use super::{
     Shape,
@@ -42,13 +42,13 @@ pub struct Writer<'a> {
     pub homes: Vec<Option<u8>>,
     /// Of the same, whether the next value waits for the old one to be read.
     pub waits: Vec<bool>,
-    /// When it is: twice the place in the order.
+    /// The current time: twice the index in the order.
     pub now: u32,
     pub free_slots: Vec<u32>,
     pub slots: u32,
 }
 
-/// What a kernel finds where. Those that point to rows move on from block to block.
+/// The general registers of a kernel. Those that point to rows are advanced from block to block.
 pub const STATE: General = General::Rdi;
 pub const ROWS: General = General::Rsi;
 pub const POOL: General = General::Rdx;
@@ -87,7 +87,7 @@ impl Writer<'_> {
             (_, Source::Pool(i)) => Memory::new(POOL, (i as usize * self.shape.pool_copies() * 8) as i32),
             (_, Source::PerStep(i)) => Memory::new(PER_STEP, i as i32 * 8),
             (_, Source::Held(_)) => Memory { indexed: true, ..self.in_row(HELD, 0, value) },
-            (_, Source::Made) => Memory::new(SCRATCH, 0), // It is in a register, and nobody asks.
+            (_, Source::Made) => Memory::new(SCRATCH, 0), // It is in a register: never read from here.
         }
     }
 
@@ -97,7 +97,7 @@ impl Writer<'_> {
         let single = self.shape.width == 1;
         let is_whole = single && form.single.is_some();
         let can = match source {
-            // Its place would have to be looked up first.
+            // Its address must be loaded first.
             Source::Held(_) => false,
             _ if self.code.evex => true,
             _ if single => is_whole || matches!(source, Source::Pool(_)),
@@ -135,7 +135,7 @@ impl Writer<'_> {
         if memory[value as usize] == Where::Nowhere { wait } else { wait.saturating_mul(2) }
     }
 
-    /// A register to write to. What it held is spilled if need be.
+    /// A register to write to. The value that it held is spilled if it is still needed.
     fn take(&mut self) -> Option<u8> {
         if let Some(register) = self.registers.any_free() {
             return Some(register);
@@ -180,7 +180,7 @@ impl Writer<'_> {
                 return Some(Operand::Memory(place));
             }
             if self.registers.free() < 2 {
-                // It is worth a register if one can be had for nothing that is needed later.
+                // It is worth a register if no value that is needed later has to leave one.
                 let (uses, memory, now) = (&mut self.uses, &self.memory, self.now);
                 let price = |value| match memory[value as usize] {
                     Where::Nowhere => 0,
@@ -393,7 +393,7 @@ impl Writer<'_> {
         Some(to)
     }
 
-    /// Notes that a value was made in a register, and what is over with that.
+    /// Records that a value was computed in a register, and frees what is not needed any more.
     fn made(&mut self, id: u32, vector: usize, to: u8, of: &[Value]) -> Option<()> {
         self.registers.unlock();
         self.let_go(of);

@@ -15,12 +15,12 @@ use self::{
     share::{Share, add, share},
 };
 use super::{Asked, Facts, Rates};
-use crate::{isa::with_isa, run::crew::Stop, spec::Spec, systems::nbody};
+use crate::{isa::with_isa, run::workers::Stop, spec::Spec, systems::nbody};
 
 /// Bodies that are taken side by side, and parts in which sums over bodies are kept.
 const SIDE: usize = LANES;
-/// Bodies from which on threads pay, which are started anew for each force: that takes some hundredths of a millisecond.
-const THREADED: usize = 1024;
+/// Bodies from which on threads are worthwhile. They are started anew for each force, which takes some hundredths of a millisecond.
+const MIN_BODIES_FOR_THREADS: usize = 1024;
 
 /// The bodies of one member, scaled to the step.
 struct Bodies {
@@ -35,16 +35,16 @@ struct Bodies {
     potential: Vec<f64>,
     /// The bodies along the lanes.
     round: Round,
-    /// What they collect, once for each thread.
+    /// Sums of forces and potentials, once for each thread.
     sums: Vec<Sums>,
     /// One for each slab, if there are several threads.
     shares: Vec<Share>,
     record: Vec<Quantity>,
     stop: Stop,
-    /// Whether `dv` are the forces at `y`: a state that is projected or recorded, at which the next step begins; of many bodies the
-    /// last that was asked for, so that a run that is stopped within a step has the forces at the end of the step before.
+    /// Whether `dv` are the forces at `y`. They are kept for a state that is projected or recorded, since the next step begins with
+    /// them; for many bodies always, so that a run that is stopped within a step has the forces at the end of the step before.
     has_forces: bool,
-    /// Whether `potential` is at these places, too.
+    /// Whether `potential` is that at `y`, too.
     has_potentials: bool,
     y: Vec<f64>,
     dv: Vec<f64>,
@@ -58,7 +58,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
     let slabs: Vec<Vec<Distances>> = partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
     let round = Round::new(n, dim);
     let threads = match machine.threads {
-        _ if n < THREADED => 1,
+        _ if n < MIN_BODIES_FOR_THREADS => 1,
         0 => thread::available_parallelism().map_or(1, usize::from),
         given => given,
     };
@@ -111,12 +111,12 @@ impl Bodies {
         }
     }
 
-    /// Whether the forces at these places, and the potentials if they are wanted, are at hand.
+    /// Whether the forces at these coordinates, and the potentials if needed, are known.
     fn has(&self, energy: bool, y: &[f64]) -> bool {
         self.has_forces && (self.has_potentials || !energy) && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits())
     }
 
-    /// Finds the forces, if they are not at hand.
+    /// Computes the forces, unless they are known.
     fn find(&mut self, energy: bool, y: &[f64], out: &mut [f64]) {
         if self.has(energy, y) {
             out[..y.len()].copy_from_slice(&self.dv);
@@ -124,7 +124,7 @@ impl Bodies {
         }
         self.has_potentials &= !energy;
         self.meet(energy, y, out);
-        if self.n >= THREADED && !self.stop.load(Relaxed) {
+        if self.n >= MIN_BODIES_FOR_THREADS && !self.stop.load(Relaxed) {
             self.dv.clear();
             self.dv.extend_from_slice(&out[..y.len()]);
             self.keep(energy, y);
@@ -165,7 +165,7 @@ impl Rates for Bodies {
         (self.has_forces, self.has_potentials) = (false, false);
     }
 
-    fn heed(&mut self, stop: &Stop) {
+    fn set_stop_flag(&mut self, stop: &Stop) {
         self.stop = Stop::clone(stop);
     }
 

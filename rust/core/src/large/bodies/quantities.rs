@@ -1,4 +1,4 @@
-//! What can be recorded of a state: quantities that the motion keeps, and how near two bodies are.
+//! Quantities that can be recorded of a state: invariants of the motion, and the least distance of two bodies.
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
@@ -127,11 +127,11 @@ impl<const D: usize> Task for Record<'_, D> {
     }
 }
 
-/// The least distance, eight partners at a time. The order in which pairs are looked at changes nothing.
+/// The least distance, eight partners at a time. The order of the pairs does not matter.
 #[inline(always)]
 fn closest<const D: usize>(bodies: &[[f64; D]]) -> f64 {
     let n = bodies.len();
-    // Bodies that are not there are nowhere, which is never near.
+    // Padding has NaN coordinates, which are never the nearest.
     let along = n.next_multiple_of(SIDE) + SIDE;
     let row = |c: usize| -> Vec<f64> { (0..along).map(|i| bodies.get(i).map_or(f64::NAN, |body| body[c])).collect() };
     let rows: [Vec<f64>; D] = std::array::from_fn(row);

@@ -4,7 +4,7 @@ use std::{sync::Mutex, thread};
 
 use stepwell_base::forces::{Distances, Sums};
 
-/// What a slab brings.
+/// The sums of a slab.
 pub(super) struct Share {
     pub(super) force: Vec<f64>,
     pub(super) potential: Vec<f64>,
@@ -42,11 +42,11 @@ pub(super) fn share(
     };
     let work = &work;
     thread::scope(|scope| {
-        // A thread that cannot be had leaves its slabs to the others.
+        // If a thread cannot be started, the others do its slabs.
         let start = |sums| thread::Builder::new().spawn_scoped(scope, move || work(sums)).ok();
         let helpers: Vec<_> = others.iter_mut().filter_map(start).collect();
         work(mine);
-        // One that panicked must not take the caller with it: its slab is made below.
+        // The panic of a thread is not passed on to the caller: its slab is computed below.
         helpers.into_iter().for_each(|helper| drop(helper.join()));
     });
     for (groups, share) in slabs.iter().zip(shares) {

@@ -1,9 +1,9 @@
-//! A control or a projection around the rates of one member: the same as [`crate::controls`], over rows.
+//! A control or a projection that wraps the rates of one member: the same as [`crate::controls`], over rows.
 
 use super::{Asked, Facts, Rates};
 use crate::{
     controls::{self, energy, projection},
-    run::crew::Stop,
+    run::workers::Stop,
     spec::Spec,
 };
 
@@ -12,37 +12,37 @@ pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
     if !controls::is_given(asked.given) {
         return rates;
     }
-    let keeps = match asked.given.word("control") {
-        "energy" => Keeps::Push { limited: asked.given.word("control.form") == "limited" },
-        _ => Keeps::Back { nacozy: asked.given.word("control.way") == "nacozy" },
+    let control = match asked.given.word("control") {
+        "energy" => Control::Push { limited: asked.given.word("control.form") == "limited" },
+        _ => Control::Projection { nacozy: asked.given.word("control.way") == "nacozy" },
     };
     let (v, y) = (vec![0.0; asked.shape.v], vec![0.0; asked.shape.y]);
-    Box::new(Held { rates, keeps, h: asked.h, gain: 0.0, target: 0.0, work: [0.0], dv: v.clone(), along: (v, y) })
+    Box::new(ControlledRates { rates, control, h: asked.h, gain: 0.0, target: 0.0, work: [0.0], dv: v.clone(), along: (v, y) })
 }
 
-/// What keeps the energy.
+/// How the energy is kept.
 #[derive(Clone, Copy)]
-enum Keeps {
+enum Control {
     Push { limited: bool },
-    Back { nacozy: bool },
+    Projection { nacozy: bool },
 }
 
-struct Held {
+struct ControlledRates {
     rates: Box<dyn Rates>,
-    keeps: Keeps,
+    control: Control,
     h: f64,
     gain: f64,
     /// h times the energy to keep.
     target: f64,
-    /// h times what it changed of the energy.
+    /// h times the energy that it added.
     work: [f64; 1],
     dv: Vec<f64>,
     along: (Vec<f64>, Vec<f64>),
 }
 
-impl Rates for Held {
+impl Rates for ControlledRates {
     fn facts(&self) -> Facts {
-        let pushes = matches!(self.keeps, Keeps::Push { .. });
+        let pushes = matches!(self.control, Control::Push { .. });
         Facts { reads_v: pushes || self.rates.facts().reads_v, ..self.rates.facts() }
     }
 
@@ -52,12 +52,12 @@ impl Rates for Held {
         self.rates.prepare(spec, first, count);
     }
 
-    fn heed(&mut self, stop: &Stop) {
-        self.rates.heed(stop);
+    fn set_stop_flag(&mut self, stop: &Stop) {
+        self.rates.set_stop_flag(stop);
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        let Keeps::Push { limited } = self.keeps else { return self.rates.dv(t, v, y, out) };
+        let Control::Push { limited } = self.control else { return self.rates.dv(t, v, y, out) };
         let Some([kinetic, whole]) = self.rates.energies(v, y, out) else { return self.rates.dv(t, v, y, out) };
         let (g, taken) = energy::push(limited, self.gain, whole - self.target, kinetic);
         self.work[0] -= taken;
@@ -75,7 +75,7 @@ impl Rates for Held {
     }
 
     fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
-        let Keeps::Back { nacozy } = self.keeps else { return };
+        let Control::Projection { nacozy } = self.control else { return };
         self.rates.cache_forces(y);
         let Some([kinetic, whole]) = self.rates.energies(v, y, &mut self.dv) else { return };
         let off = whole - self.target;

@@ -1,4 +1,4 @@
-//! Threads that share the parts of a run, and a caller who is told how far it is and may end it.
+//! The threads of a run share its parts. The caller's monitor is told the progress and may stop the run.
 
 use std::{
     sync::{
@@ -14,41 +14,41 @@ use std::{
 
 use crate::error::Error;
 
-/// How long the caller's monitor may wait.
+/// The longest time between two calls of the caller's monitor.
 pub const POLL: Duration = Duration::from_millis(20);
 
-/// Says how much was done, and hears whether to go on.
+/// Is called with the amount of work done since the last call; returns whether to continue.
 pub type GoOn<'a> = &'a mut dyn FnMut(u64) -> bool;
 
-/// Set when all threads are to stop. They leave their parts as they are; the results of an interrupted run are discarded.
+/// Set when all threads are to stop. They leave their parts unfinished; the results of an interrupted run are discarded.
 pub type Stop = Arc<AtomicBool>;
 
-/// Who does the parts of a run.
+/// The threads of a run, and its stop flag.
 #[derive(Debug)]
-pub struct Crew {
-    /// How many work.
+pub struct Workers {
+    /// Number of threads that work on parts.
     pub threads: usize,
     /// Work in other threads only: a single step may take long, and the caller waits for signals, so that it can be stopped within one.
     pub background: bool,
-    /// How much there is to do.
+    /// The whole work, in the unit of [`GoOn`].
     pub total: f64,
-    /// How it is stopped.
+    /// Set to stop all threads.
     pub stop: Stop,
 }
 
-/// Does all parts, `mine` being the first of the crew and all others made by `worker`.
+/// Does all parts. `mine` is the state of the first worker, `worker` makes those of the others.
 ///
-/// The monitor is called on this thread some dozens of times a second with the share of the total that is done; when it answers
-/// no, all threads are told to stop.
+/// The monitor is called on this thread some dozens of times a second with the fraction of the total that is done. When it returns
+/// false, all threads are told to stop.
 pub fn share<P: Send, W: Send>(
     parts: Vec<P>,
-    crew: &Crew,
+    workers: &Workers,
     monitor: &mut dyn FnMut(f64) -> bool,
     mine: W,
     worker: impl Fn() -> Result<W, Error> + Sync,
     part: impl Fn(&mut W, P, GoOn) -> Result<(), Error> + Sync,
 ) -> Result<(), Error> {
-    let Crew { threads, background, total, stop } = crew;
+    let Workers { threads, background, total, stop } = workers;
     let queue = Mutex::new(parts.into_iter());
     let done = AtomicU64::new(0);
     let take = || queue.lock().map_or(None, |mut q| q.next());
@@ -67,16 +67,16 @@ pub fn share<P: Send, W: Send>(
         for _ in usize::from(!background)..*threads {
             let its = if *background { mine.take() } else { None };
             busy.fetch_add(1, Relaxed);
-            let leave = Leave(&busy, &caller);
+            let guard = BusyGuard(&busy, &caller);
             let (work, done) = (&work, &done);
             let helper = move || {
-                let _leave = leave;
+                let _guard = guard;
                 work(its, &mut |n| {
                     done.fetch_add(n, Relaxed);
                     !stop.load(Relaxed)
                 })
             };
-            // A thread that cannot be had leaves its parts to the others.
+            // If a thread cannot be started, the others do its parts.
             match thread::Builder::new().spawn_scoped(scope, helper) {
                 Ok(helper) => helpers.push(helper),
                 Err(_) => break,
@@ -105,10 +105,10 @@ pub fn share<P: Send, W: Send>(
     })
 }
 
-/// Tells the caller that a thread has nothing left to do, also if it panicked or was never there.
-struct Leave<'a>(&'a AtomicUsize, &'a Thread);
+/// Dropped when a thread has ended, even if it panicked or could not be started: counts it out and wakes the caller.
+struct BusyGuard<'a>(&'a AtomicUsize, &'a Thread);
 
-impl Drop for Leave<'_> {
+impl Drop for BusyGuard<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Release);
         self.1.unpark();
