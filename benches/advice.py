@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import stepwell as sw
 from stepwell.advice import Advice, Row
-from stepwell.errors import ControlWarning, DivergenceWarning, ToleranceWarning, UnsupportedError
+from stepwell.errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning, UnsupportedError
 from stepwell.methods import Method
 from stepwell.scenes import Scene
 from stepwell.scenes.table import tabled
@@ -106,6 +106,7 @@ class Brute:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DivergenceWarning)
                 warnings.simplefilter("ignore", ControlWarning)
+                warnings.simplefilter("ignore", AccuracyWarning)
                 run = self.scene.run(method, dt, steps=steps, every=max(1, steps // samples))
             self._errors[key] = float(self.scene.state_error(run).max())
         return self._errors[key]
@@ -182,6 +183,7 @@ class Brute:
     def _integrated(self, method: str, tolerance: float, at: Any) -> sw.Run:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             return sw.integrate(self.scene.system, method, v=self.scene.v, y=self.scene.y, tolerance=tolerance, at=at)
 
     def chosen(self, tolerance: float, most: float) -> Try | None:

@@ -127,9 +127,9 @@ def test_run_draws_a_picture_or_an_animation(capsys, tmp_path):
 
 
 def test_run_takes_fused_multiply_adds(capsys):
-    words = ("run", "kepler", "--method", "rk4", "--dt", "0.1", "--steps", "50", "--json")
+    words = ("run", "kepler", "--method", "rk4", "--dt", "0.02", "--steps", "50", "--json")
     plain, fused = (json.loads(told(capsys, *words, *more)[1]) for more in ((), ("--fused",)))
-    run = sw.scenes.kepler().run("rk4", 0.1, steps=50, fused=True)
+    run = sw.scenes.kepler().run("rk4", 0.02, steps=50, fused=True)
     assert fused["last_y"] == run.y[-1].tolist() != plain["last_y"]
 
 

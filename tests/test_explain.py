@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,44 @@ def test_matrices_are_named_as_given() -> None:
 
 def test_fused() -> None:
     assert lines(sw.explain(sw.Oscillator(), "false_euler", fused=True))[-2:] == ["v' = fma(−Φ, y, v)", "y' = fma(Φ, v', y)"]
+
+
+def beside(explained: sw.Explanation) -> dict[str, list[str]]:
+    """Lines of what is made beside the steps."""
+    return {section.when: [f"{line.name} = {line.formula}" for line in section.lines] for section in explained.beside}
+
+
+def test_both_ends_of_what_is_carried() -> None:
+    """Verlet starts by y − Φv + ½ of the increment of the increment, as a Taylor series, or by y − Φv; v is made from it so."""
+    assert beside(sw.explain(sw.Oscillator(), "verlet")) == {
+        "start": ["Φ = h·omega", "y_prev = y − Φ·v − 0.5·(Φ·(Φ·y))"],
+        "finish": ["Φ = h·omega", "v = (y − y_prev)/Φ − 0.5·(Φ·y)"],
+    }
+    assert beside(sw.explain(sw.Oscillator(), "verlet", start="first_order")) == {
+        "start": ["y_prev = y − h·omega·v"],
+        "finish": ["v = (y − y_prev)/(h·omega)"],
+    }
+    fused = beside(sw.explain(sw.Oscillator(), "leapfrog", fused=True))
+    assert fused == {"start": ["v_half = fma(0.5, h·omega·y, v)"], "finish": ["v = fma(−0.5, h·omega·y, v_half)"]}
+    assert sw.explain(sw.Oscillator(), "rk4").beside == ()
+    text = str(sw.explain(sw.Oscillator(), "verlet"))
+    assert "at the start of a run, y_prev from v\n  Φ      = h·omega\n" in text
+    assert "where a state is kept, v from y_prev\n" in text
+
+
+def test_the_transition_matrix() -> None:
+    explained = sw.explain(sw.Oscillator(), "rk4", form="matrix")
+    assert [line.replace("  ", " ") for line in lines(explained)] == [
+        "in each step",
+        "v' = P[0,0]·v + P[0,1]·y",
+        "y' = P[1,0]·v + P[1,1]·y",
+    ]
+    assert (explained.computed["additions"], explained.computed["multiplications"]) == (2, 4)
+    assert explained.written == explained.computed
+    assert (
+        explained.title == "Runge-Kutta 4: a step of Oscillator(omega=1.0, form='canonical'), 1 member, by its transition matrix"
+    )
+    assert "P, Q: the transition matrix of a step, and what the inputs add at each node" in str(explained)
 
 
 # ---- counts by hand
@@ -364,6 +403,91 @@ def test_what_a_method_does_to_blocks(method: sw.Method) -> None:
     assert asked.count("dv") == method.evaluations
 
 
+def assert_computes_lines(section: listing.Section, known: dict[str, Any], names: list[str], wanted: Any) -> None:
+    """The lines of these names are what is wanted, number by number."""
+    alone = replace(sw.explain(sw.Oscillator(), "rk4"), sections=(section,))
+    found = evaluate(alone, known, {})
+    assert_computes([np.broadcast_to(found[name], MEMBERS) for name in names], wanted)
+
+
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[1].size <= 30 * MEMBERS])
+def test_every_listing_of_both_ends_and_of_what_is_recorded(name: str, fused: bool) -> None:
+    system, v, y = made(name)
+    for method in [each for each in METHODS if each.carry and fits(system, each)] or METHODS[:1]:
+        for start in method.starts or (None,):
+            plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, choice=method.start_choice(start), fused=fused)
+            if _core.in_parts(engine.model(plan._replace(fused=False)), MEMBERS):
+                continue
+            explained = sw.explain(system, method, start=start, fused=fused, record=list(system.quantities))
+            assert len(explained.beside) == 2 * bool(method.carry) + len(system.quantities)
+            known, _ = leaves(plan)
+            tables = listing.parameters(plan)[1]
+            tracer = Tracer(system, _core.Tape())
+            tracer.scaled(H)
+            tables = dict(zip(tables, tracer.tables, strict=True))
+            s = system.scaled(H, (MEMBERS,))
+            for section in explained.beside:
+                slot = method.carry if section.when == "finish" else "v"
+                rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS)]
+                blocks = ((slot, system.v_shape), ("y", system.y_shape))
+                labels = [listing.indexed(str(n), i) for n, shape in blocks for i in np.ndindex(shape)]
+                values = known | dict(zip(labels, rows, strict=True)) | {name: table.sample for name, table in tables.items()}
+                makes = {"start": method.carry, "finish": "v"}.get(section.when, section.when.removeprefix("record "))
+                shape = system.quantities.get(str(makes), system.v_shape)
+                results = [listing.indexed(str(makes), i) for i in np.ndindex(shape)]
+                if section.when.startswith("record"):
+                    wanted = np.asarray(s.record(section.when.removeprefix("record "), v, y)).reshape(-1, MEMBERS)
+                elif fused:
+                    wanted = engine_ends(plan, section.when, v, y)
+                else:
+                    wanted = getattr(method.steps, section.when)(s, plan.choice, T, v, y).reshape(-1, MEMBERS)
+                assert_computes_lines(section, values, results, wanted)
+
+
+def engine_ends(plan: engine.Plan, which: str, v: Any, y: Any) -> Any:
+    """What a method carries at the start, or the v that is made of it, with fused multiply-adds by the reference."""
+    run = (engine._start if which == "start" else lambda plan, v, y: engine._velocity(plan)(T, v, y))(plan, v, y)
+    return np.asarray(run).reshape(-1, MEMBERS)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[0].linear and made(name)[1].size <= 30 * MEMBERS])
+def test_every_listing_of_a_transition_matrix_is_a_step(name: str, method: sw.Method) -> None:
+    system, v, y = made(name)
+    if not fits(system, method):
+        return
+    explained = sw.explain(system, method, form="matrix")
+    if explained.parts is not None:
+        assert explained.listing == f"in each step, for each member\n  s' = P·s{' + Q·x' * bool(system.given_inputs())}"
+        assert "its products of matrices are made by a loop" in str(explained)
+        return
+    plan = engine.Plan(system, method, (MEMBERS,), H, t0=T, form="matrix")
+    given = system.given_inputs()
+    p, q = engine.transition(plan), engine.pulses(plan, given)
+    names, tables = listing.parameters(plan)
+    tracer = Tracer(system, _core.Tape())
+    tracer.symbols([each.signal() for each in given.values()], (MEMBERS,))
+    numbers = [*p.reshape(-1, MEMBERS), *q.reshape(-1, MEMBERS), *tracer.numbers]
+    known = dict(zip(names, numbers, strict=True)) | {"h": H, "t": T}
+    samples = {}
+    for name_of, table in zip(tables, tracer.tables, strict=True):
+        values = np.asarray(table.values)
+        known |= {f"{name_of}.start": table.start, f"{name_of}.interval": table.interval, f"{name_of}.last": len(values) - 1.0}
+        samples[name_of] = values
+    wide = [np.broadcast_to(each.reshape(len(each), -1), (len(each), MEMBERS)) for each in samples.values()]
+    every = np.concatenate(wide) if wide else np.zeros((0, MEMBERS))
+    ends = np.cumsum([0, *(len(each) for each in wide)])
+    known |= {f"{name_of}.first": float(first) for name_of, first in zip(tables, ends, strict=False)}
+    known |= {"lanes": 1.0, "sample": lambda at: every[np.broadcast_to(at, MEMBERS).astype(int), np.arange(MEMBERS)]}
+    rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS)]
+    known |= dict(zip(listing.states(plan, False), rows, strict=True))
+    after = state(explained, plan, evaluate(explained, known, samples))
+    out = engine.advance(plan, v, y, carried=True)
+    assert_computes(after, out.slot, out.y[-1])
+    assert_counted(explained)
+
+
 # ---- machine code, and why there is none
 
 
@@ -453,7 +577,7 @@ def test_json(tmp_path: Path) -> None:
     explained = sw.explain(sw.Oscillator(), "false_euler")
     explained.to_json(tmp_path / "step.json")
     told = json.loads((tmp_path / "step.json").read_text(encoding="utf-8"))
-    assert told == explained.as_dict() | {"sections": told["sections"]}
+    assert told == explained.as_dict() | {"sections": told["sections"], "beside": []}
     assert told["sections"][3]["lines"][0] == {
         "name": "v'",
         "formula": "v − Φ·y",
@@ -477,5 +601,15 @@ def test_what_cannot_be_explained_says_so() -> None:
         sw.explain(sw.Oscillator(1.0, 0.1), "verlet")
     with pytest.raises(sw.errors.ArgumentError, match=r"fused: a step of about \d+ operations is too long"):
         sw.explain(sw.Chain(1000), "rk4", fused=True)
+    with pytest.raises(sw.errors.UnsupportedError, match="form: form='matrix' goes without fused="):
+        sw.explain(sw.Oscillator(), "rk4", form="matrix", fused=True)
+    with pytest.raises(sw.errors.UnsupportedError, match="form: only linear systems have a transition matrix"):
+        sw.explain(sw.Pendulum(), "rk4", form="matrix")
+    with pytest.raises(sw.errors.ArgumentError, match=r"form: .*Known: direct, matrix"):
+        sw.explain(sw.Oscillator(), "rk4", form="power")
+    with pytest.raises(sw.errors.ArgumentError, match=r"record: .*did you mean 'energy'"):
+        sw.explain(sw.NBody(), "rk4", record="enrgy")
+    with pytest.raises(sw.errors.UnsupportedError, match="record: the core records nothing of Oscillator"):
+        sw.explain(sw.Oscillator(), "rk4", record="energy")
     with pytest.raises(sw.errors.DTypeError, match="fused: expected True or False"):
         sw.explain(sw.Oscillator(), "rk4", fused=WRONG)

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import textwrap
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,19 @@ def test_a_limit_of_the_address_space_is_heard(how: str) -> None:
         assert said.startswith("TooLargeError the saved states of 1 members need 610 MiB, but ")
         assert "MiB are available (limit of the address space, ulimit -v); keep less with every=" in said
     assert said.endswith("5000001\n")
+
+
+def test_a_long_chain_is_made_without_its_numbers() -> None:
+    """One stiffness and one mass serve for all; as arrays they would be 160 MB."""
+    tracemalloc.start()
+    try:
+        chain = sw.Chain(10_000_000, mass=2.0)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 1_000_000
+    assert (chain.stiffness.shape, chain.mass.shape) == ((10_000_001,), (10_000_000,))
+    assert chain.mass[-1] == 2.0
 
 
 @LINUX

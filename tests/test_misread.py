@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell import _doubt
 from stepwell.errors import ArgumentError, DTypeError
 
 START: dict[str, Any] = {"v": 0.0, "y": 1.0}
@@ -99,6 +100,13 @@ def test_bodies_whose_energy_the_method_made() -> None:
         with pytest.warns(sw.AccuracyWarning, match=match):
             scene.run(method, scene.horizon / steps, every=100, record="energy")
     scene.run("dop853", scene.horizon / 30_000, every=100, record="energy")
+    # Nothing need be recorded, nor any state kept; with a tolerance neither.
+    for options in ({}, {"every": 10_000}, {"record": "momentum", "every": 10_000}):
+        with pytest.warns(sw.AccuracyWarning, match="the only member has 5.69e\\+04 instead of -12.8, so rk4 did not"):
+            scene.run("rk4", scene.horizon / 30_000, **options)
+    scene.run("dop853", scene.horizon / 30_000)
+    with pytest.warns(sw.AccuracyWarning, match="so dop853 did not"):
+        sw.integrate(scene.system, "dop853", v=0.0, y=scene.y, tolerance=3e-2, at=[10.0])
     # Whoever diverges is named as that alone; what is no invariant of the motion is not looked at.
     with pytest.warns(sw.DivergenceWarning) as told:
         sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=0.0, y=np.zeros((2, 2)), dt=0.1, steps=9, every=1, record="energy")
@@ -107,3 +115,29 @@ def test_bodies_whose_energy_the_method_made() -> None:
     wild: dict[str, Any] = {"dt": 0.1, "steps": 100, "every": 10, "record": "energy"}
     run = sw.integrate(printed, "standard_euler", v=scene.v, y=scene.y, **wild)
     assert abs(run.energy[-1] - run.energy[0]) > abs(run.energy[0])
+
+
+def test_energies_at_both_ends_are_those_of_the_system() -> None:
+    """Summed in floats they are the same but for rounding: some ten sums of numbers of that size."""
+    rng = np.random.default_rng(4)
+    for force in ("newton", "logarithmic"):
+        for dim in (2, 3):
+            bodies = sw.NBody(rng.uniform(0.5, 2.0, 5), force=force, G=1.5, softening=0.2, dim=dim)
+            v, y = rng.normal(size=(2, 5, dim))
+            found = _doubt._summed(bodies, v.tolist(), y.tolist())
+            assert np.allclose(found, (bodies.energy(v, y), bodies.kinetic(v)), rtol=1e-14, atol=1e-13)
+    together = [[0.0, 0.0]] * 2
+    assert np.isnan(_doubt._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
+
+
+def test_bodies_in_a_batch_whose_energy_the_method_made() -> None:
+    """The second member alone is started so that two bodies come near each other."""
+    scene = sw.scenes.pythagorean()
+    y = np.stack([10.0 * scene.y, scene.y], axis=-1)
+    batch: dict[str, Any] = {"v": 0.0, "dt": 10.0 / 30_000, "steps": 30_000}
+    with pytest.warns(
+        sw.AccuracyWarning, match=r"1 of 2 member\(s\) have another energy .* member 1 has 5.69e\+04 instead of -12.8"
+    ):
+        sw.integrate(scene.system, "rk4", y=y, **batch)
+    # A controlled energy is kept, or said to be missed by the control.
+    sw.integrate(scene.system, "dop853", y=scene.y, control=sw.Projection(), **batch | {"steps": 3000})

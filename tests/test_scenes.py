@@ -153,6 +153,7 @@ def test_a_run_reaches_the_horizon_and_not_a_step_more(scene):
     for dt in (scene.dt, scene.horizon / 7, 0.37 * scene.dt):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", sw.DivergenceWarning)  # at a seventh of the horizon, bodies may meet
+            warnings.simplefilter("ignore", sw.AccuracyWarning)  # or gain energy
             t = scene.run("false_euler", dt).t[-1]
         assert -1e-9 * dt <= t - scene.horizon < dt
     assert [scene.steps_for(scene.horizon / n) for n in range(1, 2000)] == list(range(1, 2000))
@@ -203,7 +204,10 @@ def test_false_euler_leaves_the_figure_of_eight_and_leapfrog_stays():
     scene = sw.scenes.figure_eight()
     largest = {}
     for method in ("false_euler", "leapfrog"):
-        largest[method] = np.abs(scene.run(method, scene.period / 200, steps=20_000, every=1).y).max()
+        with warnings.catch_warnings():
+            if method == "false_euler":  # where the bodies leave they have another energy
+                warnings.simplefilter("ignore", sw.AccuracyWarning)
+            largest[method] = np.abs(scene.run(method, scene.period / 200, steps=20_000, every=1).y).max()
     assert largest["false_euler"] > 2.0
     assert largest["leapfrog"] < 1.1
 
@@ -368,7 +372,8 @@ def test_the_pythagorean_bodies_nearly_meet():
 def test_no_fixed_step_of_a_thousandth_survives_the_pythagorean_problem(method):
     """The error is small up to the first near collision, at t = 1.879, and of order 1 from there on, though all is finite."""
     scene = KEPT["pythagorean"]
-    run = scene.run(method, 0.001, every=1)
+    with pytest.warns(sw.AccuracyWarning, match="have another energy at the end"):
+        run = scene.run(method, 0.001, every=1)
     error = scene.state_error(run)
     assert not run.status
     assert error[run.t < 1.85].max() < 0.02
@@ -399,7 +404,10 @@ def test_energy_control_keeps_the_bodies_together(pair, form):
     """FACTS §3: under about 3.5 with the control, over 20 and growing without, 100 000 steps."""
     scene = sw.scenes.energy_control(pair, form=form)
     assert np.abs(scene.run("standard_euler", every=1).y).max() < 3.6
-    free = np.abs(scene.run("standard_euler", every=1, control=None).y)
+    with warnings.catch_warnings():
+        if pair == "matching":  # the printed pair has no energy that is constant
+            warnings.filterwarnings("ignore", "1 of 1 .* have another energy", sw.AccuracyWarning)
+        free = np.abs(scene.run("standard_euler", every=1, control=None).y)
     assert free[:10_000].max() < 20 < free.max() < 100
 
 

@@ -39,6 +39,17 @@ def point() -> charts.WorkPrecision:
     return charts.work_precision("oscillator", ["false_euler"], [100])
 
 
+def exactly(scene: sw.Scene, times: Any, setting: float) -> charts.Solved:
+    """A peer that knows the solution."""
+    assert scene.exact is not None
+    return charts.Solved(*scene.exact(times), 1, 1e-3)
+
+
+def beside(*peers: Any) -> charts.WorkPrecision:
+    """A chart of some peers alone: the one method is refused."""
+    return charts.work_precision("forced_oscillator", ["verlet"], [4], tolerances=[], peers=peers)
+
+
 #: How to make one of each, and others of the class that differ in one thing.
 MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Oscillator": [
@@ -84,7 +95,13 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.EnergyControl(0.1, "printed"),
         lambda: sw.EnergyControl(0.1, target=1.0),
     ],
-    "Projection": [sw.Projection, lambda: sw.Projection("nacozy"), lambda: sw.Projection(target=[1.0, 2.0])],
+    "Control": [lambda: sw.Control("energy", 0.1), lambda: sw.Control("norm", [0.1, 0.2], "printed", target=1.0)],
+    "Projection": [
+        sw.Projection,
+        lambda: sw.Projection("norm"),
+        lambda: sw.Projection("nacozy"),
+        lambda: sw.Projection(target=[1.0, 2.0]),
+    ],
     "Run": [
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
@@ -124,6 +141,16 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Scene": [lambda: sw.Scene(sw.Oscillator(), v=0.0, y=1.0, until=9.0), lambda: sw.scenes.kepler(), lambda: sw.scenes.clover()],
     "Status": [lambda: sw.Status.OK, lambda: sw.Status.UNDERFLOW],
     "WorkPrecision's curve": [lambda: point().curves[0]],
+    "Peer": [
+        lambda: charts.Peer("known", exactly),
+        lambda: charts.Peer("known", exactly, (0.1,)),
+        lambda: charts.Peer("known", exactly, (0.1,), by="step"),
+        lambda: charts.Peer("known", exactly, (0.1,), order=2),
+        lambda: charts.Peer("SciPy", charts.peers.ByScipy("RK45")),
+        lambda: charts.Peer("SciPy", charts.peers.ByScipy("DOP853")),
+        lambda: charts.Peer("REBOUND", charts.peers.ByRebound("bs")),
+        lambda: charts.Peer("heyoka", charts.peers.ByHeyoka()),
+    ],
     "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
     "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
@@ -213,6 +240,33 @@ def test_a_run_under_a_bar_can_be_pickled() -> None:
     pytest.importorskip("rich")
     run = sw.integrate(BODIES, "rk4", **STATE, steps=5, progress=True)
     assert pickle.loads(pickle.dumps(run)) == run
+
+
+def test_a_chart_with_peers_goes_through_a_pickle() -> None:
+    """Its peers are functions and objects that are found again by name, and solve as before."""
+    chart = beside(exactly, charts.Peer("in steps", exactly, (0.1,), by="step"))
+    again = pickle.loads(pickle.dumps(chart))
+    assert again == chart
+    assert [curve.method.name for curve in again.curves] == ["exactly", "in steps"]
+    assert again.curves[0].method.solve is exactly
+
+
+def test_a_chart_with_a_peer_that_has_no_name_says_why_it_does_not() -> None:
+    chart = beside(lambda scene, times, setting: exactly(scene, times, setting))
+    assert copy.deepcopy(chart) == chart
+    with pytest.raises(pickle.PicklingError, match="peer '<lambda>': pickle finds a function again by its name in a module"):
+        pickle.dumps(chart)
+
+
+def test_a_peer_of_scipy_goes_through_a_pickle() -> None:
+    pytest.importorskip("scipy")
+    one = charts.peers.scipy("RK45", (1e-4,))
+    two = pickle.loads(pickle.dumps(one))
+    assert two == one
+    scene = sw.scenes.oscillator()
+    a, b = (each.solve(scene, np.array([1.0, scene.horizon]), 1e-4) for each in (one, two))
+    assert np.array_equal(a.y, b.y)
+    assert a.evaluations == b.evaluations
 
 
 def test_a_pickled_state_goes_on() -> None:

@@ -376,6 +376,15 @@ def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Arra
     return np.concatenate([out.slot.reshape(n_v, *plan.batch), out.y[-1].reshape(n_y, *plan.batch)])
 
 
+def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
+    """A step by a transition matrix, P of shape (n, n, *batch), Q of shape (nodes·inputs, n, *batch), as the core takes it."""
+    n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
+    q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
+    inputs = [each.signal() for each in plan.system.given_inputs().values()]
+    linear_map = {"n": n_v + n_y, "n_v": n_v, "p": P, "q": q, "inputs": inputs}
+    return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
+
+
 def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     given = plan.system.given_inputs()
     p, q = transition(plan), pulses(plan, given)
@@ -401,9 +410,7 @@ def _matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Out
     if plan.backend == "numpy":
         flat_v, _, kept, first_bad = by_reference(plan, flat_v, flat_y, before)
     else:
-        linear_map = {"n": n_v + n_y, "n_v": n_v, "p": p, "q": q, "inputs": [each.signal() for each in given.values()]}
-        nodes = list(plan.method.nodes)
-        spec = _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(nodes, n_v))
+        spec = matrix_model(plan, p, q)
 
         def by_core(plan: Plan, v: Array, y: Array, before: Whole) -> Outcome:
             return _rust(plan, spec, v, y, before.copy(), carried=True, carries=False)

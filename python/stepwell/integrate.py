@@ -13,9 +13,9 @@ import numpy as np
 
 from . import _checks, _core, _memory, engine
 from ._checks import Array
+from ._doubt import in_words, warn_of_nonsense
 from .control import AnyControl, a_control
 from .errors import (
-    AccuracyWarning,
     ArgumentError,
     DivergenceWarning,
     DTypeError,
@@ -133,8 +133,9 @@ def integrate(
         DivergenceWarning: how many members left the finite range, which first, and when. Nothing computed is lost.
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
-        AccuracyWarning: if a run stayed finite but is meaningless: a pendulum turned so far that the sine of its angle is not
-            known; bodies whose energy is recorded ended with an energy of quite another size.
+        AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
+            sine; bodies that nothing controls ended with an energy of another size. That is looked at where it is recorded, and
+            where two energies are little work against the run; not in the pieces of a run that carries something.
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)
@@ -156,8 +157,8 @@ def integrate(
         if not isinstance(start_step, int) or start_step != 0:
             fixed["start_step"] = start_step
         _only_fixed(fixed)
-        run = _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, carry, fused, threads, backend, progress)
-        _warn_of_nonsense(run)
+        run, begun = _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, carry, fused, threads, backend, progress)
+        warn_of_nonsense(run, begun)
         return run
     if max_steps is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
@@ -255,7 +256,7 @@ def integrate(
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before)
-    _warn_of_nonsense(run)
+    warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
     return run
 
 
@@ -313,8 +314,8 @@ def _adapt(
     threads: int | None,
     backend: str,
     progress: bool,
-) -> Run:
-    """The run with a tolerance."""
+) -> tuple[Run, tuple[Array, Array] | None]:
+    """The run with a tolerance, and where it began, if it did not go on."""
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
@@ -391,7 +392,7 @@ def _adapt(
         run.recorded[name] = run.quantity(name)
     _warn_of_stops(run)
     _warn_of_lost(run, out.pace)
-    return run
+    return run, None if carry is not None else (v, y)
 
 
 def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
@@ -425,36 +426,11 @@ def _warn_of_stops(run: Run) -> None:
     time = float(run.paces.t[stopped].min())
     first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
     warnings.warn(
-        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {_member(first)} "
+        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {in_words(first)} "
         f"at t = {time:g}: {_WHY[Status(int(run.status[first]))]}",
         ToleranceWarning,
         stacklevel=4,
     )
-
-
-def _warn_of_nonsense(run: Run) -> None:
-    """Warn of what is finite and yet means nothing, as far as it is seen without more work."""
-    told = [run.system.doubt(run.y)]
-    if "energy" in run.recorded and isinstance(run.system, NBody) and run.system.keeps_energy and len(run.t) > 1:
-        with np.errstate(all="ignore"):
-            first, last = run.recorded["energy"][[0, -1]]
-            moved = np.maximum(run.system.kinetic(run.v[0]), run.system.kinetic(run.v[-1]))
-            wrong = np.abs(last - first) > 0.5 * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
-        wrong &= np.isfinite(last)  # members that diverged were named before
-        if wrong.any():
-            index = tuple(np.argwhere(wrong)[0].tolist())
-            told.append(
-                f"{np.count_nonzero(wrong)} of {wrong.size} member(s) have another energy at the end: {_member(index)} has "
-                f"{last[index]:.3g} instead of {first[index]:.3g}, so {run.method.name} did not follow its orbit"
-            )
-    for text in told:
-        if text is not None:
-            warnings.warn(text, AccuracyWarning, stacklevel=3)
-
-
-def _member(index: tuple[int, ...]) -> str:
-    """A member in words, by its place in the batch."""
-    return f"member {index if len(index) != 1 else index[0]}" if index else "the only member"
 
 
 def _warn_of_lost(run: Run, pace: Any) -> None:
@@ -555,7 +531,7 @@ def _warn(run: Run, before: Whole | None) -> None:
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
     warnings.warn(
-        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {_member(first)} at step {step} "
+        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {in_words(first)} at step {step} "
         f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",
         DivergenceWarning,
         stacklevel=3,

@@ -76,6 +76,7 @@ def table(orbits: Orbits, repeats: int, errors: tuple[float, ...], lasts: float)
     for contestant in contestants():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", sw.ToleranceWarning)
+            warnings.simplefilter("ignore", sw.AccuracyWarning)
             samples = measured(contestant, orbits, repeats, errors, lasts)
         seconds = [at_error(samples, error) for error in errors]
         rows.append((contestant.name, seconds, max(sample.spread for sample in samples)))

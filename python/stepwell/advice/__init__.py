@@ -24,7 +24,7 @@ from .adaptive import AdaptiveTrials
 from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed
 from .motion import Grid, motion_of
 from .result import Advice, Rejected, Row, Shortfall
-from .search import MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
+from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
 from .trials import Trial, Trials, step_times, tried_times
 
 __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
@@ -97,8 +97,8 @@ def advise(
         )
 
     known = motion_of(scene, frame, tolerance)
-    trials = Trials(known)
-    most = MAX_EVALUATIONS / max(1.0, trials.numbers / 8) ** SIZE_EXPONENT
+    most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
+    trials = Trials(known, tolerance, LONG_RUN_SHARE * most)
     adaptive = AdaptiveTrials(known, ERROR_SHARE * tolerance, most)
     candidates: list[Candidate] = []
     rejected = []

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
-from ..errors import ToleranceWarning
+from ..errors import AccuracyWarning, ToleranceWarning
 from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
@@ -25,6 +25,10 @@ from .trials import Trial
 #: The error of a run is measured at so many of the marks at first, at all of them to confirm it, and then at so many times around
 #: each of the so many worst.
 FIRST_SAMPLES, REFINED_SAMPLES, REFINED_MARKS = 128, 32, 4
+
+#: Each such time costs a step. Of large systems, where a run may make few evaluations, there are fewer: these steps may make at
+#: most this share of them.
+CONFIRMING_SHARE = 1 / 8
 
 #: Steps are counted for each frame. Of more frames than this, they are counted for so many pieces first, and then frame by frame
 #: in the so many pieces with the most steps.
@@ -72,8 +76,10 @@ class AdaptiveTrials:
         if key not in self._confirmed:
             trial = self.look(method, tolerance)
             if trial.error <= self.allowed:
-                error, _ = self._errors(method, tolerance, self.marks)
-                ends = np.concatenate([[0.0], self.marks, self.marks[-1:]])
+                times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.evaluations))
+                marks = self.marks[:: math.ceil(len(self.marks) / times)]
+                error, _ = self._errors(method, tolerance, marks)
+                ends = np.concatenate([[0.0], marks, self.marks[-1:]])
                 around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
                 closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
                 trial = trial._replace(error=max(trial.error, float(error.max()), float(closer.max())))
@@ -101,6 +107,7 @@ class AdaptiveTrials:
         scene, most = self.scene, max(1, int(self.most / method.evaluations))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             run = integrate(scene.system, method, v=scene.v, y=scene.y, tolerance=tolerance, at=at, max_steps=most)
         assert run.paces is not None
         self.work += int(run.paces.evaluations)
@@ -127,6 +134,7 @@ class AdaptiveTrials:
         for end in ends:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", ToleranceWarning)
+                warnings.simplefilter("ignore", AccuracyWarning)
                 run = integrate(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
             leg = Leg(end, run.resume, int(run.paces.evaluations) // method.evaluations)

@@ -143,17 +143,27 @@ def _marks(scene: Scene) -> Array:
     assert scene.exact is not None
     t = even = np.linspace(0.0, scene.horizon, EVEN_SAMPLES + 1)
     path = np.linspace(0.0, 1.0, EVEN_SAMPLES + 1)
-    for _ in range(PATH_ITERATIONS):
+    blocks = scene.exact(t)
+    for i in range(PATH_ITERATIONS):
         length = np.zeros(len(t) - 1)
-        for block, scale in zip(scene.exact(t), scene.scales, strict=True):
+        for block, scale in zip(blocks, scene.scales, strict=True):
             change = np.diff(block.reshape(len(t), -1), axis=0)
             length += np.sqrt((change * change).sum(axis=1)) / (scale or 1.0)
         reached = np.concatenate([[0.0], np.cumsum(length)])
         if len(path) == len(even) and reached[-1] * SAMPLES_PER_LENGTH > EVEN_SAMPLES:
             path = np.linspace(0.0, 1.0, min(MAX_SAMPLES, math.ceil(reached[-1] * SAMPLES_PER_LENGTH)) + 1)
         by_path = np.interp(path * reached[-1], reached, t)
-        t = np.unique(np.concatenate([t, by_path]))
+        if i < PATH_ITERATIONS - 1:
+            t, blocks = _with_more(scene.exact, t, blocks, np.setdiff1d(by_path, t))
     return np.unique(np.concatenate([even, by_path]))
+
+
+def _with_more(exact: Exact, t: Array, blocks: tuple[Array, Array], more: Array) -> tuple[Array, tuple[Array, Array]]:
+    """All times in order and the blocks there; only those at the further times are computed."""
+    times = np.concatenate([t, more])
+    order = np.argsort(times)
+    v, y = (np.concatenate(both)[order] for both in zip(blocks, exact(more), strict=True))
+    return times[order], (v, y)
 
 
 class Within:

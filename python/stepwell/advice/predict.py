@@ -148,9 +148,9 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
         return trials.unstable(method, horizon / n, n)
 
     low, high = 2 * RUNGS_PER_OCTAVE, max(2 * RUNGS_PER_OCTAVE, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable)))
-    # From the fine end, since what is coarse may be stable again by chance.
+    # From the fine end, which is known, since what is coarse may be stable again by chance.
     last = high
-    for j in range(high, low - 1, -RUNGS_PER_OCTAVE):
+    for j in range(high - RUNGS_PER_OCTAVE, low - 1, -RUNGS_PER_OCTAVE):
         if grows(j):
             low, high = j, last
             break

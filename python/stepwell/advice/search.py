@@ -13,14 +13,14 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from .candidates import Candidate
-from .trials import Trial
+from .trials import ASYMPTOTIC_ERROR, Trial
 
 #: Function (rate) evaluations that a run makes at most, or it would take too long; of a system of n > 8 numbers, this divided by
 #: (n/8) to this exponent.
 MAX_EVALUATIONS, SIZE_EXPONENT = 16_000_000, 1.5
 
 #: All runs of a search together make at most about so many times MAX_EVALUATIONS: each run may make this share of what is left.
-TOTAL_BUDGET, RUN_SHARE = 6.0, 0.25
+TOTAL_BUDGET, RUN_SHARE = 2.5, 0.5
 
 #: A candidate that costs more than this many times the cheapest is given up.
 MAX_COST_RATIO = 10.0
@@ -40,13 +40,17 @@ IRREGULAR_RISE, IRREGULAR_ERROR_RATIO, IRREGULAR_POINTS, IRREGULAR_SHARE = 1.3, 
 #: A local minimum of the error is searched by so many halvings of the interval.
 MINIMUM_HALVINGS = 8
 
-#: Below this an error is taken to be in the asymptotic range, where it falls by the method's order; above, nothing is predicted.
-ASYMPTOTIC_ERROR = 0.3
-
 #: Errors are regular where, below REGULAR_ERROR, they fall over two doublings by powers that differ by at most ORDER_SPREAD and
 #: are at least the order less ORDER_DEFICIT. Then the search begins at the share REGULAR_START of the steps that the power
 #: predicts, if a run makes more than the share LONG_RUN_SHARE of the evaluations that it may make.
 REGULAR_ERROR, ORDER_SPREAD, ORDER_DEFICIT, REGULAR_START, LONG_RUN_SHARE = 0.02, 1.0, 1.3, 0.75, 1 / 256
+
+#: Where a run makes more than this share of the evaluations that it may make, the search only halves the last doubling: so many
+#: times, and once where that cannot make it the cheapest.
+HALVED_RUN_SHARE, HALVINGS = 1 / 12, 3
+
+#: When something was found, a run that costs more may make at most this share of the evaluations that a run may make.
+LATER_RUN_SHARE = 1 / 4
 
 #: The number of steps that the order predicts is wrong by up to this factor.
 PREDICTION_FACTOR = 3.0
@@ -144,8 +148,12 @@ class Search:
                 missed[name] = Missed("dominated", k, candidate.look(k), None)
                 continue
             # Three octaves back if that might be the cheapest of all, for a dip may hide there.
-            # One that cannot be is halved, as if errors were even.
-            least = self.halved(candidate, k) if cost > 4.0 * best else self.finest(candidate, k, 8)
+            # One that cannot be, or whose runs are very long, is halved, as if errors were even.
+            least = (
+                self.halved(candidate, k, best)
+                if cost > 4.0 * best or self.very_long(candidate, k)
+                else self.finest(candidate, k, 8)
+            )
             if least is None and self.confirmed(candidate, k):
                 least = k  # what is finer would take too long to look for
             if least is None:
@@ -177,23 +185,31 @@ class Search:
                 best = min(best, cost)
                 continue
             wanted = self.wanted(candidate, k, trial)
-            least = max(2.0, (wanted or 0) / k / PREDICTION_FACTOR)
+            least = max(2.0, (wanted or self.at_least(candidate, k, trial)) / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
             made, ceiling = trial.steps * candidate.method.evaluations, ceilings.get(candidate.name, math.inf)
-            if not candidate.possible(2 * k) or made * least > self.most or trial.steps / self.spans * least > ceiling:
+            most = self.most if cost * least <= best else min(self.most, LATER_RUN_SHARE * self.longest)
+            if not candidate.possible(2 * k) or made * least > most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
             elif cost * least > MAX_COST_RATIO * best and not (trial.unstable and candidate.by == "tolerance"):
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
             else:
-                heapq.heappush(waiting, (2.0 * cost, i, 2 * k))
+                # Of equally expensive ones that which came farther goes first.
+                heapq.heappush(waiting, (2.0 * cost / trial.made, i, 2 * k))
         return found, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
-        """The k that is predicted by the order of the method, if the error is small enough for that."""
-        if not trial.error < ASYMPTOTIC_ERROR:
-            return None
-        return math.ceil(k * min(1e12, float((trial.error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
+        """The k that the order of the method asks for, if the error is small enough to tell."""
+        return self.ordered(candidate, k, trial.error) if trial.error < ASYMPTOTIC_ERROR else None
+
+    def at_least(self, candidate: Candidate, k: int, trial: Trial) -> int:
+        """The k that the order asks for where the run was long, and lost on the way: so that it is good enough up to there."""
+        return self.ordered(candidate, k, trial.before) if trial.stopped else 0
+
+    def ordered(self, candidate: Candidate, k: int, error: float) -> int:
+        """The k that is good enough if the error falls by the order of the method from that of this k."""
+        return math.ceil(k * min(1e12, float((error / self.allowed(candidate)) ** (1.0 / candidate.method.order))))
 
     def finest(self, candidate: Candidate, k: int, back: int) -> int | None:
         """The least k that is good enough, from so many times less than a good one to a little more."""
@@ -277,14 +293,21 @@ class Search:
         made = candidate.look(k).steps * candidate.method.evaluations
         return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / made)))
 
-    def halved(self, candidate: Candidate, k: int) -> int | None:
+    def very_long(self, candidate: Candidate, k: int) -> bool:
+        """Whether a run takes so long that only few more like it can be made."""
+        return candidate.look(k).steps * candidate.method.evaluations > HALVED_RUN_SHARE * self.longest
+
+    def halved(self, candidate: Candidate, k: int, best: float) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""
-        least = k if k == candidate.first else self.between(candidate, k // 2, k)
+        hopeless = self.very_long(candidate, k) and self.cost(candidate, k) > 2.0 * best
+        least = k if k == candidate.first else self.between(candidate, k // 2, k, 1 if hopeless else HALVINGS)
+        if hopeless and self.confirmed(candidate, least):
+            return least
         return next((n for n in rungs(least, k) if self.confirmed(candidate, n)), None) or self.finest(candidate, k, 1)
 
-    def between(self, candidate: Candidate, low: int, high: int) -> int:
-        """A k above ``low``, which is not good enough, up to ``high``, which is: halved thrice."""
-        for _ in range(3):
+    def between(self, candidate: Candidate, low: int, high: int, halvings: int = HALVINGS) -> int:
+        """A k above ``low``, which is not good enough, up to ``high``, which is."""
+        for _ in range(halvings):
             middle = (low + high) // 2
             if middle in (low, high):
                 break
@@ -295,6 +318,8 @@ class Search:
         """From where on a few more steps are good enough too."""
         above = [rung for rung in rungs(k, 2 * k) if rung > k and self.affordable(candidate, rung, k)]
         near = sorted({k + 1, *above[:2]})
+        if self.very_long(candidate, k):  # what was run already, and one more
+            near = sorted({k + 1, *(n for n in candidate.seen if k < n <= 2 * k)})
         if all(self.good(candidate, n) for n in near if self.affordable(candidate, n, k)):
             return k
         bad = [rung for rung in sorted({k + 1, *above}) if not self.good(candidate, rung)]

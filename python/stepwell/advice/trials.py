@@ -13,7 +13,7 @@ import numpy as np
 
 from .._checks import Array
 from ..charts.measure import MIN_GROWTH, TIMED_STEP, TIMED_TOLERANCE
-from ..errors import ControlWarning, DivergenceWarning, ToleranceWarning
+from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
 from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
@@ -29,12 +29,22 @@ MAX_CONFIRMED_STATES = 50_000
 #: The batch that is timed has at most so many members, and at most so many numbers in all, which the cache holds.
 MAX_MEMBERS, MAX_NUMBERS = 512, 16_384
 
-#: A timed run takes at least this many seconds. The shortest time of so many runs counts, since other load only adds to it; of
-#: fewer runs, where the timing of all methods takes longer than this many seconds.
-TIMED_SECONDS, REPEATS, SLOW_SECONDS = 0.0005, 5, 0.25
+#: A timed run takes at least this many seconds; of one that takes MUCH times as long a single one may do. The shortest time of so
+#: many further runs counts, since other load only adds to it; of fewer, where timing all methods takes longer than SLOW_SECONDS.
+TIMED_SECONDS, MUCH, REPEATS, SLOW_SECONDS = 0.0005, 20.0, 5, 0.25
 
-#: With a tolerance a timed run tries at least so many steps, so that the cost of the call does not count, and at most so many.
-MIN_TIMED_STEPS, MAX_TIMED_STEPS = 64, 512
+#: With a tolerance a timed run tries at least so many steps, so that the cost of the call does not count, and at most so many. A
+#: quarter of them will do for a system of more numbers than LARGE.
+MIN_TIMED_STEPS, MAX_TIMED_STEPS, LARGE = 64, 512, 128
+
+
+#: Below this an error is taken to be in the asymptotic range, where it falls by the method's order; above, nothing is predicted.
+ASYMPTOTIC_ERROR = 0.3
+
+#: A long run is made in so many pieces. Where the error at the end of one is above LOST, or above both ASYMPTOTIC_ERROR and
+#: LOST_RATIO times what is allowed, the rest is left out: no more can be learned from it. The ratio is more than the search looks
+#: at (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If an error near LOST is allowed, it must be above twice that.
+PIECES, LOST, LOST_RATIO = 12, 1.0, 16.0
 
 
 class Trial(NamedTuple):
@@ -43,9 +53,11 @@ class Trial(NamedTuple):
     Attributes:
         dt: the step; with a tolerance the mean of all that were tried.
         steps: how many; with a tolerance all that were tried.
-        error: the largest state error.
+        error: the largest state error; of a run that was stopped, up to there.
         unstable: whether it is wrong altogether and grew, or with a tolerance stopped early.
         rejected: how many of the steps were rejected.
+        before: the largest error before it left the asymptotic range, if it did.
+        made: the share of the run that was made; the rest of a long one is left out where it is wrong altogether.
     """
 
     dt: float
@@ -53,33 +65,54 @@ class Trial(NamedTuple):
     error: float
     unstable: bool
     rejected: int = 0
+    before: float = 0.0
+    made: float = 1.0
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a part of the run was left out."""
+        return self.made < 1.0
 
 
 class Trials:
-    """Runs of one scene with fixed steps, each made once."""
+    """Runs of one scene with fixed steps, each made once.
 
-    def __init__(self, motion: Motion) -> None:
+    Args:
+        motion: what runs are compared with.
+        tolerance: the state error that is allowed.
+        long: a run of more rate evaluations than this is stopped where it is wrong altogether.
+    """
+
+    def __init__(self, motion: Motion, tolerance: float, long: float) -> None:
+        self.long, self.lost = long, max(ASYMPTOTIC_ERROR, min(LOST, LOST_RATIO * tolerance), 2.0 * tolerance)
         self.scene, self.grid, self.marks = motion.scene, motion.grid, motion.marks
         self.numbers = self.scene.v.size + self.scene.y.size
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
-        #: Number of runs, and their function evaluations in total.
+        #: The last run, for what is looked at is often confirmed at once.
+        self._last: tuple[tuple[str, int, float], Run] | None = None
+        #: Runs, and rate evaluations of all.
         self.made, self.work = 0, 0.0
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
         """The run, of which some two thousand states are compared with the true ones."""
         key = (method.name, steps, dt)
         if key not in self._done:
-            part = self._marked(self._run(method, dt, steps))
-            error = float(self.scene.state_error(part).max())
-            self._done[key] = Trial(dt, steps, error, error > 1.0 and self._grown(part))
+            run, worst = self._watched(method, dt, steps)
+            part = self._marked(run)
+            errors = self.scene.state_error(part)
+            error = max(worst, float(errors.max()))
+            small = errors < ASYMPTOTIC_ERROR
+            before = 0.0 if small.all() else float(errors[: int(np.argmin(small))].max(initial=0.0))
+            self._done[key] = Trial(dt, steps, error, error > 1.0 and self._grown(part), 0, before, run.steps / steps)
         return self._done[key]
 
     def confirm(self, method: Method, dt: float, steps: int) -> Trial:
         """The same run, of which every state is compared if they are not too many."""
         key = (method.name, steps, dt)
         if key not in self._dense:
-            trial, run = self.look(method, dt, steps), self._run(method, dt, steps)
+            trial = self.look(method, dt, steps)
+            run = self._last[1] if self._last and self._last[0] == key else self._run(method, dt, steps)
             run = _part(
                 run,
                 np.arange(
@@ -95,19 +128,51 @@ class Trials:
     def unstable(self, method: Method, dt: float, steps: int) -> bool:
         """Whether the run grew and has no correct digit. The true motion is computed only if it grew."""
         key = (method.name, steps, dt)
-        if key in self._done:
+        if key in self._done and not self._done[key].stopped:
             return self._done[key].unstable
         part = self._marked(self._run(method, dt, steps))
         return self._grown(part) and float(self.scene.state_error(part).max()) > 1.0
 
+    def _every(self, steps: int) -> int:
+        return max(1, math.ceil(steps * self.numbers / MAX_SAVED_NUMBERS))
+
+    def _watched(self, method: Method, dt: float, steps: int) -> tuple[Run, float]:
+        """The run, of which the rest is left out if it is long and was wrong altogether; and the largest error that was seen."""
+        every = self._every(steps)
+        piece = every * math.ceil(steps / (PIECES * every))
+        if method.evaluations * steps <= self.long or piece >= steps:
+            run = self._run(method, dt, steps)
+            self._last = (method.name, steps, dt), run
+            return run, 0.0
+        self.made += 1
+        worst, done, pieces = 0.0, 0, []
+        state: dict[str, Any] = {"v": self.scene.v, "y": self.scene.y, "dt": dt, "control": self.scene.control}
+        with warnings.catch_warnings():
+            for kind in (DivergenceWarning, ControlWarning, AccuracyWarning):
+                warnings.simplefilter("ignore", kind)
+            while done < steps and worst <= self.lost:
+                number = min(piece, steps - done)
+                pieces.append(run := integrate(self.scene.system, method, steps=number, every=every, **state))
+                done, state = done + number, run.resume
+                worst = max(worst, float(self.scene.state_error(_part(run, np.array([-1])))[0]))
+        self.work += method.evaluations * done
+        whole = copy.copy(pieces[-1])
+        for name in ("t", "v", "y"):
+            blocks = [getattr(each, name) for each in pieces]
+            setattr(whole, name, np.concatenate([blocks[0], *(block[1:] for block in blocks[1:])]))
+        whole.steps = done
+        if done == steps:
+            self._last = (method.name, steps, dt), whole
+        return whole, worst
+
     def _run(self, method: Method, dt: float, steps: int) -> Run:
         self.made += 1
         self.work += method.evaluations * steps
-        every = max(1, math.ceil(steps * self.numbers / MAX_SAVED_NUMBERS))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", ControlWarning)
-            return self.scene.run(method, dt, steps=steps, every=every)
+            warnings.simplefilter("ignore", AccuracyWarning)
+            return self.scene.run(method, dt, steps=steps, every=self._every(steps))
 
     def _marked(self, run: Run) -> Run:
         """The states at the marks; the last is one of them."""
@@ -144,6 +209,8 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
     """Nanoseconds per step that is tried in a run with a tolerance, rejected ones counted; otherwise as ``step_times``."""
     batch_v, batch_y, members = _batch(scene)
 
+    fewest = MIN_TIMED_STEPS if scene.v.size + scene.y.size <= LARGE else MIN_TIMED_STEPS // 4
+
     def tried(method: Method, v: Array, y: Array, end: float) -> int:
         run = integrate(
             scene.system,
@@ -167,9 +234,10 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
     ends = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         for method in methods:
             end = scene.horizon / 1024
-            while tried(method, scene.v, scene.y, end) < MIN_TIMED_STEPS and end < 1000 * scene.horizon:
+            while tried(method, scene.v, scene.y, end) < fewest and end < 1000 * scene.horizon:
                 end *= 2.0
             ends[method.name] = end
     return _in_turns(methods, timed, members)
@@ -186,17 +254,18 @@ def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[fl
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         warnings.simplefilter("ignore", ToleranceWarning)
-        sizes = {}
-        for method in methods:
-            n = 1
-            # The faster of two, since a single call that was interrupted would seem long enough.
-            while min(timed(method, n)[0], timed(method, n)[0]) < TIMED_SECONDS:
-                n *= 2
-            sizes[method.name] = n
-        found = dict.fromkeys(sizes, math.inf)
+        warnings.simplefilter("ignore", AccuracyWarning)
+        sizes, found = {}, {}
         begun = time.perf_counter()
-        for rounds in range(REPEATS):
-            if rounds >= 2 and time.perf_counter() - begun > SLOW_SECONDS:
+        for method in methods:
+            n, (seconds, steps) = 1, timed(method, 1)
+            # The quicker of two, for a call that something else held up would look long enough; one that is far too long is not.
+            while seconds < MUCH * TIMED_SECONDS and min(seconds, timed(method, n)[0]) < TIMED_SECONDS:
+                n *= 2
+                seconds, steps = timed(method, n)
+            sizes[method.name], found[method.name] = n, 1e9 * seconds / (steps * members)
+        for _ in range(REPEATS):
+            if time.perf_counter() - begun > SLOW_SECONDS:
                 break
             for method in methods:
                 seconds, steps = timed(method, sizes[method.name])

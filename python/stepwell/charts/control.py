@@ -14,7 +14,7 @@ from .. import _checks
 from .. import control as controls
 from .._checks import Array
 from .._value import Value
-from ..errors import ArgumentError, ControlWarning, DivergenceWarning, DTypeError, ShapeError, UnsupportedError
+from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, DTypeError, ShapeError, UnsupportedError
 from ..integrate import integrate
 from ..methods import Method, choice
 from ..methods import method as find_method
@@ -304,6 +304,7 @@ class _Setup:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # That much gain is too much is what the chart shows.
             warnings.simplefilter("ignore", DivergenceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             warnings.simplefilter("ignore", ControlWarning)
             run = integrate(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
             energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from .._value import Value
-from ..errors import ArgumentError, DivergenceWarning, ShapeError
+from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
 from ..integrate import fits_together, integrate
 from ..methods import Method
 from ..methods import method as find_method
@@ -110,6 +110,7 @@ class StabilityMap(Value):
         begin: dict[str, Any] = {"v": unit[0], "y": unit[1]} | ({"carry": unit[0]} if self.method.carry else {})
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergenceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             run = integrate(self.system, self.method, dt=1.0, steps=steps, **begin)
         slot = run.v[-1] if run.carry is None else run.carry
         with np.errstate(all="ignore"):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .._checks import Array
-from ..errors import ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
+from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
 from ..integrate import fits_together, integrate
 from ..methods import Method
 from ..result import Run
@@ -78,6 +78,7 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
     """Run the scene with a fixed step and measure its errors."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused)
     state_error, end_error, energy_error = _errors(scene, run)
     amplitude = scene.amplitude(run)
@@ -109,6 +110,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
     times = asked(scene)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times}
         run = integrate(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
     assert run.paces is not None
@@ -301,6 +303,7 @@ def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = N
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
+        warnings.simplefilter("ignore", AccuracyWarning)
         return _in_turns(methods, timed, 1, members)
 
 

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pickle import PicklingError
 from typing import Any
 
 import numpy as np
@@ -48,12 +49,15 @@ class Peer(Value):
     """Another program.
 
     Attributes:
-        name: its name in the table and the picture.
-        solve: a function of scene, times of shape (n,) above 0, the last at the horizon, and a setting, that returns a
-            ``Solved``. It raises ``UnsupportedError`` for a scene that it cannot solve; the chart then lists it in ``refused``.
-        settings: the settings with which it is run.
-        by: the kind of setting, ``"tolerance"`` or ``"step"``.
-        order: order of convergence, or None.
+        name: in the table and the picture.
+        solve: a function, or an object that can be called: from scene, times of shape (n,) above 0, the last at the horizon, and
+            a setting, to what was found. It raises ``UnsupportedError`` for a scene that it cannot do, which the chart lists
+            among what is refused.
+        settings: with which to run it.
+        by: what they are, ``"tolerance"`` or ``"step"``.
+        order: of convergence, or None.
+
+    It is pickled with the name of its function, as ``pickle`` does with functions: one at the top of a module, not a lambda.
     """
 
     name: str
@@ -78,6 +82,21 @@ class Peer(Value):
     def title(self) -> str:
         """The name in a picture."""
         return self.name
+
+    def __copy__(self) -> Peer:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Peer:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        path = getattr(self.solve, "__qualname__", "")
+        if "<" in path:  # <lambda>, or within a function's <locals>
+            raise PicklingError(
+                f"peer {self.name!r}: pickle finds a function again by its name in a module, and {path} has none; define the "
+                f"function at the top of a module"
+            )
+        return Peer, (self.name, self.solve, self.settings, self.by, self.order)
 
 
 def peer(given: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
@@ -104,9 +123,22 @@ def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
     Raises:
         UnsupportedError: if SciPy is not installed.
     """
-    solver = _need("scipy.integrate", "scipy")
+    _need("scipy.integrate", "scipy")
+    return Peer(f"SciPy {method}", ByScipy(method), settings)
 
-    def solve(scene: Scene, times: Array, tolerance: float) -> Solved:
+
+class ByScipy(Value):
+    """Solves a scene by one of SciPy's methods."""
+
+    def __init__(self, method: str) -> None:
+        self.method = method
+
+    def __repr__(self) -> str:
+        return f"ByScipy({self.method!r})"
+
+    def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
+        """The states at these times."""
+        solver = _need("scipy.integrate", "scipy")
         system = scene.system.scaled(1.0, ())
         cut = scene.v.size
 
@@ -117,13 +149,11 @@ def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
         start = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
         begin = time.perf_counter()
         span = 0.0, float(times[-1])
-        found = solver.solve_ivp(rates, span, start, method=method, t_eval=times, rtol=tolerance, atol=tolerance)
+        found = solver.solve_ivp(rates, span, start, method=self.method, t_eval=times, rtol=tolerance, atol=tolerance)
         seconds = time.perf_counter() - begin
         states = np.full((len(times), len(start)), np.nan)
         states[: found.y.shape[1]] = found.y.T
         return Solved(*_blocks(scene, states), int(found.nfev), seconds)
-
-    return Peer(f"SciPy {method}", solve, settings)
 
 
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
@@ -135,22 +165,31 @@ def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
     Raises:
         UnsupportedError: if heyoka is not installed.
     """
+    _need("heyoka", "heyoka")
+    return Peer("heyoka", ByHeyoka(), settings)
+
+
+@lru_cache(maxsize=1)
+def _series(scene: Scene, tolerance: float) -> Any:
     hy = _need("heyoka", "heyoka")
+    return hy.taylor_adaptive(_expressions(hy, scene), np.zeros(scene.v.size + scene.y.size), tol=tolerance)
 
-    @lru_cache(maxsize=1)
-    def compiled(scene: Scene, tolerance: float) -> Any:
-        return hy.taylor_adaptive(_expressions(hy, scene), np.zeros(scene.v.size + scene.y.size), tol=tolerance)
 
-    def solve(scene: Scene, times: Array, tolerance: float) -> Solved:
-        series = compiled(scene, tolerance)
+class ByHeyoka(Value):
+    """Solves a scene by heyoka."""
+
+    def __repr__(self) -> str:
+        return "ByHeyoka()"
+
+    def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
+        """The states at these times."""
+        series = _series(scene, tolerance)
         series.time = 0.0
         series.state[:] = np.concatenate([np.ravel(scene.v), np.ravel(scene.y)])
         begin = time.perf_counter()
         found = series.propagate_grid(np.concatenate([[0.0], times]))
         seconds = time.perf_counter() - begin
         return Solved(*_blocks(scene, found[-1][1:]), int(found[3]) * series.order, seconds)
-
-    return Peer("heyoka", solve, settings)
 
 
 #: REBOUND's integrators that are offered, and whether a setting is a tolerance.
@@ -170,11 +209,26 @@ def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) 
     Raises:
         UnsupportedError: if REBOUND is not installed.
     """
-    rb = _need("rebound", "rebound")
+    _need("rebound", "rebound")
     known("integrator", integrator, REBOUND)
+    if settings is None:
+        if not REBOUND[integrator]:
+            raise UnsupportedError(f"settings: expected the steps of {integrator}, got none")
+        settings = TOLERANCES
+    return Peer(f"REBOUND {integrator}", ByRebound(integrator), settings, "tolerance" if REBOUND[integrator] else "step")
 
-    def simulation(scene: Scene, setting: float) -> Any:
-        system = scene.system
+
+class ByRebound(Value):
+    """Solves a scene by one of REBOUND's integrators."""
+
+    def __init__(self, integrator: str) -> None:
+        self.integrator = integrator
+
+    def __repr__(self) -> str:
+        return f"ByRebound({self.integrator!r})"
+
+    def _simulation(self, scene: Scene, setting: float) -> Any:
+        rb, integrator, system = _need("rebound", "rebound"), self.integrator, scene.system
         if not isinstance(system, NBody) or system.force != "newton":
             raise UnsupportedError(f"REBOUND has bodies under Newton's law only; {system!r} is not that")
         sim = rb.Simulation()
@@ -188,18 +242,19 @@ def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) 
             sim.add(m=m, x=x3[0], y=x3[1], z=x3[2], vx=v3[0], vy=v3[1], vz=v3[2])
         return sim
 
-    def solve(scene: Scene, times: Array, setting: float) -> Solved:
+    def __call__(self, scene: Scene, times: Array, setting: float) -> Solved:
+        """The states at these times."""
         count = 0
 
         def counted(_: Any) -> None:
             nonlocal count
             count += 1
 
-        sim = simulation(scene, setting)
+        sim = self._simulation(scene, setting)
         sim.additional_forces = counted
         for t in times.tolist():
             sim.integrate(t)
-        sim = simulation(scene, setting)
+        sim = self._simulation(scene, setting)
         dim = scene.y.shape[1]
         v, y = (np.empty((len(times), *scene.y.shape)) for _ in range(2))
         seconds = 0.0
@@ -209,12 +264,6 @@ def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) 
             seconds += time.perf_counter() - begin
             v[i], y[i] = ([getattr(p, block)[:dim] for p in sim.particles] for block in ("vxyz", "xyz"))
         return Solved(v, y, count, seconds)
-
-    if settings is None:
-        if not REBOUND[integrator]:
-            raise UnsupportedError(f"settings: expected the steps of {integrator}, got none")
-        settings = TOLERANCES
-    return Peer(f"REBOUND {integrator}", solve, settings, "tolerance" if REBOUND[integrator] else "step")
 
 
 def _need(module: str, package: str) -> Any:

@@ -9,7 +9,7 @@ from .. import _checks, systems
 from ..control import AnyControl
 from ..errors import ArgumentError, StepwellError, UnknownNameError
 from ..explanation import explain
-from ..scenes import scene, scenes
+from ..scenes import FILE, scene, scenes
 from ..systems import System
 from . import show
 
@@ -19,12 +19,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "system",
         metavar="SYSTEM",
-        help="a scene, see stepwell scenes, under its control; or a system by its class, such as Pendulum",
+        help="a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum",
     )
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
     parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
     parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
+    parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
+    parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods")
+    parser.add_argument("--record", action="append", default=[], metavar="NAME", help="a quantity to list, too, such as energy")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it: .json, .html or .txt")
     show.json_option(parser)
 
@@ -41,6 +44,9 @@ def command(args: argparse.Namespace) -> None:
         control=None if args.attempt else control,
         fused=args.fused,
         attempt=args.attempt,
+        form=args.form,
+        start=args.start,
+        record=args.record,
     )
     written = show.Written()
     if args.output is not None:
@@ -65,7 +71,7 @@ def system_and_control(name: str) -> tuple[System, AnyControl | None]:
         except (StepwellError, TypeError):
             raise ArgumentError(f"system: {name} needs arguments; name a scene, or use stepwell.explain in Python") from None
     known = [each.name for each in scenes()]
-    if name not in known:
+    if name not in known and not FILE.fullmatch(name):
         classes = [each for each in systems.__all__ if isinstance(getattr(systems, each), type) and each != "System"]
         raise UnknownNameError(
             f"system: there is no {_checks.short(name)}; expected a scene, {', '.join(known)}, or a system, "

@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "system",
         metavar="SYSTEM",
-        help="a scene, see stepwell scenes, with its start and its control; or a system by its class, such as Pendulum",
+        help="a scene (see stepwell scenes), a Python file that makes one, or a system by its class, such as Pendulum",
     )
     parser.add_argument("--method", required=True, metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--language", required=True, metavar="LANGUAGE", help=f"{', '.join(LANGUAGES)}")

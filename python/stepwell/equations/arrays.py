@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
 
 from ..errors import TraceError
-from ..reference import functions
+from ..reference import functions, trig
 from .values import (
     COMPARISONS,
     Operators,
@@ -62,8 +63,15 @@ _MOVING = (
 MOVING = {getattr(np, name) for name in _MOVING.split()}
 
 
+#: Whether sine and cosine are those of the built-in systems: see ``stepwell.system``.
+QUICK_SINES: ContextVar[bool] = ContextVar("quick_sines", default=False)
+_QUICK = {"sin": trig.sin, "cos": trig.cos}
+
+
 def elementwise_named(name: str, *given: Any) -> Any:
     """A function of numbers by NumPy's name."""
+    if name in _QUICK and QUICK_SINES.get():
+        return elementwise(name, _QUICK[name], *given)
     if name in COMPARISONS:
         return compared(name, *given)
     if name in ("divide", "true_divide"):

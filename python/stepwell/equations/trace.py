@@ -11,6 +11,7 @@ import numpy as np
 from .._checks import Shape
 from ..errors import TraceError
 from ..reference.types import Array as Numbers
+from .arrays import QUICK_SINES
 from .namespace import rebound
 from .values import Array, Scalar, array, objects, of_shape
 
@@ -141,6 +142,7 @@ class Equations:
         return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
 
     def _run(self, function: Callable[..., Any], name: str, *given: Any, **named: Any) -> Any:
+        before = QUICK_SINES.set(self.definition.quick_sines)
         try:
             return function(*given, **named)
         except RecursionError:
@@ -154,6 +156,8 @@ class Equations:
                 known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
             )
             raise told from error
+        finally:
+            QUICK_SINES.reset(before)
 
     def _checked(self, made: Any) -> tuple[Any, Any]:
         """The rates of v and of y as objects; None for one that the function does not return."""

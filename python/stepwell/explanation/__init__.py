@@ -1,10 +1,13 @@
 """Explains a step: every operation by name, how often it is computed, and the machine code.
 
-``formula`` writes operations as text, ``listing`` makes lines of a tape, ``result`` holds and presents the result.
+``formula`` writes operations as text, ``listing`` makes lines of a tape, ``beside`` of what is made beside the steps,
+``result`` holds and tells what was found.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import prod
 from typing import Any
 
@@ -17,7 +20,8 @@ from ..methods import method as find_method
 from ..methods import methods as every_method
 from ..systems import System
 from ..systems.base import a_system
-from .listing import Line, Section, lines_of_program, lines_of_tape, written
+from .beside import lines_beside
+from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of, written
 from .result import Explanation, MachineCode
 
 __all__ = ["Explanation", "Line", "MachineCode", "Section", "explain"]
@@ -31,6 +35,9 @@ def explain(
     control: AnyControl | None = None,
     fused: bool = False,
     attempt: bool = False,
+    form: str = "direct",
+    start: str | None = None,
+    record: str | Sequence[str] | None = (),
 ) -> Explanation:
     """Explain what a step of a system by a method computes, and its machine code on this machine.
 
@@ -54,8 +61,13 @@ def explain(
             machine code for many differs from that for one.
         control: an ``EnergyControl`` or a ``Projection``, as ``integrate`` takes it.
         fused: with fused multiply-adds, fma(a, b, c) = a·b + c rounded once, as ``integrate`` takes it.
-        attempt: explain an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with the choice of the next
-            step.
+        attempt: an attempt at an adaptive step, as ``integrate`` makes with ``tolerance=``, with what decides on the next
+            one.
+        form: ``"direct"``, or ``"matrix"`` for a step by the transition matrix of a linear system: P, and Q for the inputs at
+            each node of the method.
+        start: how a method with a choice starts, as ``integrate`` takes it.
+        record: quantities that the core can record, whose computation is listed, too: "energy", and what else the system names
+            in its ``quantities``.
 
     Returns:
         An ``Explanation``.
@@ -74,6 +86,16 @@ def explain(
     if attempt and (control is not None or system.control is not None):
         raise ArgumentError("control: goes with fixed steps only, and attempt=True was given")
     own = prod(system.batch)
+    form = _checks.known("form", form, ("direct", "matrix"))
+    if form != "direct" and (fused or attempt or control is not None):
+        raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
+    if form != "direct" and not system.linear:
+        raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    choice = how.start_choice(start)
+    given = [record] if isinstance(record, str) else [] if record is None else _checks.several("record", record, "quantities")
+    if given and not system.quantities:
+        raise UnsupportedError(f"record: the core records nothing of {system!r}; its energy is NumPy's, from the saved states")
+    quantities = list(dict.fromkeys(_checks.known("record", name, list(system.quantities)) for name in given))
     count = own if members is None else _checks.count("members", members, 1)
     if count % own:
         raise ArgumentError(f"members: expected a multiple of the system's batch of {own}, got {count}")
@@ -82,18 +104,22 @@ def explain(
     if control is not None:
         system = system.under(control, batch)
         fits_together(system, how)
-    return _explained(engine.Plan(system, how, batch, 1.0, fused=fused), attempt)
+    plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice)
+    explained = _explained(plan, attempt)
+    if explained.parts is not None or attempt:
+        return explained
+    return replace(explained, beside=lines_beside(plan, choice, quantities))
 
 
 def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
-    model = engine.model(plan)
+    model = engine.matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
     what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
-    what |= {"fused": plan.fused, "attempt": attempt}
+    what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form}
     parts = _core.in_parts(model, plan.members, attempts=attempt)
     told = None if parts else _core.compiled(model, plan.members, attempts=attempt)
     if told is None:
         kind, about, lanes = parts or ("rates", 0, 1)
-        sections = lines_of_program(plan, attempt)
+        sections = line_of_matrices(plan) if plan.form == "matrix" else lines_of_program(plan, attempt)
         return Explanation(**what, sections=sections, level=_core.isa(), lanes=lanes, parts=kind, about=about)
     sections = lines_of_tape(plan, told["split"], attempt)
     code = why = None
@@ -107,7 +133,7 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
         sections=sections,
         level=told["level"],
         lanes=told["lanes"],
-        written=written(plan.system, plan.method, attempt),
+        written=written(plan, attempt),
         computed=told["computed"],
         hoisted={section.when: sum(sum(line.operations.values()) for line in section.lines) for section in sections[:-1]},
         code=code,

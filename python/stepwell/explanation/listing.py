@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from math import prod
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -129,9 +130,27 @@ def indexed(name: str, index: Shape) -> str:
 
 def parameters(plan: Plan) -> tuple[list[str], list[str]]:
     """What the numbers are called that describe a system, in the core's order, and its sampled inputs."""
+    system = plan.system
+    if plan.form == "matrix":
+        inputs = system.given_inputs()
+        given = matrix_of(plan) | {name: each.signal() for name, each in inputs.items()}
+    else:
+        given = system.given(plan.batch) | ({} if system.control is None else system.control.given())
+    return named_numbers(plan, given)
+
+
+def matrix_of(plan: Plan) -> dict[str, Any]:
+    """Matrices of a step, P of shape (n, n, *batch) and Q of shape (nodes, inputs, n, *batch), in shape alone."""
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    inputs = len(plan.system.given_inputs())
+    return {"P": np.zeros((n, n, *plan.batch)), "Q": np.zeros((len(plan.method.nodes), inputs, n, *plan.batch))}
+
+
+def named_numbers(plan: Plan, given: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+    """Names of the numbers in what is given, and of the sampled inputs."""
     numbers: list[str] = []
     tables: list[str] = []
-    system = plan.system
+    named = indexed if plan.form == "matrix" else plan.system.named
 
     def add(name: str, value: Any, own: int | None = None) -> None:
         match value:
@@ -144,12 +163,11 @@ def parameters(plan: Plan) -> tuple[list[str], list[str]]:
                 for part in ("amplitude", "omega", "phase"):
                     add(f"{name}.{part}", getattr(value, part))
             case Held():
-                tables.append(system.named(name, ()))
+                tables.append(named(name, ()))
             case np.ndarray():
                 axes = max(0, value.ndim - len(plan.batch))
-                numbers.extend(system.named(name, index) for index in np.ndindex(value.shape[:axes]))
+                numbers.extend(named(name, index) for index in np.ndindex(value.shape[:axes]))
 
-    given = system.given(plan.batch) | ({} if system.control is None else system.control.given())
     for name, value in given.items():
         add(name, value)
     return numbers, tables
@@ -256,8 +274,8 @@ class _Value(NamedTuple):
 class Writer:
     """Writes sections, one after the other, and knows what values are called."""
 
-    def __init__(self, tape: Any, names: dict[int, str], notation: Notation | None = None) -> None:
-        self.tape, self.names = tape, names
+    def __init__(self, tape: Any, names: dict[int, str], notation: Notation | None = None, *, tables: Sequence[str] = ()) -> None:
+        self.tape, self.names, self.tables = tape, names, tables
         self.notation = Notation() if notation is None else notation
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
@@ -309,7 +327,10 @@ class Writer:
                 parts.sort(key=lambda each: -each.rank)
             elif name == "add" and (parts[0].text.holds != ATOM or parts[0].rank < 4):  # but v + (…), as methods are written
                 parts.sort(key=lambda each: each.text.holds != SUM)
-            text = self.notation.formula(name, [each.text for each in parts], given, [each.bits for each in parts])
+            if name == "sample" and self.tables:
+                text = Formula(f"{self.tables[given]}({parts[0].text.text})")
+            else:
+                text = self.notation.formula(name, [each.text for each in parts], given, [each.bits for each in parts])
             count = sum((Counter(each.operations) for each in parts), Counter[str]())
             if name in KINDS:
                 count[KINDS[name]] += 1
@@ -338,24 +359,31 @@ class Writer:
         out = []
         for place in places:
             value = values[place]
-            if results is not None and operations[place][0] == "state":  # it stays as it is
+            if results is not None and operations[place][0] in ("state", "constant"):  # it stays as it is
                 lines.append(Line(str(wanted[place]), value.text.text, {}))
             out.append(Leaf(value.text, value.symbol, rank if value.rank else 0))
         return Section(when, tuple(lines)), out
 
 
-def written(system: Any, method: Any, attempts: bool = False) -> dict[str, int]:
+def written(plan: Plan, attempts: bool = False) -> dict[str, int]:
     """Operations of a step as it is written down, by kind, of values that change between steps."""
     tape = _core.Tape()
-    tracer = Tracer(system, tape)
-    return tape.written(tracer.attempt(method) if attempts else tracer.step(method))
+    return tape.written(_traced(Tracer(plan.system, tape), plan, attempts))
+
+
+def _traced(tracer: Tracer, plan: Plan, attempts: bool) -> list[Any]:
+    if plan.form == "matrix":
+        inputs = [each.signal() for each in plan.system.given_inputs().values()]
+        n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+        return tracer.matrix(plan.method.nodes, n, inputs)
+    return tracer.attempt(plan.method) if attempts else tracer.step(plan.method)
 
 
 def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Section, ...]:
     """The sections of a step that is one tape, cut as the core did."""
     tape = _core.Tape()
     tracer = Named(plan.system, tape)
-    _ = tracer.attempt(plan.method) if attempts else tracer.step(plan.method)
+    _traced(tracer, plan, attempts)
     numbers, tables = parameters(plan)
     of_state, next_state = states(plan, attempts), states(plan, attempts, "'")
     params = [tape.param(i) for i in range(len(numbers))]
@@ -406,6 +434,11 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
 
     body, _ = writer.section("member step", split["body"], hot, 4, "a", next_state)
     return run, member, step, body
+
+
+def line_of_matrices(plan: Plan) -> tuple[Section, ...]:
+    """A step by matrices that are too large for one tape: s is v and then y, x the inputs at each node of the method."""
+    return (Section("member step", (Line("s'", "P·s + Q·x" if plan.system.given_inputs() else "P·s", {}),)),)
 
 
 def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:

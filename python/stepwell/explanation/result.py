@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from html import escape
 from pathlib import Path
@@ -23,9 +24,13 @@ WHEN = {
     "member step": "in each step, for each member",
 }
 
-#: How the rates are computed in a step that is not a single tape.
+#: What is made beside the steps of a method that carries something.
+BESIDE = {"start": "at the start of a run, {carry} from v", "finish": "where a state is kept, v from {carry}"}
+
+#: What makes the rates of a step that is no single tape.
 PARTS = {
     "rates": "the rates are a tape of their own, {lanes} at a time",
+    "matrix": "its products of matrices are made by a loop that was compiled beforehand, one member after the other",
     "hand": "the rates are computed by a loop that was compiled beforehand, one member after the other",
 }
 
@@ -63,22 +68,27 @@ class Explanation(Value):
         members: number of trajectories.
         fused: whether it uses fused multiply-adds.
         attempt: whether it is an attempt at an adaptive step.
-        sections: the values, grouped by how often they are computed. For a step that is too long for one tape, the operations of
-            the method on blocks.
+        form: ``"direct"`` or ``"matrix"``.
+        sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
+            blocks.
         level: the CPU level in use.
-        lanes: number of members that are stepped together.
-        written: operations of a step, by kind, as the method and the system are written down. Values that do not change from step
-            to step are computed before and not counted; changes of sign are not counted either. Empty if the step is too long for
-            one tape.
-        computed: operations of a step, by kind, that are performed for each member, after equal and unused ones were removed.
-            ``fused`` counts fused multiply-adds.
-        hoisted: numbers of operations that are computed once a run, once for each member, and once a step for all members,
-            instead of for each member in each step: ``"run"``, ``"member"``, ``"step"``.
+        lanes: how many members go together.
+        written: operations of a step, by kind, as the method and the system are written down. What does not change from step to
+            step is not counted, for it is computed before; changes of sign are not either. Empty if the step is too long for one
+            tape. Counted on the reference, which runs a method as it is written; the core counts less on its own tape, where a
+            sum or product of whole blocks that a method asks for twice was made one already.
+        computed: operations of a step, by kind, that each member makes: without what was found equal or needless. ``fused``
+            counts fused multiply-adds.
+        hoisted: how many operations are made once a run, once for each member, and once a step for all members, instead of by
+            each member in each step: ``"run"``, ``"member"``, ``"step"``.
         code: the machine code, or None.
         interpreted_because: why there is none, in words, or None. Runs too short to be worth machine code are interpreted anyway.
-        parts: for a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
-            loop that was compiled beforehand. None if it is one tape.
-        about: approximate number of operations of such a step; 0 if it is one tape, whose operations are counted.
+        parts: of a step that is too long for one tape: ``"rates"`` if its rates are tapes of their own, ``"hand"`` if they are a
+            loop that was compiled beforehand, ``"matrix"`` if it is products of large matrices. None if it is one tape.
+        about: about how many operations such a step has; 0 if it is one tape, of which they are counted.
+        beside: what is made beside the steps, ``when``: of a method that carries something, ``"start"``, which makes that from v
+            at the start of a run, and ``"finish"``, which makes v from it where a state is kept; and what was asked for by
+            ``record=``, such as ``"record energy"``. A sampled input is written as a function, a(t).
     """
 
     system: System
@@ -96,12 +106,17 @@ class Explanation(Value):
     interpreted_because: str | None = None
     parts: str | None = None
     about: int = 0
+    form: str = "direct"
+    beside: tuple[Section, ...] = ()
 
     @property
     def listing(self) -> str:
         """The values alone, a line each."""
+        return self._listed(self.sections)
+
+    def _listed(self, sections: Sequence[Section]) -> str:
         out = []
-        for section in self.sections:
+        for section in sections:
             if section.lines:
                 out.append(self._when(section))
                 width = max(len(line.name) for line in section.lines)
@@ -115,6 +130,7 @@ class Explanation(Value):
         """What is explained, in a line."""
         what = "an attempt at a step" if self.attempt else "a step"
         fused = ", with fused multiply-adds" if self.fused else ""
+        fused += ", by its transition matrix" if self.form == "matrix" else ""
         return f"{self.method.title}: {what} of {self.system!r}, {self.members} member{'s' * (self.members > 1)}{fused}"
 
     @property
@@ -122,6 +138,8 @@ class Explanation(Value):
         """What the step becomes, in words."""
         if self.parts is not None:
             rates = PARTS[self.parts].format(lanes=_members(self.lanes))
+            if self.parts == "matrix":
+                return f"A step of about {self.about} operations is not one tape: {rates}."
             between = "is interpreted" if self.level == "baseline" else f"is machine code for {self.level}"
             return (
                 f"A step of about {self.about} operations is not one tape: {rates}; what the method does between them {between}."
@@ -141,6 +159,10 @@ class Explanation(Value):
 
     def _when(self, section: Section) -> str:
         """How often, in words; of one member all are the same."""
+        if section.when in BESIDE:
+            return BESIDE[section.when].format(carry=self.method.carry)
+        if section.when.startswith("record "):
+            return "recorded of a state that is kept"
         text = WHEN[section.when]
         return text if self.members > 1 else text.partition(",")[0]
 
@@ -155,6 +177,8 @@ class Explanation(Value):
             out.append(f"{'operations of a step':<24}{'written':>8}{'computed':>10}")
             out += [f"  {name:<22}{written:>8}{computed:>10}" for name, written, computed in self.counts()]
             out.append(self._hoisted())
+        if self.beside:
+            out += ["", self._listed(self.beside), ""]
         return "\n".join([*out, self.machine, *self.words()])
 
     def _hoisted(self) -> str:
@@ -163,29 +187,40 @@ class Explanation(Value):
 
     def words(self) -> list[str]:
         """What names in the listing mean that are no arguments."""
-        text = [f"{line.name} {line.formula}" for section in self.sections for line in section.lines]
+        text = [f"{line.name} {line.formula}" for section in (*self.sections, *self.beside) for line in section.lines]
         known = {
             "h": "the step dt",
             "Φ": "h·omega, the true angle of a step",
             "Gm": "G·masses",
             "fma": "fma(a, b, c) = a·b + c, rounded once",
-            "v2": "v2, y2: the state at which rates are evaluated the second time",
+            "v2": "v2, y2: the state at which rates are asked for the second time",
+            "s": "s: the numbers of v and then those of y",
+            "P": "P, Q: the transition matrix of a step, and what the inputs add at each node",
             "dv": "h times the rate of v" if self.parts is None else "dv(t, v, y) = h times the rate of v",
         }
         shown = []
         for name, meaning in known.items():
             if any(_names(name, each) for each in text):
-                shown.append(meaning if name in ("fma", "v2") else f"{name}: {meaning}")
+                shown.append(meaning if name in ("fma", "v2", "P", "s") else f"{name}: {meaning}")
         if self.method.carry:
             shown.append(f"{self.method.carry}: what is carried in place of v between steps")
         return [f"Here {'; '.join(shown)}."] if shown else []
 
     def as_dict(self) -> dict[str, Any]:
         """All of it as numbers and texts."""
-        sections = [{"when": s.when, "lines": [line._asdict() for line in s.lines]} for s in self.sections]
+        sections, beside = (
+            [{"when": s.when, "lines": [line._asdict() for line in s.lines]} for s in each]
+            for each in (self.sections, self.beside)
+        )
         held = {name: getattr(self, name) for name in self.__dataclass_fields__}
         code = None if self.code is None else asdict(self.code)
-        return held | {"system": repr(self.system), "method": self.method.name, "sections": sections, "code": code}
+        return held | {
+            "system": repr(self.system),
+            "method": self.method.name,
+            "sections": sections,
+            "beside": beside,
+            "code": code,
+        }
 
     def to_json(self, path: str | Path) -> None:
         """Write ``as_dict()``."""
@@ -195,7 +230,7 @@ class Explanation(Value):
     def _repr_html_(self) -> str:
         """The same as tables."""
         rows = []
-        for section in self.sections:
+        for section in (*self.sections, *self.beside):
             if section.lines:
                 rows.append(f'<tr><th colspan="3" style="text-align:left">{self._when(section)}</th></tr>')
             rows += [

@@ -96,7 +96,7 @@ def export(
         raise UnsupportedError(f"fused: {kind.title} has no fused multiply-add; export without, or to another language")
     choice = how.start_choice(start)
     control = a_control(control)
-    called = prefix(f"{snake(type(system).__name__)}_{how.name}" if name is None else name)
+    called = prefix(f"{snake(system.kind_name)}_{how.name}" if name is None else name)
     blocks = [
         None if block is None else _checks.block(argument, block, shape, system.axes)
         for argument, block, shape in (("v", v, system.v_shape), ("y", y, system.y_shape))

@@ -57,6 +57,10 @@ def scene(name: str | Scene) -> Scene:
 FILE = re.compile(r"(.+\.py)(?::(\w+))?")
 
 
+#: Modules that were made of such files.
+_LOADED: set[str] = set()
+
+
 def _from_file(path: str, variable: str | None) -> Scene:
     """The scene that a file defines."""
     name = re.sub(r"\W", "_", Path(path).stem)
@@ -64,7 +68,9 @@ def _from_file(path: str, variable: str | None) -> Scene:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(name, module)  # so that its systems can be pickled
+    if name not in sys.modules or name in _LOADED:
+        sys.modules[name] = module  # so that its systems can be pickled
+        _LOADED.add(name)
     try:
         spec.loader.exec_module(module)
     except FileNotFoundError:
@@ -75,7 +81,8 @@ def _from_file(path: str, variable: str | None) -> Scene:
         raise ArgumentError(f"scene: the file {path} cannot be run: {type(error).__name__}: {error}") from error
     made = {key: value for key, value in vars(module).items() if isinstance(value, Scene)}
     if variable is not None:
-        return made[_checks.known("scene", variable, made)]
+        found = made[_checks.known("scene", variable, made)]
+        return replace(found, name=variable, title="") if found.name == "unnamed" else found
     if len(made) != 1:
         if not made:
             raise ArgumentError(f"scene: {path} makes no Scene; write scene = sw.Scene(system, v=…, y=…, until=…)")

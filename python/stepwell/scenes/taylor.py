@@ -160,26 +160,36 @@ class _Pair:
         self.i, self.j, self.dim = i, j, dim
         self.distance: list[Series] = [[] for _ in range(dim)]
         self.square: Series = []
+        #: Term n of the square times n.
+        self.slope: Series = []
         self.cube: Series = []
 
     def next(self, k: int, y: list[Series]) -> list[Decimal]:
         """Term k for each axis."""
         for axis, series in enumerate(self.distance):
             series.append(y[self.j * self.dim + axis][k] - y[self.i * self.dim + axis][k])
-        self.square.append(sum((_product(series, series, k) for series in self.distance), Decimal(0)))
+        self.square.append(sum((_square(series, k) for series in self.distance), Decimal(0)))
+        self.slope.append(k * self.square[k])
         first = self.square[0]
         if k == 0:
             self.cube.append(1 / (first * first.sqrt()))
         else:
-            # From s·u̇ = p·ṡ·u for u = s^p, p = −3/2; twice everything, so that the factors are whole.
-            terms = (-(k + k + n) * self.square[n] * self.cube[k - n] for n in range(1, k + 1))
-            self.cube.append(sum(terms, Decimal(0)) / (2 * k * first))
+            # From s·u̇ = p·ṡ·u for u = s^p, p = −3/2; twice everything, so that the factors are whole: 2·k + n of s_n·u_(k − n).
+            back = self.cube[::-1]
+            plain, sloped = (sum(map(mul, series[1:], back), Decimal(0)) for series in (self.square, self.slope))
+            self.cube.append(-((k + k) * plain + sloped) / (2 * k * first))
         return [_product(series, self.cube, k) for series in self.distance]
 
 
 def _product(a: Series, b: Series, k: int) -> Decimal:
     """Term k of the product of two series."""
     return sum(map(mul, a, b[k::-1]), Decimal(0))
+
+
+def _square(a: Series, k: int) -> Decimal:
+    """Term k of the square of a series: each product of two different terms once, and doubled."""
+    half = sum(map(mul, a[: (k + 1) // 2], a[k : k // 2 : -1]), Decimal(0))
+    return half + half if k % 2 else half + half + a[k // 2] * a[k // 2]
 
 
 def _radius(v: list[Series], y: list[Series], k: int, tolerance: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._checks import Array
-from ..errors import ToleranceWarning
+from ..errors import AccuracyWarning, ToleranceWarning
 from ..integrate import integrate
 from ..result import Run
 from .base import Scene
@@ -60,6 +60,7 @@ class Tight:
     def _run(self, at: Array, on: dict[str, Any]) -> Run:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
             return integrate(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -23,7 +23,9 @@ from ..result import Run
 from ..systems import LinearSystem, Oscillator, System
 from . import eigen, maps
 from .eigen import Complex
-from .limit import GROWTH_EXPONENT, LADDER, NEVER_STABLE_STEP, NUMBERS_AT_ONCE, PAST_LIMIT, Mode, _Search, stability_limit
+from .limit import Mode, stability_limit
+from .limit_digits import LADDER
+from .limit_search import GROWTH_EXPONENT, NEVER_STABLE_STEP, NUMBERS_AT_ONCE, PAST_LIMIT, Search
 from .parts import function_of_rates
 
 #: A real part below the first fraction of a state's fastest rate counts as zero, and so does a rate below the second.
@@ -226,8 +228,10 @@ def _of_rates(method: Method, rates: Complex, n_v: int) -> Array:
     if turns.any():
         some = directions[turns]
         turning = np.array([[some.real, -some.imag], [some.imag, some.real]])
-        velocities = 1 if function_of_rates(method) else 2 if n_v else 0  # no difference if both blocks are treated alike
-        found[turns] = _Search(LinearSystem(turning, velocities=velocities), method, None, None, 0.0).limits()[0]
+        velocities = (
+            1 if function_of_rates(method) else 2 if n_v else 0
+        )  # where both blocks are treated alike, it is all the same
+        found[turns] = Search(LinearSystem(turning, velocities=velocities), method, None, None, 0.0).limits()[0]
     return np.asarray(found[which.reshape(-1)] / size)
 
 

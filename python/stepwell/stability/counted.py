@@ -6,6 +6,7 @@ from collections import Counter
 from typing import NamedTuple
 
 from .. import _core
+from ..engine import Plan
 from ..errors import ShapeError
 from ..explanation.listing import written
 from ..integrate import fits_together
@@ -54,7 +55,7 @@ def operations(method: str | Method, system: System | None = None) -> Operations
     fits_together(system, how)
     if system.batch:
         raise ShapeError(f"system: expected one member to count the operations of, got a batch of shape {system.batch}")
-    counted = written(system, how)
+    counted = written(Plan(system, how, (), 1.0))
     kinds = Counter(name for name, _, _ in _core.program(how.name)[0])
     arithmetic = {kind: counted[kind] for kind in Operations._fields[:4]}
     return Operations(**arithmetic, rate_evaluations=kinds["dv"], rate_evaluations_y=kinds["dy"])

@@ -63,6 +63,11 @@ class System(Value, ABC):
     _free: System | None = None
 
     @property
+    def kind_name(self) -> str:
+        """What systems of its kind are called."""
+        return type(self).__name__
+
+    @property
     def uncontrolled(self) -> System:
         """The same system without its control."""
         return self if self._free is None else self._free

@@ -57,8 +57,9 @@ class Chain(System):
 
 
 def _per_row(argument: str, array: Array, rows: int, what: str) -> Array:
+    """One number for each row; where one serves for all it is held once, so that a long chain is made at once."""
     if array.ndim == 0:
-        return np.full(rows, array)
+        return np.broadcast_to(array, (rows,))
     if array.shape[0] not in (1, rows):
         raise ShapeError(f"{argument}: expected {rows} {what} (or 1) along the first axis, got shape {array.shape}")
-    return np.ascontiguousarray(np.broadcast_to(array, (rows, *array.shape[1:])))
+    return np.broadcast_to(array, (rows, *array.shape[1:]))

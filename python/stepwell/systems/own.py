@@ -21,9 +21,11 @@ from .inputs import Input, Sampled, Sinusoid
 
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
-#: Attributes that are computed from others and cached.
-FOUND_LATER = ("_core", "_bounds")
-#: Without a state, vectors up to this length are tried, for the shortest that the function accepts.
+#: Attributes that are found out of the others and kept.
+FOUND_LATER = ("_core", "_bounds", "_met")
+#: Of how many shapes of states it is remembered what they are of.
+MOST_MET = 256
+#: Without a state the shortest vector is looked for that the function can do with, up to this length.
 LONGEST_GUESS = 32
 
 
@@ -58,8 +60,14 @@ class OwnSystem(System):
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
         self._core: Any = None
-        #: Systems for shapes of states that occurred before.
+        #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
+        self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
+
+    @property
+    def kind_name(self) -> str:
+        """The name of the function."""
+        return self.definition.name
 
     def said(self) -> list[str]:
         """The parameters."""
@@ -73,14 +81,14 @@ class OwnSystem(System):
         return {name: value for name, value in vars(self).items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self._held() | {"_core": None, "_bounds": {}}
+        return self._held() | {"_core": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = copy.copy(self)
         again.parameters_given = copy.deepcopy(self.parameters_given, memo)
         if self.control is not None:
             again.control = copy.deepcopy(self.control, memo)
-        again._bounds = {}
+        again._bounds, again._met = {}, {}
         return again
 
     def own_axes(self, name: str) -> int:
@@ -91,15 +99,21 @@ class OwnSystem(System):
     # ---- shapes
 
     def sized(self, *states: Any) -> OwnSystem:
-        """The same system for the states v and y of these shapes; None if not given."""
-        given = dict(zip(("v", "y"), states, strict=False))
-        shapes = {name: _checks.shape_of(name, state) for name, state in given.items() if state is not None}
+        """The same system for the states v and y of these shapes; None is what was not given."""
+        given = zip(("v", "y"), states, strict=False)
+        shapes = {name: _checks.shape_of(name, state) for name, state in given if state is not None}
         if self.equations is not None and self._fits(shapes):
             return self
+        met = shapes.get("v"), shapes.get("y")
+        if (known := self._met.get(met)) is not None:
+            return known
         refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
             try:
-                return self._bound(v_shape, y_shape)
+                if len(self._met) >= MOST_MET:
+                    self._met.clear()
+                self._met[met] = self._bound(v_shape, y_shape)
+                return self._met[met]
             except TraceError as error:
                 refused.append(error)
         if not refused:
@@ -142,7 +156,7 @@ class OwnSystem(System):
             return known
         definition = self.definition
         bound = copy.copy(self)
-        bound._bounds = {}
+        bound._bounds, bound._met = {}, {}
         bound.v_shape, bound.y_shape = v_shape, y_shape
         shapes = {
             name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
@@ -220,8 +234,14 @@ class OwnSystem(System):
 
     @property
     def quantities(self) -> dict[str, Shape]:
-        """The invariants, each one number."""
-        return dict.fromkeys(self.definition.invariants, ())
+        """The invariants, each one number; what is made of a parameter that changes with the time is none."""
+        given = self.parameters_given
+        constant = (
+            name
+            for name, each in self.definition.invariants.items()
+            if all(isinstance(given[parameter], np.ndarray) for parameter in each.parameters)
+        )
+        return dict.fromkeys(constant, ())
 
     def energy(self, v: Array, y: Array) -> Array:
         """The invariant that is called ``energy``."""
@@ -264,7 +284,7 @@ class OwnSystem(System):
         known = self._known()
         assert known.equations is not None
         kept = copy.copy(known)
-        kept._bounds = {}
+        kept._bounds, kept._met = {}, {}
         kept._free = known
         kept.batch = _checks.batch_shape({"system": known.batch, "control": control.batch})
         pushed = isinstance(control, Control)

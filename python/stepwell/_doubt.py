@@ -1,0 +1,120 @@
+"""Warnings of runs that stayed finite and yet mean nothing."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ._checks import Array
+from .errors import AccuracyWarning
+from .result import Run
+from .systems import NBody
+
+#: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
+DOUBTFUL_CHANGE = 0.5
+
+#: One member of at most so many bodies is summed in floats. That takes some microseconds, so a run of this many rate evaluations
+#: does not notice it.
+FEW_BODIES, FEW_EVALUATIONS = 8, 100
+
+#: Other energies take NumPy: a run must make so many rate evaluations, and of so many pairs in all, not to notice it. States of
+#: more numbers than the last would take memory that was not counted.
+EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
+
+State = tuple[Array, Array]
+
+
+class Ends(NamedTuple):
+    """Energies at the start and at the end of a run, and the larger of both kinetic energies; per member."""
+
+    first: Array
+    last: Array
+    moved: Array
+
+
+def warn_of_nonsense(run: Run, start: State | None) -> None:
+    """Warn of what is finite and yet means nothing, as far as it is seen at little cost.
+
+    Args:
+        run: which.
+        start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+    """
+    told = [run.system.doubt(run.y)]
+    if isinstance(run.system, NBody) and run.system.keeps_energy and (ends := _ends(run, run.system, start)) is not None:
+        told.append(_of_energy(run.method.name, ends))
+    for text in told:
+        if text is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
+
+
+def _of_energy(method: str, ends: Ends) -> str | None:
+    first, last, moved = ends
+    with np.errstate(all="ignore"):
+        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+    wrong &= np.isfinite(last)  # who diverged was named before
+    if not wrong.any():
+        return None
+    index = tuple(np.argwhere(wrong)[0].tolist())
+    return (
+        f"{np.count_nonzero(wrong)} of {wrong.size} member(s) have another energy at the end: {in_words(index)} has "
+        f"{last[index]:.3g} instead of {first[index]:.3g}, so {method} did not follow its orbit"
+    )
+
+
+def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
+    """What was recorded, or what is computed now where that costs little against the run; None where it would not."""
+    if "energy" in run.recorded and len(run.t) > 1:
+        with np.errstate(all="ignore"):
+            moved = np.maximum(bodies.kinetic(run.v[0]), bodies.kinetic(run.v[-1]))
+        first, last = run.recorded["energy"][[0, -1]]
+        return Ends(first, last, moved)
+    if start is None:
+        return None
+    end = run.v[-1], run.y[-1]
+    n, members = len(end[1]), run.status.size
+    made = run.method.evaluations * run.steps if run.paces is None else int(run.paces.evaluations.min(initial=2**62))
+    if run.status.ndim == 0 and n <= FEW_BODIES:
+        return _of_few(bodies, start, end) if made >= FEW_EVALUATIONS else None
+    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
+        return None
+    start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all
+    with np.errstate(all="ignore"):
+        moved = np.maximum(bodies.kinetic(start[0]), bodies.kinetic(end[0]))
+        return Ends(bodies.energy(*start), bodies.energy(*end), moved)
+
+
+def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
+    """The energies of one member, or None where they are not doubtful, which is told without an array."""
+    (first, moved_first), (last, moved_last) = (_summed(bodies, v.tolist(), y.tolist()) for v, y in (start, end))
+    moved = max(moved_first, moved_last)
+    if abs(last - first) <= DOUBTFUL_CHANGE * max(moved, abs(first), abs(last)):
+        return None
+    return Ends(np.asarray(first), np.asarray(last), np.asarray(moved))
+
+
+def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
+    """The energy of one state, of lists or of one number for all of v, and its kinetic part, in floats; NaN if not finite."""
+    if not isinstance(v, list):
+        v = [[v] * len(row) for row in y]
+    masses, soft = bodies.masses.tolist(), float(bodies.softening) ** 2
+    strength = float(bodies.G)
+    newton = bodies.force == "newton"
+    try:
+        kinetic = sum(0.5 * m * sum(x * x for x in row) for m, row in zip(masses, v, strict=True))
+        potential = 0.0
+        for i, (m, place) in enumerate(zip(masses, y, strict=True)):
+            for j in range(i):
+                square = sum((a - b) * (a - b) for a, b in zip(place, y[j], strict=True)) + soft
+                potential += m * masses[j] * (-1.0 / math.sqrt(square) if newton else 0.5 * math.log(square))
+    except (ValueError, ZeroDivisionError):  # two bodies in one place, or what is not finite
+        return math.nan, math.nan
+    return kinetic + strength * potential, kinetic
+
+
+def in_words(index: tuple[int, ...]) -> str:
+    """A member in words, by its place in the batch."""
+    return f"member {index if len(index) != 1 else index[0]}" if index else "the only member"

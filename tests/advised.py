@@ -1,0 +1,117 @@
+"""What the tests of advice have in common: brute force, and what must hold of advice beside it."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.scenes import Scene
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benches.advice import Brute
+
+#: What is advised may cost this many times the cheapest that brute force finds.
+WORTH = 1.5
+
+#: Brute force tries numbers of steps this far apart; no rung of the search's own ladder of 2^(1/8) is meant.
+RATIO = 1.0777
+
+
+#: A built-in scene is made once, for some take long to know their true motion.
+scene_of = functools.cache(sw.scenes.scene)
+
+
+@functools.cache
+def brute_of(name: str, frames: int | None = None) -> Brute:
+    """All that can be tried on a built-in scene, with any steps or in so many frames."""
+    scene = scene_of(name)
+    return Brute(scene, None if frames is None else scene.horizon / frames, RATIO)
+
+
+#: What was measured so far, by what was measured.
+MEASURED: dict[tuple[str, ...], dict[str, float]] = {}
+
+
+@pytest.fixture(autouse=True)
+def _times_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a step takes is measured once for each system and its methods: that is up to a second, and most tests only show it."""
+
+    def once(name: str) -> Any:
+        measure = getattr(sw.advice, name)
+
+        def times(scene: Scene, methods: Any) -> dict[str, float]:
+            key = (name, repr(scene.system), repr(scene.control), *(m.name for m in methods))
+            if key not in MEASURED:
+                MEASURED[key] = measure(scene, methods)
+            return MEASURED[key]
+
+        return times
+
+    for name in ("step_times", "tried_times"):
+        monkeypatch.setattr(f"stepwell.advice.{name}", once(name))
+
+
+@pytest.fixture
+def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every step takes a nanosecond: for tests that rank by evaluations and look at no time."""
+    for name in ("step_times", "tried_times"):
+        monkeypatch.setattr(f"stepwell.advice.{name}", lambda scene, methods: {m.name: 1.0 for m in methods})
+
+
+def assert_true(brute: Brute, advice: sw.advice.Advice) -> None:
+    """Every ranked row, run in full, is as wrong as it says and no more than allowed.
+
+    With a tolerance at whatever times it is asked, for it is one run. Brute force has the true motion from a table that is right
+    to 1e-9, and so has the search.
+    """
+    frames = brute.frames
+    for row in advice.ranked:
+        error = float(advice.scene.state_error(advice.run(row)).max())
+        assert error <= row.error * (1 + 1e-6) + 2e-9
+        assert row.error <= advice.tolerance
+        assert row.evaluations_per_time == row.method.evaluations / row.dt
+        if row.tolerance is not None:
+            assert brute.between(row.method.name, row.tolerance) <= advice.tolerance + 2e-9
+        else:
+            assert brute.advised(row) <= row.error * (1 + 1e-6) + 2e-9
+            assert row.dt == (advice.scene.horizon / row.steps if frames is None else brute.frame / (row.substeps or 0))
+        if frames is not None:
+            assert row.evaluations_per_frame == row.method.evaluations * row.steps / frames
+    costs = [row.method.evaluations * row.steps for row in advice.ranked]
+    assert costs == sorted(costs)
+
+
+def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
+    """Nothing that brute force finds costs less than two thirds."""
+    assert brute.best(advice.tolerance, brute.cost(advice) / WORTH) is None
+
+
+def tried(cases: Mapping[str, Sequence[float]], long: Collection[str] = ()) -> list[Any]:
+    """A scene and a tolerance: by default each scene but the ``long`` once, with one tolerance after the other."""
+    return [
+        pytest.param(name, each, marks=() if i == turn % len(of) and name not in long else pytest.mark.long)
+        for turn, (name, of) in enumerate(cases.items())
+        for i, each in enumerate(of)
+    ]
+
+
+def pendulum(v: float, y: float, horizon: float) -> Scene:
+    return Scene(sw.Pendulum(1.0), v=v, y=y, horizon=horizon)
+
+
+def linear() -> Scene:
+    """Three states, all in one block: one dies at once, two turn."""
+    a = np.array([[-1.0, 5.0, 0.0], [-5.0, -1.0, 0.0], [0.0, 0.0, -20.0]])
+
+    def exact(t: Any) -> Any:
+        c, s, slow = np.cos(5.0 * t), np.sin(5.0 * t), np.exp(-t)
+        return np.zeros((len(t), 0)), np.stack([slow * c, -slow * s, np.exp(-20.0 * t)], axis=-1)
+
+    return Scene(sw.LinearSystem(a, velocities=0), v=np.zeros(0), y=[1.0, 0.0, 1.0], horizon=5.0, exact=exact)

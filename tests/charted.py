@@ -1,0 +1,54 @@
+"""Work-precision charts that several tests look at."""
+
+import functools
+import sys
+
+import pytest
+import stepwell as sw
+from stepwell.charts import measure
+
+#: The scenes with a solution that a fixed step does well; the others have their own test of orders.
+HARD = ("figure_eight", "kepler", "pythagorean", "arenstorf")
+SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and scene.name not in HARD]
+METHODS = sw.methods()
+
+#: The function hides the module of its name.
+LADDER = sys.modules["stepwell.charts.work_precision"]
+
+
+@functools.cache
+def _made():
+    with pytest.MonkeyPatch.context() as patched:
+        hasty(patched)
+        patched.setattr(LADDER, "SMALLEST", 1 / 30)
+        return {scene.name: sw.charts.work_precision(scene) for scene in SCENES}
+
+
+@pytest.fixture(scope="module", name="charts")
+def the_charts():
+    """These scenes by every method: what `stepwell chart` draws, but for the finest rungs of the ladder and with hasty times."""
+    return _made()
+
+
+@pytest.fixture(scope="module", name="whole")
+def the_whole():
+    """These scenes, when they are asked for, on the whole ladder."""
+
+    @functools.cache
+    def chart(name):
+        with pytest.MonkeyPatch.context() as patched:
+            hasty(patched)
+            return sw.charts.work_precision(name, tolerances=[])
+
+    return chart
+
+
+def hasty(patched):
+    """Times of steps are not what is looked at."""
+    patched.setattr(measure, "REPEATS", 2)
+    patched.setattr(measure, "TIMED_SECONDS", 1e-4)
+
+
+@pytest.fixture(scope="module", name="small")
+def the_small():
+    return sw.charts.work_precision("forced_oscillator", ["verlet", "false_euler", "rk4"], [4, 40, 400])

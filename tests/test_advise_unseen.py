@@ -1,0 +1,314 @@
+"""Advice for scenes that it never saw, of any size, and of one's own."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import math
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from advised import RATIO, _times_are_measured_once, assert_cheap, assert_true, linear, pendulum, tried, unmeasured  # noqa: F401
+from stepwell.errors import ArgumentError, DTypeError
+from stepwell.scenes import Scene
+
+from benches.advice import Brute
+
+# ---- scenes that this test makes
+
+
+def driven(damping: float, drive: float) -> Scene:
+    """A damped oscillator under a sinusoid, from rest: the steady swing and the dying one, in closed form."""
+    omega, d = 2.0, damping
+    system = sw.Oscillator(omega, d, a=sw.Sinusoid(1.0, drive), form="physical")
+    s, fast = d * omega, omega * math.sqrt(1 - d * d)
+    below = (omega**2 - drive**2) ** 2 + (2 * s * drive) ** 2
+    p, q = (omega**2 - drive**2) / below, -2 * s * drive / below  # y = p·sin + q·cos for ever
+
+    def exact(t: Any) -> Any:
+        a, b = -q, (-p * drive - s * q) / fast  # the rest: e^(−st)·(a·cos + b·sin), so that y and v begin at 0
+        swing, die = np.sin(drive * t), np.exp(-s * t)
+        y = p * swing + q * np.cos(drive * t) + die * (a * np.cos(fast * t) + b * np.sin(fast * t))
+        v = drive * (p * np.cos(drive * t) - q * swing)
+        v = v + die * ((-s * a + b * fast) * np.cos(fast * t) + (-s * b - a * fast) * np.sin(fast * t))
+        return v, y
+
+    return Scene(system, 0.0, 0.0, 30.0, exact=exact, name="driven")
+
+
+def soft_chain() -> Scene:
+    """A chain of five unequal masses with no formula at all."""
+    system = sw.Chain(5, stiffness=[1.0, 3.0, 2.0, 5.0, 1.0, 4.0], mass=[1.0, 2.0, 0.5, 1.0, 3.0])
+    return Scene(system, v=[0.0, 0.0, 1.0, 0.0, 0.0], y=0.2, horizon=40.0)
+
+
+def stiff_chain() -> Scene:
+    """Springs that differ by ten thousand, so that what is fast is no part of what is seen."""
+    system = sw.Chain(4, stiffness=[1.0, 100.0, 3.0, 1e4, 2.0], mass=[1.0, 0.1, 2.0, 1.0])
+    return Scene(system, v=[0.0, 0.0, 1.0, 0.0], y=0.1, horizon=8.0)
+
+
+def overdamped() -> Scene:
+    system = sw.Oscillator(50.0, 2.0, form="physical")
+    return Scene(system, v=0.0, y=1.0, horizon=5.0)
+
+
+def jolted() -> Scene:
+    """An oscillator whose force jumps."""
+    force = sw.Sampled(np.random.default_rng(3).normal(size=10), interval=0.7)
+    system = sw.Oscillator(2.0, 0.1, a=force, form="physical")
+    return Scene(system, v=0.0, y=0.5, horizon=7.0)
+
+
+HELD_OUT = {
+    "driven": lambda: driven(0.05, 1.3),
+    "resonant": lambda: driven(0.02, 2.0),
+    "chain of 3": lambda: sw.scenes.chain(3),
+    "chain of 15": lambda: sw.scenes.chain(15),
+    "unequal chain": soft_chain,
+    "stiff chain": stiff_chain,
+    "ellipse": lambda: sw.scenes.kepler(0.5),
+    "uneven ellipse": lambda: sw.scenes.kepler(0.3, 0.1),
+    "long ellipse": lambda: sw.scenes.kepler(0.95, 0.3),
+    "over the top": lambda: pendulum(2.5, 0.0, 30.0),
+    "nearly upright": lambda: pendulum(0.0, 3.1, 30.0),
+    "overdamped": overdamped,
+    "one block": linear,
+    "jolted": jolted,
+    "controlled": lambda: replace(sw.scenes.clover(), control=sw.EnergyControl(0.3)),
+    "four stars": lambda: replace(sw.scenes.plummer(4), horizon=3.0),
+}
+
+#: Of scenes that take long one tolerance is tried.
+LONG = {
+    "chain of 3": 5e-2,
+    "chain of 15": 2e-3,
+    "unequal chain": 3e-5,
+    "stiff chain": 5e-2,
+    "uneven ellipse": 5e-2,
+    "long ellipse": 3e-5,
+    "over the top": 2e-3,
+    "nearly upright": 5e-2,
+    "one block": 2e-3,
+    "jolted": 2e-3,
+    "controlled": 3e-5,
+    "four stars": 5e-2,
+}
+UNSEEN = {name: (LONG[name],) if name in LONG else (5e-2, 2e-3, 3e-5) for name in HELD_OUT}
+
+#: Of these there is another of the same kind, which is quicker.
+FURTHER = (
+    "resonant",
+    "chain of 3",
+    "chain of 15",
+    "unequal chain",
+    "uneven ellipse",
+    "long ellipse",
+    "nearly upright",
+    "four stars",
+)
+
+
+@functools.cache
+def held_out(name: str) -> Brute:
+    return Brute(HELD_OUT[name](), None, RATIO)
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("name", "tolerance"), tried(UNSEEN, FURTHER))
+def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
+    brute = held_out(name)
+    advice = sw.advise(brute.given, frame=None, tolerance=tolerance, cost="evaluations")
+    assert advice.best is not None
+    assert_true(brute, advice)
+    assert_cheap(brute, advice)
+
+
+FRAMED = {"over the top": lambda: pendulum(2.5, 0.0, 30.0), "ellipse": lambda: sw.scenes.kepler(0.6)}
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(
+    ("name", "frame"), [("over the top", 0.9), pytest.param("over the top", 100.0, marks=pytest.mark.long), ("ellipse", 7.3)]
+)
+def test_frames_that_do_not_divide_the_horizon(name: str, frame: float) -> None:
+    """The last one ends beyond it, where the true motion is known too."""
+    brute = Brute(FRAMED[name](), frame, RATIO)
+    advice = sw.advise(brute.given, frame=frame, tolerance=1e-3, cost="evaluations")
+    assert advice.best is not None
+    assert not advice.cut
+    assert_true(brute, advice)
+    assert_cheap(brute, advice)
+
+
+def test_a_motion_that_is_not_known_to_the_end_of_the_first_frame_is_no_scene_to_judge_by() -> None:
+    chaos = replace(sw.scenes.energy_control(), horizon=200.0)
+    with pytest.raises(ArgumentError, match=r"is not known beyond t = .*, within the first frame"):
+        sw.advise(chaos, frame=100.0, tolerance=1e-2, methods=["rk4"])
+
+
+# ---- motions of any size, scenes of one's own
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize("known", [True, False])
+def test_amplitudes_do_not_matter(known: bool) -> None:
+    """From 1e-12 to 1e12 the advice is the same, by a formula or by a tight run; for powers of two to the bit."""
+
+    def advised(size: float) -> sw.advice.Advice:
+        exact = (lambda t: (-size * np.sin(t), size * np.cos(t))) if known else None
+        scene = Scene(sw.Oscillator(1.0), v=0.0, y=size, horizon=40.0, exact=exact)
+        return sw.advise(scene, frame=None, tolerance=1e-3, methods=["rk4", "dop853"], cost="evaluations")
+
+    one = advised(1.0)
+    assert {row.by for row in one.ranked} == {"step", "tolerance"}
+    for size in (2.0**-40, 2.0**40):
+        assert advised(size).ranked == one.ranked
+    for size in (1e-12, 1e-9, 1e-7, 1e-6, 1e12):
+        for ours, theirs in zip(advised(size).ranked, one.ranked, strict=True):
+            assert (ours.name, ours.steps, ours.tolerance) == (theirs.name, theirs.steps, theirs.tolerance)
+            assert ours.error == pytest.approx(theirs.error, rel=1e-6)
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize("force", [1e-12, 1e-6, 1e9])
+def test_from_rest_under_a_force(force: float) -> None:
+    system = sw.Oscillator(1.0, a=sw.Sinusoid(force, 2.0), form="physical")
+    scene = Scene(system, v=0, y=0, horizon=40.0)
+    advice = sw.advise(scene, frame=None, tolerance=1e-3, methods=["rk4", "dop853"], cost="evaluations")
+    t = np.linspace(0.0, 40.0, 4001)
+    true = replace(
+        scene, exact=lambda t: (force * (2 * np.cos(t) - 2 * np.cos(2 * t)) / 3, force * (2 * np.sin(t) - np.sin(2 * t)) / 3)
+    )
+    assert len(advice.ranked) >= 2
+    for row in advice.ranked:
+        if row.tolerance is None:
+            run = true.run(row.method, row.dt, steps=row.steps, every=1)
+        else:
+            run = sw.integrate(system, row.method, v=0.0, y=0.0, tolerance=row.tolerance, at=t)
+        assert true.state_error(run).max() <= 1e-3
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(("scene", "exact"), [(lambda: sw.scenes.kepler(0.95), None), (lambda: sw.scenes.pendulum(179.0), None)])
+def test_a_hard_part_does_not_end_what_is_known(scene: Any, exact: None) -> None:
+    """A loose tolerance asks for a truth that is a tenth as loose, so it is judged to the end and true there."""
+    given = scene()
+    advice = sw.advise(replace(given, exact=exact), frame=None, tolerance=1e-1, methods=["dop853", "merson"], cost="evaluations")
+    assert not advice.cut
+    assert advice.scene.horizon == given.horizon
+    for row in advice.ranked:
+        run = advice.run(row)
+        assert given.state_error(run).max() <= 1e-1
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
+    """Asked for the end alone, for a few times or for thousands: one run."""
+    scene = sw.scenes.kepler(0.3)
+    scene = replace(scene, horizon=20.0 * math.pi)
+    rng = np.random.default_rng(11)
+    for tolerance in (1e-2, 1e-4):
+        advice = sw.advise(scene, frame=None, tolerance=tolerance, cost="evaluations")
+        for row in (row for row in advice.ranked if row.tolerance is not None):
+            for number in (0, 1, 3, 30, 3000):
+                at = np.union1d(rng.uniform(0.0, scene.horizon, number), [scene.horizon])
+                run = sw.integrate(scene.system, row.method, v=scene.v, y=scene.y, tolerance=row.tolerance, at=at)
+                assert scene.state_error(run).max() <= tolerance
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "said"),
+    [
+        ({"system": 3}, DTypeError, "system: expected a stepwell system such as Oscillator(), got int"),
+        ({"v": "fast"}, DTypeError, "v: expected real numbers"),
+        ({"v": [0.0, 1.0]}, ArgumentError, "v: expected shape () of a scene's one member, got (2,)"),
+        ({"y": math.nan}, ArgumentError, "y: expected finite numbers"),
+        (
+            {"system": sw.Pendulum([1.0, 2.0])},
+            ArgumentError,
+            "system: expected a system of one member, got parameters of shape (2,)",
+        ),
+        (
+            {"horizon": None},
+            ArgumentError,
+            "horizon: expected the time over which errors are measured, in units of time, got None",
+        ),
+        ({"horizon": math.nan}, ArgumentError, "horizon: expected finite numbers in units of time"),
+        ({"horizon": -1.0}, ArgumentError, "horizon: expected numbers above zero"),
+        ({"dt": 0.0}, ArgumentError, "dt: expected numbers above zero"),
+        ({"until": -1.0}, ArgumentError, "until: expected a time of zero or more"),
+        ({"exact": 3.0}, DTypeError, "exact: expected a function of times, or None, got float"),
+        ({"control": "on"}, DTypeError, "control: expected an EnergyControl, a Control or a Projection, got str"),
+    ],
+)
+def test_what_is_no_scene(given: dict[str, Any], error: type[Exception], said: str) -> None:
+    with pytest.raises(error) as raised:
+        Scene(**({"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "horizon": 10.0} | given))
+    assert said in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("exact", "error", "said"),
+    [
+        (
+            lambda t: (np.cos(t), np.where(t < 3.0, t, np.nan)),
+            ArgumentError,
+            "exact: expected finite numbers, got y = nan at t = 3",
+        ),
+        (lambda t: np.cos(t)[0], ArgumentError, "exact: expected the blocks v and y, arrays of real numbers, got float64"),
+        (
+            lambda t: (np.cos(t), np.zeros((len(t), 2))),
+            ArgumentError,
+            "exact: expected y of shape (1001,) for 1001 times, got (1001, 2)",
+        ),
+    ],
+)
+def test_what_is_no_exact_solution(exact: Any, error: type[Exception], said: str) -> None:
+    scene = Scene(sw.Pendulum(), v=0.0, y=1.0, horizon=10.0, exact=exact)
+    with pytest.raises(error) as raised:
+        sw.advise(scene, frame=None)
+    assert said in str(raised.value)
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_a_scene_needs_three_things_beside_its_system() -> None:
+    """Numbers and lists for blocks, and all else by itself; ``until`` says how far if ``horizon`` does not."""
+    scene = sw.Scene(sw.Chain(3), v=0, y=[0.0, 1, 0], until=20)
+    assert (scene.v.shape, scene.y.shape, scene.horizon, scene.dt) == ((3,), (3,), 20.0, 0.02)
+    assert scene == Scene(sw.Chain(3), v=np.zeros(3), y=np.array([0.0, 1.0, 0.0]), horizon=20.0, until=20.0)
+    advice = sw.advise(scene, frame=None, tolerance=1e-2, methods=["leapfrog"], cost="evaluations")
+    assert advice.best is not None
+    assert not advice.cut
+    at_rest = sw.advise(Scene(sw.Chain(3), v=0, y=0, horizon=20.0), frame=None, methods=["leapfrog", "merson"])
+    assert at_rest.best is not None
+    assert at_rest.best.error == 0.0
+
+
+def test_what_is_too_large_or_too_long_is_refused_at_once() -> None:
+    large = Scene(sw.NBody(np.ones(30_000), force="newton", dim=2), v=0.0, y=1.0, horizon=1.0)
+    with pytest.raises(ArgumentError, match="scene: expected a state of at most 100000 numbers, got one of 120000"):
+        sw.advise(large)
+    with pytest.raises(ArgumentError, match=r"frame: expected at most 100 times the horizon of 62\.83.* got 1e\+09"):
+        sw.advise("oscillator", frame=1e9)
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_scenes_and_advice_go_through_a_file() -> None:
+    for scene in sw.scenes.scenes():
+        for other in (pickle.loads(pickle.dumps(scene)), copy.copy(scene), copy.deepcopy(scene)):
+            assert other == scene
+            assert hash(other) == hash(scene)
+    assert sw.scenes.kepler(0.5) == sw.scenes.kepler(0.5) != sw.scenes.kepler(0.6)
+    assert replace(sw.scenes.clover(), dt=0.2) != sw.scenes.clover()
+    for scene in ("clover", Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)):
+        advice = sw.advise(scene, frame=None, tolerance=1e-2, methods=["rk4", "merson", "verlet"], cost="evaluations")
+        for other in (pickle.loads(pickle.dumps(advice)), copy.deepcopy(advice)):
+            assert other == advice
+            assert hash(other) == hash(advice)
+            assert str(other) == str(advice)
+            assert np.array_equal(other.run().y, advice.run().y)

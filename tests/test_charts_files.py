@@ -1,0 +1,269 @@
+"""Work-precision charts: peers, the panel, what is refused, files and the picture."""
+
+import csv
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+import stepwell as sw
+from charted import METHODS, SCENES, the_charts, the_small  # noqa: F401
+from stepwell.charts import data, measure, peers, style
+from stepwell.errors import ArgumentError, DTypeError, UnknownNameError, UnsupportedError
+
+
+def read(path):
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# ---- peers
+
+
+def perfect(scene, times, tolerance):
+    """A peer that knows the solution and misses it by the tolerance."""
+    v, y = scene.exact(times)
+    return peers.Solved(v, y + tolerance, round(-100 * math.log10(tolerance)), 1e-3)
+
+
+def test_a_peer_is_on_the_same_axes(tmp_path):
+    def cannot(scene, times, setting):
+        raise UnsupportedError("it has no springs")
+
+    coarse = peers.Peer("in steps", perfect, (0.01, 0.1), by="step")
+    chart = sw.charts.work_precision("oscillator", ["rk4"], [100, 200], tolerances=[], peers=[perfect, coarse, cannot])
+    assert [curve.name for curve in chart.curves] == ["rk4", "perfect", "in steps"]
+    assert chart.refused == {"cannot": "it has no springs"}
+    curve = chart.curves[1]
+    assert [point.tolerance for point in curve.points] == list(peers.TOLERANCES)
+    for point in curve.points:
+        assert point.state_error == pytest.approx(point.tolerance, rel=1e-3)
+        assert point.cost == round(-100 * math.log10(point.tolerance)) / chart.scene.horizon
+    assert curve.time(0, "single").median == pytest.approx(1e6 / chart.scene.horizon)
+    assert [point.dt for point in chart.curves[2].points] == [0.1, 0.01]
+    assert {row["method"] for row in chart.front()} >= {"perfect"}
+    chart.plot(tmp_path / "peers.png", time="single", error="end_error")
+    chart.to_csv(tmp_path / "peers.csv")
+    chart.to_json(tmp_path / "peers.json")
+
+
+def test_a_peer_that_is_not_installed_says_so(monkeypatch):
+    for module, make in (("scipy.integrate", peers.scipy), ("heyoka", peers.heyoka), ("rebound", peers.rebound)):
+        monkeypatch.setitem(sys.modules, module, None)
+        name = module.split(".")[0]
+        with pytest.raises(UnsupportedError, match=f"peers: {name} is not installed; pip install {name}"):
+            make()
+
+
+@pytest.mark.parametrize(
+    ("package", "make", "scene"),
+    [
+        ("scipy", lambda: peers.scipy("DOP853", (1e-4, 1e-10)), "oscillator"),
+        ("scipy", lambda: peers.scipy("RK45", (1e-4, 1e-10)), "figure_eight"),
+        ("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "chain"),
+        ("heyoka", lambda: peers.heyoka((1e-4, 1e-10)), "figure_eight"),
+        ("rebound", lambda: peers.rebound("bs", (1e-4, 1e-10)), "figure_eight"),
+        ("rebound", lambda: peers.rebound("leapfrog", (0.1, 0.001)), "figure_eight"),
+    ],
+)
+def test_a_real_peer_solves_the_scene(package, make, scene):
+    pytest.importorskip(package)
+    curve = sw.charts.work_precision(scene, ["rk4"], [400], tolerances=[], peers=[make()]).curves[-1]
+    coarse, fine = curve.points
+    assert fine.state_error < min(1e-3, 0.1 * coarse.state_error)
+    assert fine.cost >= coarse.cost > 0
+
+
+# ---- the panel
+
+
+def test_a_panel_is_its_charts(tmp_path):
+    panel = sw.charts.panel(["oscillator", "clover", "chain", "kepler"], methods=["rk4", "merson"], steps=[400, 4000])
+    assert [chart.scene.name for chart in panel.charts] == ["oscillator", "clover", "chain", "kepler"]
+    figure = panel.plot(tmp_path / "panel.png")
+    assert [axes.get_title(loc="left").strip() for axes in figure.axes] == [chart.scene.title for chart in panel.charts]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "Runge-Kutta 4",
+        "RK-Merson",
+        "RK-Merson, tolerance",
+        "the cheapest of all for its error",
+    ]
+    legend = figure.legends[0].get_window_extent()
+    assert not any(axes.get_tightbbox().overlaps(legend) for axes in figure.axes)
+    panel.to_csv(tmp_path / "panel.csv")
+    assert len(read(tmp_path / "panel.csv")) == len(panel.rows()) == sum(len(chart.rows()) for chart in panel.charts)
+    panel.to_json(tmp_path / "panel.json")
+    whole = json.loads((tmp_path / "panel.json").read_text(encoding="utf-8"))
+    assert [len(each["front"]) for each in whole] == [len(chart.front()) for chart in panel.charts]
+    with pytest.raises(ArgumentError, match="scenes: expected at least one, got none"):
+        sw.charts.panel([])
+    with pytest.raises(DTypeError, match="scenes: expected a list of scenes"):
+        sw.charts.panel("clover")
+
+
+# ---- what is refused
+
+
+def test_a_refused_method_is_named_with_the_reason(small, tmp_path):
+    assert [curve.name for curve in small.curves] == ["false_euler", "rk4"]
+    assert list(small.refused) == ["verlet"]
+    assert "has damping" in small.refused["verlet"]
+    small.to_csv(tmp_path / "chart.csv")
+    rows = read(tmp_path / "chart.csv")
+    assert [(row["method"], row["refused"], row["cost"]) for row in rows if row["refused"]] == [
+        ("verlet", small.refused["verlet"], "")
+    ]
+    assert "Verlet is refused" in " ".join(text.get_text() for text in small.plot().texts).replace("\n", " ")
+
+
+def test_a_scene_that_only_refuses_can_still_be_drawn_and_written(tmp_path):
+    chart = sw.charts.work_precision("forced_oscillator", ["verlet"], [100])
+    assert (chart.curves, chart.summary()) == ((), [])
+    chart.plot(tmp_path / "chart.png")
+    chart.to_csv(tmp_path / "chart.csv")
+    assert "verlet" in (tmp_path / "chart.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("clovr",), UnknownNameError, "did you mean 'clover'"),
+        ((3,), DTypeError, "scene: expected a Scene or its name, got int"),
+        (("clover", ["rk5"]), UnknownNameError, "did you mean 'rk4'"),
+        (("clover", "rk4"), DTypeError, "methods: expected a list of names, got 'rk4'"),
+        (("clover", []), ArgumentError, "methods: expected at least one, got none"),
+        (("clover", None, []), ArgumentError, "steps: expected at least one, got none"),
+        (("clover", None, [3]), ArgumentError, "steps: expected 4 or more"),
+        (("clover", None, [4.5]), DTypeError, "steps: expected a whole number"),
+        (("clover", None, None, [0.0]), ArgumentError, "tolerances: expected"),
+    ],
+)
+def test_what_cannot_be_charted_is_said(arguments, error, message):
+    with pytest.raises(error, match=message):
+        sw.charts.work_precision(*arguments[:3], **({"tolerances": arguments[3]} if len(arguments) > 3 else {}))
+
+
+# ---- files
+
+
+def test_the_csv_reads_back_as_the_same_numbers(charts, tmp_path):
+    for name, chart in charts.items():
+        chart.to_csv(tmp_path / f"{name}.csv")
+        found_rows = read(tmp_path / f"{name}.csv")
+        rows = chart.rows()
+        assert len(found_rows) == len(rows) == sum(len(c.points) for c in chart.curves) + len(chart.refused)
+        for found, wanted in zip(found_rows, rows, strict=True):
+            assert list(found) == list(wanted)
+            for key, value in wanted.items():
+                if value is None or found[key] == "":
+                    assert found[key] == ("" if value is None else value)
+                    continue
+                kind = bool if isinstance(value, bool) else type(value)
+                assert {"True": True, "False": False}[found[key]] is value if kind is bool else kind(found[key]) == value
+
+
+def test_the_measured_columns_are_those_of_the_counted_step(small):
+    for curve in small.curves:
+        rows = [row for row in small.rows() if row["method"] == curve.name]
+        for row, point in zip(rows, curve.points, strict=True):
+            assert row["measured_ns_per_time_median"] == curve.step_time.median / point.dt
+            assert row["measured_ns_per_time_single_median"] == curve.single_time.median / point.dt
+            assert row["measured_ns_per_time_low"] <= row["measured_ns_per_time_median"] <= row["measured_ns_per_time_high"]
+
+
+def test_the_json_is_strict_and_whole(small, tmp_path):
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    small.to_json(tmp_path / "chart.json")
+    whole = json.loads((tmp_path / "chart.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    assert whole["scene"]["name"] == "forced_oscillator"
+    assert whole["refused"] == small.refused
+    assert whole["measured_on"] == {"members": 4096, "threads": 1, "repeats": measure.REPEATS, "isa": sw.isa()}
+    assert [row["state_error"] for row in whole["rows"][:3]] == [p.state_error for p in small.curves[0].points]
+    assert [row["method"] for row in whole["summary"]] == ["false_euler", "rk4"]
+    assert data.finite({"a": [math.inf, 1.0], "b": math.nan}) == {"a": [None, 1.0], "b": None}
+
+
+def test_the_summary_is_what_the_points_say(charts):
+    for chart in charts.values():
+        for row, curve in zip(chart.summary(), chart.curves, strict=True):
+            assert row["least_error"] == min((p.state_error for p in curve.usable), default=math.inf)
+            for error in data.TARGETS:
+                cost = row[f"cost_at_error_{error:g}"]
+                better = [p.cost for p in curve.points if not p.unstable and p.state_error <= error]
+                assert cost == (min(better) if better else math.inf)
+
+
+# ---- the picture
+
+
+def test_methods_are_told_apart_without_colour():
+    looks = [style.look(method) for method in METHODS]
+    assert len({look["marker"] for look in looks}) == len({look["color"] for look in looks}) == len(METHODS)
+    assert len({str(look["linestyle"]) for look in looks}) == len({method.order for method in METHODS})
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
+def test_nothing_in_the_picture_is_cut_off_or_covered(charts, scene, tmp_path):
+    chart = charts[scene.name]
+    figure = chart.plot(tmp_path / "chart.png")
+    width, height = np.frombuffer((tmp_path / "chart.png").read_bytes()[16:24], ">u4")
+    assert (width, height) == (1600, 900)
+
+    page = figure.bbox
+    panels = [axes.get_tightbbox() for axes in figure.axes]
+    texts = [text for text in figure.texts if text.get_text()]
+    beside = [figure.legends[0].get_window_extent(), *(text.get_window_extent() for text in texts)]
+    for box in (*panels, *beside):
+        assert page.x0 <= box.x0 < box.x1 <= page.x1
+        assert page.y0 <= box.y0 < box.y1 <= page.y1
+    for i, box in enumerate(beside):
+        assert not any(box.overlaps(other) for other in (*panels, *beside[:i]))
+
+
+def test_every_point_is_in_the_picture(charts):
+    """Below 1 as a point of a curve, or above it as a mark; each unstable method's own marker where it falls off."""
+    chart = charts["oscillator"]
+    figure = chart.plot()
+    curves, marks = figure.axes[0], figure.axes[2]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels.pop() == "the cheapest of all for its error"
+    assert [label.split(", order")[0] for label in labels] == [curve.title for curve in chart.curves]
+    for row, curve in enumerate(chart.curves):
+        line = curves.lines[row]
+        shown = [(x, y) for x, y in line.get_xydata().tolist() if math.isfinite(y)]
+        assert shown == [(p.cost, p.state_error) for p in curve.points if p.usable]
+        of_row = [mark for mark in marks.lines if len(mark.get_ydata()) and set(mark.get_ydata()) == {row}]
+        crosses = [x for mark in of_row if mark.get_marker() == "x" for x in mark.get_xdata()]
+        assert crosses == [p.cost for p in curve.points if p.unstable]
+        if curve.by == "tolerance":
+            continue
+        own = [mark.get_xdata()[0] for mark in of_row if mark.get_marker() == style.look(curve.method)["marker"]]
+        assert curve.method.evaluations / curve.largest_stable_step in own
+
+
+def test_an_unknown_kind_of_picture_is_refused(small, tmp_path):
+    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
+        small.plot(tmp_path / "chart.docx")
+
+
+def test_without_matplotlib_the_numbers_are_still_there(small, monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
+    with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
+        small.plot()
+    small.to_csv(tmp_path / "chart.csv")
+
+
+def test_both_arithmetics_are_charted():
+    chart = sw.charts.work_precision("oscillator", ["false_euler", "rk4"], [50, 100, 500, 2000], tolerances=(), fused="both")
+    assert [curve.name for curve in chart.curves] == ["false_euler", "rk4", "false_euler, fused", "rk4, fused"]
+    plain, fused = (chart.curves[i].points for i in (1, 3))
+    # The method's error is the same; rounding is not.
+    assert [p.state_error for p in plain] != [p.state_error for p in fused]
+    np.testing.assert_allclose([p.state_error for p in plain], [p.state_error for p in fused], rtol=1e-3)
+    assert {row["method"] for row in chart.rows()} == {curve.name for curve in chart.curves}
+    chart.plot()
+    with pytest.raises(sw.errors.UnknownNameError, match="fused: there is no 'all'"):
+        sw.charts.work_precision("oscillator", fused="all")
