@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 use stepwell_core::{
     bodies, controls,
@@ -11,7 +13,10 @@ use stepwell_core::{
     spec::{Given, Parameters},
     steppers::RECORDS,
     system::{self, Make, Shape, System},
-    systems::KINDS,
+    systems::{
+        KINDS,
+        equations::{Equations, Invariant},
+    },
     tape::{Counts, Id, Op, Tape, eval},
 };
 
@@ -132,7 +137,32 @@ fn systems() -> Vec<Given> {
         all.extend(CONTROLS.iter().flat_map(|control| [bodies(3, 2, force, control), bodies(10, 3, force, control)]));
     }
     all.push(bodies(35, 2, "newton", &[]));
+    all.extend(own());
     all
+}
+
+/// Equations of a user's own: a force p·x(t) − p·y, the same with a rate of y, with a choice that depends on v, and with an invariant.
+fn own() -> [Given; 4] {
+    let system = |control: &[(&str, &str)], equations: Equations| {
+        let rows = [("p", 1), ("control.target", 1)];
+        let given = given("equations", control, &[], &rows[..if control.is_empty() { 1 } else { 2 }], &["x"]);
+        Given { equations: Some(Arc::new(equations)), ..given }
+    };
+    let leaves = [Op::State(0), Op::State(1), Op::Param(0), Op::Time, Op::Sample(0, 3)];
+    let force = [&leaves[..], &[Op::Sub(4, 1), Op::Mul(2, 5)]].concat();
+    let rate = [&force[..], &[Op::Mul(0, 2), Op::Sqrt(7)]].concat();
+    let choice = [&force[..], &[Op::Less(0, 1), Op::Select(7, 0, 6)]].concat();
+    // p·y²/2 + v²/2, with its derivatives p·y and v, and the square of their length.
+    let half = Op::Const(0.5_f64.to_bits());
+    let energy =
+        [half, Op::Mul(2, 1), Op::Mul(8, 1), Op::Mul(0, 0), Op::Add(9, 10), Op::Mul(7, 11), Op::Mul(8, 8), Op::Add(13, 10)];
+    let kept = Invariant { value: 12, along_v: vec![0], along_y: vec![8], square: 14 };
+    [
+        system(&[], Equations::new(force.clone(), vec![6], None, Vec::new(), None)),
+        system(&[], Equations::new(rate, vec![6], Some(vec![8]), Vec::new(), None)),
+        system(&[], Equations::new(choice, vec![8], None, Vec::new(), None)),
+        system(&CONTROLS[3], Equations::new([&force[..], &energy].concat(), vec![6], None, Vec::new(), Some(kept))),
+    ]
 }
 
 /// What a step makes: the state, then the tally.
