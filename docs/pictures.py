@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import io
 import re
+import runpy
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +54,17 @@ def write_best(panel: sw.charts.Panel) -> None:
     page = DOCS / "work-precision.md"
     page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
     print("docs/work-precision.md")
+
+
+def examples() -> None:
+    """The pictures of the examples of own equations, drawn by these."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file in sorted((DOCS.parent / "examples" / "equations").glob("*.py")):
+            runpy.run_path(str(file))["main"](Path(folder))
+            drawn = Image.open(Path(folder) / f"{file.stem}.png").convert("RGB")
+            drawn = drawn.convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS)
+            drawn.save(IMAGES / "equations" / f"{file.stem}.png", optimize=True)
+            print(f"docs/images/equations/{file.stem}.png")
 
 
 def tape() -> Figure:
@@ -118,6 +131,7 @@ def tape() -> Figure:
 
 if __name__ == "__main__":
     write("tape.png", tape())
+    examples()
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panel = sw.charts.panel(each.name for each in sw.scenes.scenes())
