@@ -28,6 +28,8 @@ PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL
 
 #: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades want more.
 COLOURS, SHADES = 64, 256
+#: The picture of an example has as many colours as fit into so many bytes.
+MOST_BYTES = 60 * 1024
 
 #: The methods whose maps are shown.
 MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4", "merson", "fehlberg_5")
@@ -62,8 +64,12 @@ def examples() -> None:
         for file in sorted((DOCS.parent / "examples" / "equations").glob("*.py")):
             runpy.run_path(str(file))["main"](Path(folder))
             drawn = Image.open(Path(folder) / f"{file.stem}.png").convert("RGB")
-            drawn = drawn.convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS)
-            drawn.save(IMAGES / "equations" / f"{file.stem}.png", optimize=True)
+            written = IMAGES / "equations" / file.name.replace(".py", ".png")
+            for colours in (256, COLOURS, 32, 16):
+                few = drawn.convert("P", palette=Image.Palette.ADAPTIVE, colors=colours).convert("RGB")
+                few.save(written, optimize=True)
+                if written.stat().st_size <= MOST_BYTES:
+                    break
             print(f"docs/images/equations/{file.stem}.png")
 
 

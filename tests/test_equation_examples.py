@@ -16,7 +16,7 @@ LAST_LINES = {
     "cart_pole": "6106 of 10100 poles are caught, all those that the two laws tell and no other",
     "double_pendulum": "energy after 120 s: -0.759 J alone, +0.00000 J with a projection",
     "epidemic": "at R0 = 2 79.68 % fall ill; the formula says 79.68 %",
-    "luneburg_lens": "19 rays pass the focus within 0.0020 radii",
+    "luneburg_lens": "13 rays pass the focus within 2e-08 radii",
     "neuron": "fires from 6.5 µA/cm² on, with 55 Hz; rest is unstable beyond 9.78",
     "oscillator_circuit": "period 6.2871 at µ = 0.1, 34.608 at µ = 20; the two laws say 6.2871 and 34.784",
     "predators": "mean prey over 1000 years: 4.0056 thousand; in equilibrium 4.0000",

@@ -47,7 +47,7 @@ def main(folder: Path) -> None:
     axes.set_yticks([5, 10, 20, 40], ["5", "10", "20", "40"])
     axes.minorticks_off()
     axes.set(xlabel="strength of the triode µ", ylabel="period, in units of √(LC)")
-    axes.set_title("Van der Pol's oscillator changes from one law to the other")
+    axes.set_title("Weak and strong triodes follow two known laws")
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(folder / "oscillator_circuit.png")
     print(f"period {period[0]:.4f} at µ = 0.1, {period[-1]:.3f} at µ = 20; the two laws say {weak[0]:.4f} and {strong[-1]:.3f}")
