@@ -15,19 +15,19 @@ G, LENGTH, MASS = 9.81, 1.0, 1.0  # m/s², of each rod in m, of each bob in kg
 
 
 @sw.system
-def double_pendulum(t, v, y, *, g=G, l=LENGTH):  # noqa: E741
+def double_pendulum(t, v, y, *, g=G, rod=LENGTH):
     a, b = y  # angles from straight down, in rad
     sine, cosine = np.sin(a - b), np.cos(a - b)
     matrix = 2.0 - cosine**2
-    left = -(v[1] ** 2) * sine - 2.0 * g / l * np.sin(a)
-    right = v[0] ** 2 * sine - g / l * np.sin(b)
+    left = -(v[1] ** 2) * sine - 2.0 * g / rod * np.sin(a)
+    right = v[0] ** 2 * sine - g / rod * np.sin(b)
     return np.array([(left - cosine * right) / matrix, (2.0 * right - cosine * left) / matrix])
 
 
 @double_pendulum.invariant
-def energy(v, y, *, g, l):  # noqa: E741
-    kinetic = l**2 * (v[0] ** 2 + 0.5 * v[1] ** 2 + v[0] * v[1] * np.cos(y[0] - y[1]))
-    return MASS * (kinetic - g * l * (2.0 * np.cos(y[0]) + np.cos(y[1])))
+def energy(v, y, *, g, rod):
+    kinetic = rod**2 * (v[0] ** 2 + 0.5 * v[1] ** 2 + v[0] * v[1] * np.cos(y[0] - y[1]))
+    return MASS * (kinetic - g * rod * (2.0 * np.cos(y[0]) + np.cos(y[1])))
 
 
 #: For the command line too: stepwell run double_pendulum.py --method rk4
