@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import io
 import re
+import runpy
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +28,8 @@ PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL
 
 #: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades want more.
 COLOURS, SHADES = 64, 256
+#: The picture of an example has as many colours as fit into so many bytes.
+MOST_BYTES = 60 * 1024
 
 #: The methods whose maps are shown.
 MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4", "merson", "fehlberg_5")
@@ -52,6 +56,21 @@ def write_best(panel: sw.charts.Panel) -> None:
     page = DOCS / "work-precision.md"
     page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
     print("docs/work-precision.md")
+
+
+def examples() -> None:
+    """The pictures of the examples of own equations, drawn by these."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file in sorted((DOCS.parent / "examples" / "equations").glob("*.py")):
+            runpy.run_path(str(file))["main"](Path(folder))
+            drawn = Image.open(Path(folder) / f"{file.stem}.png").convert("RGB")
+            written = IMAGES / "equations" / file.name.replace(".py", ".png")
+            for colours in (256, COLOURS, 32, 16):
+                few = drawn.convert("P", palette=Image.Palette.ADAPTIVE, colors=colours).convert("RGB")
+                few.save(written, optimize=True)
+                if written.stat().st_size <= MOST_BYTES:
+                    break
+            print(f"docs/images/equations/{file.stem}.png")
 
 
 def tape() -> Figure:
@@ -119,6 +138,7 @@ def tape() -> Figure:
 
 if __name__ == "__main__":
     write("tape.png", tape())
+    examples()
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panel = sw.charts.panel(each.name for each in sw.scenes.scenes())
