@@ -20,7 +20,7 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, explanation, exports, scenes, stability
+    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, scenes, stability
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
@@ -63,6 +63,7 @@ __all__ = [
     "criteria",
     "derivatives",
     "dynamics",
+    "equations",
     "equilibria",
     "errors",
     "explain",
@@ -112,6 +113,7 @@ _LATER = {
     "explain": "explanation.explain",
     "explanation": "explanation",
     "ExportedStep": "exports.ExportedStep",
+    "equations": "equations",
     "export": "exports.export",
     "exports": "exports",
     "scenes": "scenes",
