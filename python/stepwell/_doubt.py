@@ -55,7 +55,7 @@ def _of_energy(method: str, ends: Ends) -> str | None:
     first, last, moved = ends
     with np.errstate(all="ignore"):
         wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
-    wrong &= np.isfinite(last)  # who diverged was named before
+    wrong &= np.isfinite(last)  # members that diverged were named before
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
