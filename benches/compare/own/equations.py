@@ -1,7 +1,7 @@
 """The equations: once as users of stepwell write them, and once as assignments for everybody else.
 
-NumPy, numba, heyoka, JAX and SciPy all read the same assignments, each with its own exp, sin and cos. A test holds the two against
-each other.
+NumPy, numba, heyoka, JAX and SciPy all read the same assignments, each with its own exp, sin and cos. A test holds the two
+against each other.
 """
 
 from __future__ import annotations
@@ -272,7 +272,11 @@ EQUATIONS = [
         d_f0 = back_s0 - from_f0
         """,
         {
-            **{"s0": (0.5, 1.5), "s1": (0.0, 0.5), "s2": (0.0, 0.5), "e": (0.5, 1.0), "f": (0.5, 1.0)},
+            "s0": (0.5, 1.5),
+            "s1": (0.0, 0.5),
+            "s2": (0.0, 0.5),
+            "e": (0.5, 1.0),
+            "f": (0.5, 1.0),
             **dict.fromkeys(("e0", "e1", "f2", "f1", "f0"), (0.0, 0.2)),
         },
         {"bind": (1.0, 3.0), "turn": (0.5, 1.0), "release": (0.3, 0.7)},

@@ -20,7 +20,7 @@ from . import Contestant, Ready, Workload, fastest
 from .numba_peer import module, polynomial_sine
 
 #: Members of a block, and steps at each visit of it.
-SHAPES = list(product((16, 32, 64, 128, 256), (1,))) + [(64, 2)]
+SHAPES = [(16, 1), (32, 1), (64, 1), (128, 1), (256, 1), (64, 2)]
 #: What numba may do: nothing; contract to FMA; and reorder, besides.
 EXACT, CONTRACT, FAST = False, frozenset({"contract"}), True
 
@@ -31,7 +31,9 @@ def polynomial_exp(x):
     r = (x - n * 0.6931471803691238) - n * 1.9082149292705877e-10
     z = r * r
     w = z * z
-    even = (1.0 + z * 0.5) + w * ((1.0 / 24 + z * (1.0 / 720)) + w * ((1.0 / 40320 + z * (1.0 / 3628800)) + w * (1.0 / 479001600)))
+    even = (1.0 + z * 0.5) + w * (
+        (1.0 / 24 + z * (1.0 / 720)) + w * ((1.0 / 40320 + z * (1.0 / 3628800)) + w * (1.0 / 479001600))
+    )
     odd = (1.0 + z * (1.0 / 6)) + w * (
         (1.0 / 120 + z * (1.0 / 5040)) + w * ((1.0 / 362880 + z * (1.0 / 39916800)) + w * (1.0 / 6227020800))
     )

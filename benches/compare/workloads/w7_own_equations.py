@@ -17,7 +17,7 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class Own(Workload):
-    """There is no formula: the truth is the same method with half the step, and what it may miss what it misses with twice the step.
+    """There is no formula: the truth is found with half the step, and what may be missed is told by what twice the step misses.
 
     ``data`` holds v of shape (numbers, members), without any if the equations are of the first order, y, and then the parameters
     that are the members' own. Blocks of one number have the shape (members,).
