@@ -23,9 +23,9 @@ POINTS = 100
 READING = """\
 Milliseconds until the first step of Runge-Kutta 4 of {members:,} members. stepwell: *Python* makes the system and runs its
 function with symbols, twice; *trace* makes the tape of a step; *code* writes the machine code; each is the least of
-{repeats}. numba compiles for one signature, in blocks of 64 members and as it is usually written. heyoka makes its symbols and compiles its
-series, another method, for a batch of one vector at a tolerance of 1e-9. Both do so once, with nothing in a cache, when they
-have compiled something before.
+{repeats}. numba compiles for one signature, in blocks of 64 members and as it is usually written. heyoka makes its symbols and
+compiles its series, another method, for a batch of one vector at a tolerance of 1e-9. Both do so once, with nothing in a cache,
+when they have compiled something before.
 """
 
 

@@ -111,6 +111,6 @@ def ready(way, work: Workload, quick: bool) -> Ready:
 
 KINDS = [f"own_{name}" for name in NAMED]
 CONTESTANTS = [
-    Contestant("diffrax", dict.fromkeys(KINDS, functools.partial(ready, by_diffrax))),
-    Contestant("JAX, fori_loop", dict.fromkeys(KINDS, functools.partial(ready, by_loop))),
+    Contestant("diffrax", dict.fromkeys(KINDS, functools.partial(ready, by_diffrax)), slow="steps"),
+    Contestant("JAX, fori_loop", dict.fromkeys(KINDS, functools.partial(ready, by_loop)), slow="steps"),
 ]

@@ -90,5 +90,5 @@ KINDS = [f"own_{name}" for name in NAMED]
 CONTESTANTS = [
     Contestant("numba", dict.fromkeys(KINDS, best(CONTRACT, FAST))),
     Contestant("numba, exact", dict.fromkeys(KINDS, best(EXACT))),
-    Contestant("numba, plain", dict.fromkeys(KINDS, plain)),
+    Contestant("numba, plain", dict.fromkeys(KINDS, plain), slow="members"),
 ]

@@ -38,14 +38,15 @@ def ready(work: Workload, quick: bool) -> Ready:
         import scipy.integrate  # noqa: F401
     except ImportError:
         raise MissingPeerError("SciPy is not installed") from None
-    best = math.inf, "", 0.0
-    few = work.cut(members=TRIAL)
+    best = math.inf, ""
+    few = work.cut(members=TRIAL)  # to choose the method by
     for method in ("RK45", "DOP853"):
         tolerance = as_exact(few, functools.partial(solve, method))
         start = time.perf_counter()
         solve(method, few, tolerance)
-        best = min(best, (time.perf_counter() - start, method, tolerance))
-    _, method, tolerance = best
+        best = min(best, (time.perf_counter() - start, method))
+    _, method = best
+    tolerance = as_exact(work, functools.partial(solve, method))
     return Ready(lambda: solve(method, work, tolerance), f"{method}, own steps, tolerance {tolerance:.0e}")
 
 
