@@ -31,6 +31,13 @@ share has the error of that share. REBOUND's leapfrog alone is another: drift-ki
 every machine. All of them are the best of several shapes, found before the timing; one thread each, unless the title
 says all. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file mean
 anything: another machine, or another hour on a shared one, gives other speeds.
+
+W7 are equations that users write themselves. stepwell traces them anew in every call, which is timed; what others compile is
+not timed. *numba* there is the best of several shapes that may contract, or reorder, too; *numba, exact* the best that may
+not; *numba, plain* goes member after member with the functions of `math`, as most people write it. In their blocks the sine
+and the exponential are polynomials for results of usual size, to which stepwell is not confined. *diffrax* and *JAX* take
+all members as one array. *heyoka* and *SciPy* choose their own, longer steps: they get the coarsest tolerance at which they
+miss no more than is expected of the common method and step, and are shown as if they had made as many steps as the others.
 """
 
 
