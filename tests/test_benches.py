@@ -9,14 +9,26 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import stepwell as sw
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benches.compare import machine, peers, runner, workloads  # noqa: E402
-from benches.compare.peers import c_peer, numba_peer, rebound_peer, stepwell_peer  # noqa: E402
+from benches.compare import machine, peers, report, runner, workloads  # noqa: E402
+from benches.compare.own import first_call, tolerance  # noqa: E402
+from benches.compare.own.equations import EQUATIONS, Equation  # noqa: E402
+from benches.compare.peers import (  # noqa: E402
+    c_peer,
+    heyoka_peer,
+    jax_peer,
+    numba_own,
+    numba_peer,
+    rebound_peer,
+    scipy_peer,
+    stepwell_peer,
+)
 
 WORKS = [work.quick().cut(members=200) for work in workloads.catalogue()]
 
@@ -39,6 +51,8 @@ ABLE = [
 def test_every_contestant_is_as_right_as_its_method(contestant: peers.Contestant, work: workloads.Workload) -> None:
     if contestant.slow == "steps":
         work = work.cut(steps=200)
+    if contestant.slow == "members" and not contestant.alike:
+        work = work.cut(members=20)
     try:
         v, y = contestant.kernels[work.kind](work, True).call()
     except peers.MissingPeerError as why:
@@ -47,7 +61,8 @@ def test_every_contestant_is_as_right_as_its_method(contestant: peers.Contestant
     if contestant.alike:
         # Same method, same work: what is left is rounding, a few thousand operations of 1e-16 each, and another sine.
         ours_v, ours_y = stepwell_peer.kernels()[work.kind](work, True).call()
-        assert max(abs(v.ravel() - ours_v.ravel()).max(), abs(y.ravel() - ours_y.ravel()).max()) < 1e-11
+        off = [abs(a.ravel() - b.ravel()).max(initial=0.0) for a, b in ((v, ours_v), (y, ours_y))]
+        assert max(off) < 1e-11
 
 
 @pytest.mark.parametrize("work", WORKS, ids=named)
@@ -65,8 +80,19 @@ def test_a_missing_peer_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -
     c_peer.library.cache_clear()
     numba_peer.compiled.cache_clear()
     c_peer.vectors_of_512.cache_clear()
-    monkeypatch.setitem(sys.modules, "rebound", None)
-    absent = {c_peer: "no C compiler", numba_peer: "numba is not installed", rebound_peer: "REBOUND is not installed"}
+    numba_own.compiled.cache_clear()
+    jax_peer.modules.cache_clear()
+    for name in ("rebound", "heyoka", "scipy", "scipy.integrate", "jax"):
+        monkeypatch.setitem(sys.modules, name, None)
+    absent = {
+        c_peer: "no C compiler",
+        numba_peer: "numba is not installed",
+        rebound_peer: "REBOUND is not installed",
+        numba_own: "numba is not installed",
+        heyoka_peer: "heyoka is not installed",
+        scipy_peer: "SciPy is not installed",
+        jax_peer: "jax is not installed",
+    }
     for module, why in absent.items():
         contestant = module.CONTESTANTS[0]
         able = [work for work in WORKS if work.kind in contestant.kernels]
@@ -75,6 +101,66 @@ def test_a_missing_peer_is_a_row_that_says_so(monkeypatch: pytest.MonkeyPatch) -
             row, ready = runner.prepare(contestant, work, quick=True)
             assert (row.missing, ready) == (why, None)
     assert ("C", "no C compiler") in machine.describe()
+
+
+OWN = [*EQUATIONS, first_call.ring(5)]
+
+
+@pytest.mark.parametrize("equation", OWN, ids=[each.name for each in OWN])
+def test_own_equations_are_the_same_for_stepwell_as_for_all_others(equation: Equation) -> None:
+    rng = np.random.default_rng(3)
+    state = np.array([rng.uniform(*bounds, 50) for bounds in equation.start.values()])
+    own = [rng.uniform(*bounds, 50) for bounds in equation.own.values()]
+    ours, t = equation.system.function, 0.7
+    fixed = equation.system.parameters | dict(equation.shared)
+    expected = np.empty_like(state)
+    for k, s in enumerate(state.T):
+        parameters = fixed | {name: row[k] for name, row in zip(equation.own, own, strict=True)}
+        expected[:, k] = ours(t, s, **parameters) if equation.system.order == 1 else (ours(t, *s, **parameters), s[0])
+    found = np.array(equation.function(np)(t, state, own))
+    # Up to 25 roundings of 1.1e-16 of terms up to 120·50 (the neuron's currents), otherwise of the size of the sums.
+    largest = 6000.0 if equation.name == "hodgkin_huxley" else 100.0
+    assert abs(found - expected).max() <= 25 * 1.2e-16 * largest
+    assert all(equation.system.parameters[name] == value for name, value in equation.shared.items())
+
+
+def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
+    work = next(work for work in WORKS if work.kind == "own_lorenz")
+    asked = []
+
+    def off_by_the_tolerance(part: workloads.Workload, wanted: float) -> Any:
+        asked.append(wanted)
+        v, y = (block.copy() for block in part.exact())
+        y[0] += wanted
+        return v, y
+
+    found = tolerance.as_exact(work, off_by_the_tolerance)
+    assert found <= min(work.expected, work.cut(members=tolerance.TRIAL).expected)
+    assert found == next(each for each in tolerance.TOLERANCES if each <= work.cut(members=tolerance.TRIAL).expected)
+    assert asked == sorted(asked, reverse=True)
+    with pytest.raises(peers.WrongResultError):
+        tolerance.as_exact(work, lambda part, wanted: off_by_the_tolerance(part, 1.0))
+
+
+def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
+    title, head, lines = first_call.table(2, quick=True)
+    assert "Own equations" in title
+    assert [(line[1], line[-1]) for line in lines] == [("3", "≤ 5"), ("100", "≤ 100")]
+    for line in lines:
+        assert len(line) == len(head)
+        python, trace, code, together = map(float, line[2:6])
+        assert together == pytest.approx(python + trace + code, rel=0.01)  # three digits of each
+        assert min(python, trace, code) > 0
+
+
+def test_own_equations_are_compared_with_every_way_of_numba() -> None:
+    work = next(work for work in WORKS if work.kind == "own_lorenz")
+    names = [contestant.name for contestant in numba_own.CONTESTANTS]
+    assert list(work.beside) == names
+    rows = [runner.Row(name, amount=1.0, seconds=[seconds]) for name, seconds in zip(names, (1.0, 2.0, 4.0), strict=True)]
+    _, head, lines = report.table(work, [*rows, runner.Row("other", amount=1.0, seconds=[0.5])])
+    assert head[4:-1] == [f"÷ {name}" for name in names]
+    assert lines[0][4:-1] == ["2.00", "4.00", "8.00"]
 
 
 def cells(line: str) -> list[str]:

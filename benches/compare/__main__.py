@@ -8,6 +8,7 @@ from pathlib import Path
 
 from . import extras, machine, peers, report, runner, workloads
 from .chosen import tables
+from .own import first_call
 
 EPILOG = """To compare at another CPU level: STEPWELL_KERNELS=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
 NUMBA_CPU_NAME=haswell NUMBA_CPU_FEATURES=+avx2,+fma (numba)."""
@@ -19,7 +20,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
     parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
     parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
-    about = "only the works whose names begin so, with commas between; chosen for adaptive steps"
+    about = "only the works whose names begin so, with commas between; chosen for adaptive steps, W7 for own equations"
     parser.add_argument("--only", default="", metavar="W4", help=about)
     parser.add_argument("--members", type=int, default=10_000, help="orbits with adaptive steps (default: 10 000)")
     given = parser.parse_args()
@@ -44,6 +45,11 @@ def main() -> None:
         for made in tables.tables(repeats, given.quick, given.members):
             report.show(*made)
             parts.append(report.markdown(*made))
+    if first_call.NAME.startswith(only):
+        parts.append("## Own equations\n\n" + first_call.READING.format(members=first_call.MEMBERS, repeats=repeats))
+        made = first_call.table(repeats, given.quick)
+        report.show(*made)
+        parts.append(report.markdown(*made))
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]

@@ -36,6 +36,10 @@ def compiler() -> str:
     return f"{told.splitlines()[0]}, `{' '.join(c_peer.flags())}`"
 
 
+#: What is told of with its version.
+PACKAGES = ("stepwell", "numpy", "numba", "llvmlite", "rebound", "heyoka", "scipy", "jax", "diffrax")
+
+
 def version(package: str) -> str:
     """A package with its version."""
     try:
@@ -56,6 +60,6 @@ def describe() -> list[tuple[str, str]]:
         ("CPU", f"{cpu()}, {threads()} cores"),
         ("system", f"{platform.system()} {platform.machine()}"),
         ("CPU level of stepwell", f"{sw.isa()} of {', '.join(sw.isa_levels())}"),
-        ("Python", ", ".join([platform.python_version(), *map(version, ("stepwell", "numpy", "numba", "llvmlite", "rebound"))])),
+        ("Python", ", ".join([platform.python_version(), *map(version, PACKAGES)])),
         ("C", compiler()),
     ]

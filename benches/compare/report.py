@@ -7,7 +7,7 @@ from .workloads import Workload
 
 Table = tuple[str, list[str], list[list[str]]]
 
-HEAD = ["contestant", "speed", "min … max", "error", "÷ numba", "÷ C", "÷ C, exact", "remarks"]
+HEAD = ["contestant", "speed", "min … max", "error", "remarks"]
 
 READING = """\
 A call goes from the user's arrays to the final state. Shown is the median of {repeats} repeats, then the least and the
@@ -31,6 +31,13 @@ share has the error of that share. REBOUND's leapfrog alone is another: drift-ki
 every machine. All of them are the best of several shapes, found before the timing; one thread each, unless the title
 says all. *stepwell* is `stepwell.integrate`, checks of the arguments included. Only ratios within this file mean
 anything: another machine, or another hour on a shared one, gives other speeds.
+
+W7 are equations that users write themselves. stepwell traces them anew in every call, which is timed; what others compile is
+not timed. *numba* there is the best of several shapes that may contract, or reorder, too; *numba, exact* the best that may
+not; *numba, plain* goes member after member with the functions of `math`, as most people write it. In their blocks the sine
+and the exponential are polynomials for results of usual size, to which stepwell is not confined. *diffrax* and *JAX* take
+all members as one array. *heyoka* and *SciPy* choose their own, longer steps: they get the coarsest tolerance at which they
+miss no more than is expected of the common method and step, and are shown as if they had made as many steps as the others.
 """
 
 
@@ -42,17 +49,18 @@ def number(x: float) -> str:
 def table(work: Workload, rows: list[Row]) -> Table:
     """One workload's table, fastest first."""
     speed = {row.name: row.rates[1] for row in rows if row.seconds}
+    head = [HEAD[0], work.unit.name, *HEAD[2:-1], *(f"÷ {peer}" for peer in work.beside), HEAD[-1]]
     lines = []
     for row in sorted(rows, key=lambda row: -speed.get(row.name, 0.0)):
         if row.missing:
-            lines.append([row.name, *["—"] * (len(HEAD) - 2), row.missing])
+            lines.append([row.name, *["—"] * (len(head) - 2), row.missing])
             continue
         middle = row.rates[1]
-        ratios = [f"{middle / speed[peer]:.2f}" if peer in speed else "—" for peer in ("numba", "C", "C, exact")]
+        ratios = [f"{middle / speed[peer]:.2f}" if peer in speed else "—" for peer in work.beside]
         low, shown, high = (number(each) for each in sorted(work.unit.shown(rate) for rate in row.rates))
         lines.append([row.name, shown, f"{low} … {high}", f"{row.error:.1e}", *ratios, row.note])
     title = f"{work.name}: {work.about}, {work.size}, {work.steps:,} steps of {work.dt:g}"
-    return title, [HEAD[0], work.unit.name, *HEAD[2:]], lines
+    return title, head, lines
 
 
 def threads(rows: list[Row]) -> str:

@@ -6,6 +6,7 @@ import functools
 
 import stepwell as sw
 
+from ..own.equations import EQUATIONS, Equation
 from ..workloads import w2_pendulums
 from . import Contestant, Ready, Workload, threads
 
@@ -32,6 +33,16 @@ def bodies(data) -> sw.System:
     return sw.NBody(data["masses"], force="newton", softening=data["softening"])
 
 
+def own(equation: Equation, data) -> sw.System:
+    """Own equations with the members' parameters."""
+    return equation.system(**{name: data[name] for name in equation.own})
+
+
+def built_in(data) -> sw.System:
+    """The same pendulums, as stepwell has them."""
+    return sw.Pendulum(data["omega"])
+
+
 SYSTEMS = {
     "free_false_euler": (free, "false_euler"),
     "forced_standard_heun": (forced, "standard_heun"),
@@ -41,7 +52,9 @@ SYSTEMS = {
     "bodies_leapfrog": (bodies, "leapfrog"),
     "cluster_leapfrog": (bodies, "leapfrog"),
     "shared_cluster_leapfrog": (bodies, "leapfrog"),
+    **{f"own_{each.name}": (functools.partial(own, each), "rk4") for each in EQUATIONS},
 }
+OWN = tuple(kind for kind in SYSTEMS if kind.startswith("own_"))
 
 
 def made(system, method: str, how, work: Workload, quick: bool) -> Ready:
@@ -50,8 +63,10 @@ def made(system, method: str, how, work: Workload, quick: bool) -> Ready:
     if work.members == 1 and data["v"].ndim > 1:  # one system has no axis of members
         data = {name: row[..., 0] for name, row in data.items()}
 
+    start = {name: data[name] for name in ("v", "y") if data[name].size}  # a system of the first order has no v
+
     def call():
-        run = sw.integrate(system(data), method, v=data["v"], y=data["y"], dt=work.dt, steps=work.steps, **how)
+        run = sw.integrate(system(data), method, **start, dt=work.dt, steps=work.steps, **how)
         return run.v[-1], run.y[-1]
 
     # Leapfrog goes half a kick back before the first step, and half a kick forward after the last.
@@ -63,12 +78,13 @@ def kernels(*without: str, **how):
     return {kind: functools.partial(made, *what, how) for kind, what in SYSTEMS.items() if kind not in without}
 
 
-as_many_as_pay = kernels("cluster_leapfrog", threads=None)
+as_many_as_pay = kernels("cluster_leapfrog", *OWN, threads=None)
 #: Large clusters are no single tape, and so are not fused.
 fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", threads=1, fused=True)
 all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),
     Contestant("stepwell, fused, 1 thread", fused),
+    Contestant("built-in pendulum", {"own_pendulum": functools.partial(made, built_in, "rk4", {"threads": 1})}, alike=False),
     Contestant(f"stepwell, up to {threads()} threads", as_many_as_pay | all_of_them),
 ]

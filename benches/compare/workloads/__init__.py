@@ -39,6 +39,8 @@ class Workload(ABC):
     kind: ClassVar[str]
     about: ClassVar[str]
     unit: ClassVar[Unit] = Unit("G steps/s", 1e9)
+    #: The contestants that all others are compared with, where they take part.
+    beside: ClassVar[tuple[str, ...]] = ("numba", "C", "C, exact")
     name: str
     data: Mapping[str, Array]
     dt: float
