@@ -145,7 +145,7 @@ def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
 def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
     title, head, lines = first_call.table(2, quick=True)
     assert "Own equations" in title
-    assert [(line[1], line[-1]) for line in lines] == [("3", "≤ 5"), ("100", "≤ 100")]
+    assert [(line[1], line[-1]) for line in lines] == [("3", "≤ 5"), ("10", "≤ 100")]
     for line in lines:
         assert len(line) == len(head)
         python, trace, code, together = map(float, line[2:6])

@@ -129,7 +129,7 @@ def table(repeats: int, quick: bool = False) -> Table:
         except MissingPeerError:
             return missing
 
-    equations = [NAMED["lorenz"], ring(POINTS)] if quick else [*EQUATIONS, ring(POINTS)]
+    equations = [NAMED["lorenz"], ring(10)] if quick else [*EQUATIONS, ring(POINTS)]
     none = float("nan")
     tried(lambda: numbas(NAMED["duffing"]), none)  # what is loaded once
     tried(lambda: heyokas(NAMED["duffing"]), none)

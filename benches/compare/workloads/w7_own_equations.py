@@ -100,7 +100,7 @@ def make(equation: Equation, members: int) -> Own:
     else:
         v, y = (block[0] if len(block) == 1 else block for block in np.split(state, 2))
     own = {name: rng.uniform(*bounds, members) for name, bounds in equation.own.items()}
-    return Own("W7", {"v": v, "y": y, **own}, equation.dt, equation.steps, equation=equation)
+    return Own(f"W7 {equation.name}", {"v": v, "y": y, **own}, equation.dt, equation.steps, equation=equation)
 
 
 WORKLOADS = [make(equation, 100_000) for equation in EQUATIONS]
