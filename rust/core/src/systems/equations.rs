@@ -205,7 +205,8 @@ struct Own<N: Number> {
 }
 
 fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
-    let equations = p.given.equations.clone().unwrap_or_else(|| Equations::new(Vec::new(), Vec::new(), None, Vec::new(), None).into());
+    let equations =
+        p.given.equations.clone().unwrap_or_else(|| Equations::new(Vec::new(), Vec::new(), None, Vec::new(), None).into());
     let (of_v, of_y) = (equations.needed(&equations.dv), equations.needed(equations.dy.as_deref().unwrap_or(&[])));
     Box::new(Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations, of_v, of_y })
 }
