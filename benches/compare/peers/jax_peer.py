@@ -1,7 +1,7 @@
 """JAX on own equations, one thread, on the CPU: by diffrax, told Runge-Kutta 4's tableau, and by a loop of one's own.
 
 Both take members side by side in one array, as many at once as stay in the cache; and diffrax also all of them, as most people
-write it, which is up to four times as slow. diffrax has no classical Runge-Kutta 4, so it gets its tableau: the same method and as
+write it, which is up to four times as slow. diffrax has no classical Runge-Kutta 4, so it gets its tableau: the same method, as
 many steps, of which it keeps the last state alone. Compiling is not timed.
 """
 
