@@ -36,8 +36,9 @@ W7 are equations that users write themselves. stepwell traces them anew in every
 not timed. *numba* there is the best of several shapes that may contract, or reorder, too; *numba, exact* the best that may
 not; *numba, plain* goes member after member with the functions of `math`, as most people write it. In their blocks the sine
 and the exponential are polynomials for results of usual size, to which stepwell is not confined. *diffrax* and *JAX* take
-all members as one array. *heyoka* and *SciPy* choose their own, longer steps: they get the coarsest tolerance at which they
-miss no more than is expected of the common method and step, and are shown as if they had made as many steps as the others.
+some thousand members as one array, unless the name says all at once. *heyoka* and *SciPy* choose their own, longer steps:
+they get the coarsest tolerance at which they miss no more than is expected of the common method and step, and are shown as
+if they had made as many steps as the others.
 """
 
 

@@ -68,7 +68,7 @@ def ready(work: Workload, quick: bool) -> Ready:
     module()
     tolerance = as_exact(work, solve)
     integ, seconds = integrator(work.equation.name, tolerance)
-    note = f"own steps, tolerance {tolerance:.0e}, order {integ.order}, batch {integ.batch_size}; compiled in {seconds:.1f} s"
+    note = f"own steps, tolerance {tolerance:.0e}, order {integ.order}, batch {integ.batch_size}; compiled in {seconds:.2f} s"
     return Ready(lambda: solve(work, tolerance), note)
 
 
