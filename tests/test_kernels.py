@@ -109,7 +109,9 @@ def test_a_child_runs_the_kernels_of_its_parent_and_writes_its_own() -> None:
 
     process = fork.Process(target=child)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # other tests may have left threads that wait
+        # Other tests may have left threads that wait, and programs that warn of a fork beside these, as JAX does.
+        for kind in (DeprecationWarning, RuntimeWarning):
+            warnings.simplefilter("ignore", kind)
         process.start()
     assert mine.poll(60), "the child says nothing"
     assert mine.recv() == [first, bits("moon"), first]
