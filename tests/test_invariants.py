@@ -110,12 +110,17 @@ def test_runs_worlds_and_pickles_under_control() -> None:
     system = own.pendulum()
     whole = sw.integrate(system, "rk4", **START, control=control)
     half = sw.integrate(system, "rk4", **START | {"steps": 20}, control=control)
-    again = sw.integrate(half.system, "rk4", **half.resume, steps=20)
-    np.testing.assert_array_equal(again.y[-1], whole.y[-1])
+    for each in (system, half.system):  # what resumes a run has its control, too
+        again = sw.integrate(each, "rk4", **half.resume, steps=20)
+        np.testing.assert_array_equal(again.y[-1], whole.y[-1])
+        assert again.system.uncontrolled == half.system.uncontrolled
     v, y = START["v"].copy(), START["y"].copy()
     world = sw.World(system, "rk4", v=v, y=y, dt=0.05, control=control)
-    world.step(40)
-    np.testing.assert_array_equal(y, whole.y[-1])
+    world.step(20)
+    resumed = sw.World(system, "rk4", dt=0.05, **world.resume)
+    for each in (world, resumed):
+        each.step(20)
+        np.testing.assert_array_equal(each.y, whole.y[-1])
     for each in (pickle.loads(pickle.dumps(whole.system)), copy.deepcopy(whole.system)):
         assert each == whole.system
     projected = sw.integrate(system, "rk4", **START, control=sw.Projection("energy"))
@@ -183,3 +188,16 @@ def test_a_parameter_that_changes_makes_no_invariant() -> None:
     both(own.pendulum(omega=own.turning), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
     with pytest.raises(ArgumentError, match=r"pendulum: energy: omega changes with the time"):
         sw.integrate(own.pendulum(omega=lambda t: 1.0 + 0.1 * np.sin(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="energy")
+
+
+def test_adaptive_steps_refuse_a_system_under_control() -> None:
+    """They used to step bodies as if there were no control, though the run said that there was one."""
+    y = np.array([[0.0, 1.0], [1.0, 0.0], [2.0, 2.0]])
+    bodies = sw.integrate(sw.NBody(), "rk4", v=0.0, y=y, dt=0.01, steps=1, control=sw.EnergyControl(0.1)).system
+    for control in (sw.Control("energy", 1.0), sw.Projection("energy")):
+        mine = sw.integrate(own.pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=control).system
+        with pytest.raises(UnsupportedError, match=r"tolerance: goes with systems that nothing controls, got pendulum"):
+            sw.integrate(mine, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+        sw.integrate(mine.uncontrolled, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+    with pytest.raises(UnsupportedError, match=r"tolerance: .* EnergyControl"):
+        sw.integrate(bodies, "dop853", v=0.0, y=y, tolerance=1e-6, at=[0.1])

@@ -319,6 +319,8 @@ def _adapt(
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if system.keeper is not None:
+        raise UnsupportedError(f"tolerance: goes with systems that nothing controls, got {system!r}; use its .uncontrolled")
     if carry is not None and not isinstance(carry, AdaptiveState):
         raise DTypeError(f"carry: with a tolerance expected that of run.resume, got {type(carry).__name__}")
     if at is None or (tolerance is None) == (carry is None):

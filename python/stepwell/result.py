@@ -221,8 +221,8 @@ class Run(Value):
             state["start"] = self.start
         if self.status.any():
             state["first_bad_step"] = self.first_bad_step
-        if self.system.control is not None:
-            state["control"] = self.system.control
+        if self.system.keeper is not None:
+            state["control"] = self.system.keeper
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
 
     def __repr__(self) -> str:

@@ -152,8 +152,8 @@ class World:
             state["start"] = self._start
         if self._fused:
             state["fused"] = True
-        if self._system.control is not None:
-            state["control"] = self._system.control
+        if self._system.keeper is not None:
+            state["control"] = self._system.keeper
         carry = self._core.carry() if self._method.carry is not None else None
         return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
 

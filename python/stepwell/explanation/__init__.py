@@ -83,7 +83,7 @@ def explain(
     if attempt and how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if attempt and (control is not None or system.control is not None):
+    if attempt and (control is not None or system.keeper is not None):
         raise ArgumentError("control: goes with fixed steps only, and attempt=True was given")
     own = prod(system.batch)
     form = _checks.known("form", form, ("direct", "matrix"))

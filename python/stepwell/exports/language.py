@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from .. import _core
 from .._checks import Shape
+from ..errors import UnsupportedError
 from ..explanation import formula as plain
 from ..explanation.formula import ALL_BITS, ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
 from ..explanation.listing import Leaf, Writer
@@ -199,7 +200,7 @@ class Language(Notation, ABC):
             case _ if name in ARITHMETIC:
                 return plain.formula(name, numbers, given, bits)
             case _:
-                raise NotImplementedError(f"{self.title} for the operation {name!r}")
+                raise UnsupportedError(f"language: there is nothing in {self.title} for the operation {name!r} of this step")
 
     def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
         """A quotient; ``divisor`` are the bits of one that is a constant."""

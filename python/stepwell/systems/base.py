@@ -17,7 +17,7 @@ from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
 if TYPE_CHECKING:
-    from ..control import EnergyControl, Projection
+    from ..control import AnyControl, EnergyControl, Projection
     from .inputs import Input
 
 #: A description as the core takes it: names with words, whole numbers, rows of numbers for each member (or one for all), and
@@ -66,6 +66,11 @@ class System(Value, ABC):
     def kind_name(self) -> str:
         """What systems of its kind are called."""
         return type(self).__name__
+
+    @property
+    def keeper(self) -> AnyControl | None:
+        """The control or projection that it is under, as ``integrate`` was given it, with its target in numbers."""
+        return self.control
 
     @property
     def uncontrolled(self) -> System:
@@ -174,7 +179,7 @@ class System(Value, ABC):
 
     def _held_by(self, control: EnergyControl | Projection) -> Self:
         held = copy.copy(self)
-        held._free = self
+        held._free = self.uncontrolled
         held.control = control
         held.velocity_term = "energy control"
         return held

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array, Shape
-from ..control import WAYS, Control, EnergyControl, Projection
+from ..control import WAYS, AnyControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
 from ..equations.trace import Equations
 from ..errors import ShapeError, TraceError, UnsupportedError
@@ -63,6 +63,11 @@ class OwnSystem(System):
         #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
         self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
+
+    @property
+    def keeper(self) -> AnyControl | None:
+        """A control is a part of the rates, and a projection is not."""
+        return self.push if self.push is not None else self.control
 
     @property
     def kind_name(self) -> str:
@@ -281,7 +286,8 @@ class OwnSystem(System):
         return _checks.known("control", name, self.definition.invariants)
 
     def _keeping(self, name: str, control: Any) -> OwnSystem:
-        known = self._known()
+        known = self._known().uncontrolled  # one control takes the place of another
+        assert isinstance(known, OwnSystem)
         assert known.equations is not None
         kept = copy.copy(known)
         kept._bounds, kept._met = {}, {}
