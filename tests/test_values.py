@@ -89,6 +89,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     ],
     "Sinusoid": [lambda: sw.Sinusoid(1.0, 2.0), lambda: sw.Sinusoid(1.0, 2.0, 0.5)],
     "Sampled": [lambda: sw.Sampled([1.0], 0.1), lambda: sw.Sampled([1.0], 0.2), lambda: sw.Sampled([2.0], 0.1)],
+    "LengthControl": [lambda: sw.LengthControl(0.5), lambda: sw.LengthControl([0.1, 0.5])],
+    "NormControl": [lambda: sw.NormControl(0.5), lambda: sw.NormControl([0.1, 0.5])],
     "EnergyControl": [
         lambda: sw.EnergyControl(0.1),
         lambda: sw.EnergyControl(relative=0.1),

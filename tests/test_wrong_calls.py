@@ -177,6 +177,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "NBody": (sw.NBody, {"masses": [1.0, 1.0], "force": "newton", "G": 1.0, "softening": 0.1, "dim": 2}),
     "Sinusoid": (sw.Sinusoid, {"amplitude": 1.0, "omega": 1.0, "phase": 0.0}),
     "Sampled": (sw.Sampled, {"values": [1.0, 2.0], "interval": 0.1, "start": 0.0}),
+    "LengthControl": (sw.LengthControl, {"c": 0.5}),
+    "NormControl": (sw.NormControl, {"k": 0.5}),
     "EnergyControl": (sw.EnergyControl, {"gain": 0.1, "form": "limited", "target": 1.0}),
     "EnergyControl relative": (sw.EnergyControl, {"relative": 0.1}),
     "Projection": (sw.Projection, {"way": "scaling", "target": 1.0}),

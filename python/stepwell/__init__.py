@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .control import Control, EnergyControl, Projection
+from .control import Control, EnergyControl, LengthControl, NormControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
@@ -40,9 +40,11 @@ __all__ = [
     "EnergyControl",
     "Explanation",
     "ExportedStep",
+    "LengthControl",
     "LinearSystem",
     "Method",
     "NBody",
+    "NormControl",
     "Oscillator",
     "Pendulum",
     "Projection",

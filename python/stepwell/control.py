@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -148,6 +148,63 @@ class Control(Value):
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
+class ConstraintControl(Value):
+    """Adds to the rates of a system what returns its own constraint; the system has the equations.
+
+    Attributes:
+        constraint: which constraint it keeps, as a system names it in ``System.constraint``.
+        strength: its number, broadcasts over the batch.
+    """
+
+    constraint: ClassVar[str]
+    strength: Array
+
+    @property
+    def batch(self) -> Shape:
+        """The shape of its number."""
+        return self.strength.shape
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.strength})"
+
+
+class LengthControl(ConstraintControl):
+    """Returns the rods of a system to their lengths, as critically damped springs would (§12; Baumgarte 1972).
+
+    In place of C̈ = 0 the constraint of a rod, C = ½(r·r − l²), obeys C̈ + 2αĊ + β²C = 0 with α = β = c/h. C is then an oscillator
+    with Φ = c, so c has the stability limit of the method for a critically damped oscillator, whatever the step.
+
+    Args:
+        c: α·h = β·h, without a unit, zero or more; broadcasts over the batch.
+
+    Raises:
+        ArgumentError: what is wrong with ``c``.
+    """
+
+    constraint = "length"
+
+    def __init__(self, c: Any) -> None:
+        self.strength = _checks.not_negative("c", c)
+
+
+class NormControl(ConstraintControl):
+    """Returns a quaternion q to the length 1 by a rate k·(1 − q·q)·q (§12).
+
+    q·q − 1 decays as exp(−2kt), so h·k must stay below 1 for methods of the Euler family.
+
+    Args:
+        k: in 1 per unit of time, zero or more; broadcasts over the batch.
+
+    Raises:
+        ArgumentError: what is wrong with ``k``.
+    """
+
+    constraint = "norm"
+
+    def __init__(self, k: Any) -> None:
+        self.strength = _checks.not_negative("k", k)
+
+
 WAYS = ("scaling", "nacozy")
 
 
@@ -156,10 +213,11 @@ class Projection(Value):
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
     that suffices to first order: along the gradient of the energy, in velocities and coordinates (Nacozy 1971). The name of an
-    invariant of a system of your own does the same for that invariant.
+    invariant of a system of your own does the same for that invariant. ``"length"`` returns rods to their lengths, and ``"norm"``
+    a quaternion to the length 1.
 
     Args:
-        way: ``"scaling"``, ``"nacozy"``, or the name of an invariant.
+        way: ``"scaling"``, ``"nacozy"``, the name of an invariant, or the constraint of a system.
         target: the energy to keep; that of the start if None. Broadcasts over the batch.
 
     Raises:
@@ -208,11 +266,14 @@ class Projection(Value):
         return alone
 
 
-AnyControl = EnergyControl | Projection | Control
+AnyControl = EnergyControl | Projection | Control | ConstraintControl
 
 
 def a_control(value: Any) -> Any:
     """Return the argument ``control`` if it is one, or None."""
-    if value is not None and not isinstance(value, (EnergyControl, Projection, Control)):
-        raise DTypeError(f"control: expected an EnergyControl, a Control or a Projection, got {type(value).__name__}")
+    if value is not None and not isinstance(value, (EnergyControl, Projection, Control, ConstraintControl)):
+        raise DTypeError(
+            f"control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got "
+            f"{type(value).__name__}"
+        )
     return value

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array, Shape
-from ..control import AnyControl, EnergyControl, a_control
+from ..control import AnyControl, ConstraintControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..integrate import fits_together
 from ..methods import Method
@@ -145,7 +145,7 @@ def _under(system: System, control: AnyControl, blocks: list[Array | None], batc
     if v is not None and y is not None:
         v, y = (_wide(each, shape, batch) for each, shape in ((v, system.v_shape), (y, system.y_shape)))
         return system.controlled(control, v, y, dt)
-    if control.target is None:
+    if not isinstance(control, ConstraintControl) and control.target is None:
         raise ArgumentError("control: expected one with a target, or v and y, of which it keeps the energy")
     if isinstance(control, EnergyControl) and control.gain is None:
         raise ArgumentError("control: expected one with a gain, or v and y, to which relative= relates it")

@@ -6,10 +6,11 @@ import copy
 from abc import ABC, abstractmethod
 from math import inf, prod
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 
+from .. import _checks
 from .._checks import Array, Shape
 from .._value import Value
 from ..errors import DTypeError, UnsupportedError
@@ -17,7 +18,7 @@ from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
 if TYPE_CHECKING:
-    from ..control import AnyControl, EnergyControl, Projection
+    from ..control import AnyControl, ConstraintControl, EnergyControl, Projection
     from .inputs import Input
 
 #: A description as the core takes it: names with words, whole numbers, rows of numbers for each member (or one for all), and
@@ -46,6 +47,8 @@ class System(Value, ABC):
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
+        constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
+        kept: that control or projection, or None; ``integrate`` sets it.
     """
 
     kernel: ClassVar[str]
@@ -60,6 +63,8 @@ class System(Value, ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
     control: EnergyControl | Projection | None = None
+    constraint: ClassVar[str | None] = None
+    kept: ConstraintControl | Projection | None = None
     _free: System | None = None
 
     @property
@@ -70,7 +75,7 @@ class System(Value, ABC):
     @property
     def keeper(self) -> AnyControl | None:
         """The control or projection that it is under, as ``integrate`` was given it, with its target in numbers."""
-        return self.control
+        return self.control if self.kept is None else self.kept
 
     @property
     def uncontrolled(self) -> System:
@@ -82,7 +87,7 @@ class System(Value, ABC):
         """Its arguments, for its repr."""
 
     def __repr__(self) -> str:
-        said = self.said() + ([] if self.control is None else [repr(self.control)])
+        said = self.said() + ([] if self.keeper is None else [repr(self.keeper)])
         return f"{type(self).__name__}({', '.join(said)})"
 
     @abstractmethod
@@ -157,6 +162,8 @@ class System(Value, ABC):
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
+        if self._keeps(control):
+            return self._kept_by(control)
         self._controllable(control)
         with np.errstate(all="ignore"):
             _, kinetic, energy = self.alone(1.0, y.shape[len(self.y_shape) :]).energies(v, y)
@@ -168,10 +175,33 @@ class System(Value, ABC):
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
+        if self._keeps(control):
+            return self._kept_by(control)
         self._controllable(control)
         return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
+    def _keeps(self, control: Any) -> bool:
+        """Whether it is the control or projection of the system's own constraint."""
+        kept = getattr(control, "constraint", None) or getattr(control, "way", None)
+        return kept is not None and kept == self.constraint
+
+    def _kept_by(self, control: Any) -> Self:
+        free = self.uncontrolled
+        kept = copy.copy(free)
+        kept._free, kept.kept = free, control
+        kept.batch = _checks.batch_shape({"system": free.batch, "control": control.batch})
+        return cast("Self", kept)
+
+    def given_kept(self) -> dict[str, Any]:
+        """What keeps the system's constraint, as parameters: ``keeps``, "control" or "projection", and its ``strength``."""
+        if self.kept is None:
+            return {"keeps": None, "strength": None}
+        strength = getattr(self.kept, "strength", None)
+        return {"keeps": "projection" if strength is None else "control", "strength": strength}
+
     def _controllable(self, control: Any) -> None:
+        if (name := getattr(control, "constraint", None)) is not None:
+            raise UnsupportedError(f"control: {control!r} keeps a {name}, and {self!r} has no such constraint")
         if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):
             raise UnsupportedError(f"control: {control!r} is for an invariant of an own system, and {self!r} has none")
         if not hasattr(self.reference, "energies"):

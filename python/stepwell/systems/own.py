@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array, Shape
-from ..control import WAYS, AnyControl, Control, EnergyControl, Projection
+from ..control import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
 from ..equations.trace import Equations
 from ..errors import ShapeError, TraceError, UnsupportedError
@@ -275,6 +275,8 @@ class OwnSystem(System):
                 f"control: EnergyControl pushes velocities by the kinetic energy, which {self!r} does not tell; use "
                 f"Control('energy', gain), which pushes along the gradient of an invariant"
             )
+        if isinstance(control, ConstraintControl):
+            self._controllable(control)
         name = control.invariant
         if isinstance(control, Projection) and control.way in WAYS:
             if control.way == "scaling":
