@@ -31,6 +31,14 @@ def main() -> None:
     reading = report.READING.format(repeats=repeats, sample=1e3 * runner.SAMPLE / (10 if given.quick else 1))
     parts = ["## How to read", reading]
     contestants = peers.catalogue()
+    described = [*machine.describe(), ("load of the machine", f"{load} before")]
+
+    def write() -> None:
+        """What is known so far, so that nothing is lost if a later work fails or is interrupted."""
+        told = "\n".join(f"- {what}: {value}" for what, value in described)
+        whole = ["# Every language on the same work", "Written by `python -m benches.compare`; do not edit.", told, *parts]
+        given.output.write_text("\n\n".join(part.strip() for part in whole) + "\n", encoding="utf-8")
+
     for work in workloads.catalogue():
         if not work.name.startswith(only):
             continue
@@ -40,11 +48,13 @@ def main() -> None:
         made = report.table(work, rows)
         report.show(*made)
         parts += [report.markdown(*made), report.threads(rows)]
+        write()
     if "chosen".startswith(only):
         parts.append("## Adaptive steps\n\n" + tables.READING.format(repeats=repeats))
         for made in tables.tables(repeats, given.quick, given.members):
             report.show(*made)
             parts.append(report.markdown(*made))
+            write()
     if first_call.NAME.startswith(only):
         parts.append("## Own equations\n\n" + first_call.READING.format(members=first_call.MEMBERS, repeats=repeats))
         made = first_call.table(repeats, given.quick)
@@ -53,10 +63,8 @@ def main() -> None:
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]
-    described = [*machine.describe(), ("load of the machine", f"{load} before, {machine.load()} after")]
-    title = ["# Every language on the same work", "Written by `python -m benches.compare`; do not edit."]
-    parts = [*title, "\n".join(f"- {what}: {value}" for what, value in described), *parts]
-    given.output.write_text("\n\n".join(part.strip() for part in parts) + "\n", encoding="utf-8")
+    described[-1] = ("load of the machine", f"{load} before, {machine.load()} after")
+    write()
     print(f"Written to {given.output}.")
 
 

@@ -20,7 +20,7 @@ from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, Restricte
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, scenes, stability
+    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, paper, scenes, stability
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
@@ -79,6 +79,7 @@ __all__ = [
     "lyapunov",
     "method",
     "methods",
+    "paper",
     "scenes",
     "stability",
     "stability_along",
@@ -118,6 +119,7 @@ _LATER = {
     "equations": "equations",
     "export": "exports.export",
     "exports": "exports",
+    "paper": "paper",
     "scenes": "scenes",
     "system": "equations.system",
     "stability": "stability",

@@ -539,7 +539,8 @@ def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, a
 
     if first is None:
         first = adaptive.first_step(plan.system.scaled(1.0, plan.batch), plan.t0, v, y, plan.block_axes)
-    first, relative, wide = (np.broadcast_to(a, plan.batch) for a in (first, relative, 0.0 if absolute is None else absolute))
+    wide = np.zeros(plan.batch) if absolute is None else absolute
+    first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
     tolerance = relative, wide, 1.0 if absolute is None else 0.0
     return adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
 
@@ -577,10 +578,13 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members
     last = np.empty((n_v + prod(plan.system.y_shape), members))
-    paces = np.stack([np.broadcast_to(number, plan.batch).reshape(members) for number in pace])
+    paces = np.empty((len(pace), *plan.batch))
+    for row, number in enumerate(pace):
+        paces[row] = number
+    paces = paces.reshape(len(pace), members)
     last_paces, status = np.empty_like(paces), np.empty(members, dtype=np.int64)
     arrays = AdaptiveArrays(rows(v, plan.batch), rows(y, plan.batch), paces, saved_v, saved_y, last, last_paces, status)
     _core.adapt(model(plan), plan, pacing, arrays)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
-    ended = adaptive.Pace(*(row.reshape(plan.batch) for row in last_paces))
+    ended = pace_of(last_paces.reshape(len(pace), *plan.batch))
     return adaptive.Outcome(saved_v, saved_y, last_v, last_y, ended, status.reshape(plan.batch))

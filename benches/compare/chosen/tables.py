@@ -22,11 +22,14 @@ ERRORS = (1e-3, 1e-6, 1e-9)
 TOLERANCES = tuple(10.0 ** -np.arange(1.0, 14.5, 0.5))
 #: Seconds after which a contestant gets no finer tolerance, and its least time of a sample.
 PATIENCE, SAMPLE = 3.0, 0.02
+#: Seconds that the repeats of one tolerance may take together; there are two at least.
+REPEATS_TIME = 0.5
 
 READING = """\
 Microseconds an orbit for a median error at the end of so much, between the two tolerances that enclose it; the median
-of {repeats} repeats. *Spread* is the most over the least time of the repeats, of the worst tolerance. One thread. — says that
-it did not get there, or not in time. What numba and heyoka compile is not timed. SciPy does 5 of many orbits.
+of up to {repeats} repeats, fewer where a solution takes long. *Spread* is the most over the least time of the repeats, of
+the worst tolerance. One thread. — says that it did not get there, or not in time. What numba and heyoka compile is not
+timed. SciPy does 5 of many orbits.
 """
 
 
@@ -50,7 +53,7 @@ def measured(contestant: Contestant, orbits: Orbits, repeats: int, errors: tuple
         solve(tolerance)
         first = time.perf_counter() - begin
         calls, times = max(1, round(lasts / max(first, 1e-7))), [first]
-        for _ in range(repeats if first < 1.0 else 1):
+        for _ in range(max(2, min(repeats, int(REPEATS_TIME / first)))):
             begin = time.perf_counter()
             for _ in range(calls):
                 solve(tolerance)
