@@ -387,7 +387,7 @@ def _adapt(
         steps=0,
         start=None,
         paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.evaluations * (accepted + rejected + extra_steps)),
-        stand=AdaptiveState(out.last_v, out.last_y, np.stack(out.pace), float(times[-1]), how.name),
+        stand=AdaptiveState(out.last_v, out.last_y, np.array(out.pace), float(times[-1]), how.name),
         fused=fused,
     )
     for name in record:
