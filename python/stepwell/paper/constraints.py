@@ -103,7 +103,6 @@ def satellite() -> Finding:
     "`sw.advise`; `stepwell advise`; `sw.charts.work_precision`",
 )
 def asks() -> Finding:
-    """Advice for the clover leaf."""
-    advice = advise("clover", tolerance=1e-2)
-    best = advice.best
-    return Finding(best is not None, f"clover leaf to 1 %: {best.method.title}" if best else "no advice")
+    """Advice for the clover leaf; which method is fastest depends on the machine, that it is accurate does not."""
+    best = advise("clover", tolerance=1e-2).best
+    return Finding(best is not None and best.error <= 1e-2, "the method and the step that it names keep the clover leaf to 1 %")
