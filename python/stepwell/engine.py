@@ -122,7 +122,7 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
     ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
     """
     if before is None:
-        before = np.empty(plan.batch, np.int64)
+        before = _memory.empty(plan.batch).view(np.int64)
         before.fill(-1)
     else:
         before = before.copy()
