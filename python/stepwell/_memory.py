@@ -16,8 +16,8 @@ import numpy as np
 
 from ._checks import Array, Shape
 
-#: Arrays of fewer bytes are NumPy's own: the allocator keeps memory of such sizes by itself. Of larger ones, such as the results of
-#: 100 000 members, it gives the pages back as soon as some of them are free together.
+#: Arrays of fewer bytes are NumPy's own: the allocator keeps memory of such sizes by itself. Of larger ones, such as the results
+#: of 100 000 members, it gives the pages back as soon as some of them are free together.
 LEAST_LENT = 1 << 17
 #: The most bytes that are kept in all while no array uses them.
 MOST_KEPT = 1 << 26
