@@ -236,7 +236,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Run.quantity": (_of_run("quantity"), {"name": "energy"}),
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None}),
     "scenes.aircraft": (sw.scenes.aircraft, {"form": "euler", "roll": 40.0, "pitch": 0.0}),
-    "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 5.0, "torque": -1.5}),
+    "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),

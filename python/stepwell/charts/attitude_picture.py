@@ -32,13 +32,19 @@ AZIMUTH, ELEVATION = 215.0, 25.0
 #: Half the side of a panel with an aircraft, whose nose is 1 from its centre; the radius of the horizontal circle around it.
 HALF_SIDE, CIRCLE = 1.4, 1.25
 
-#: How many attitudes the picture shows.
-ATTITUDES = 6
+#: How many attitudes the picture shows, how many side by side, and the height of a row as a share of the picture's.
+ATTITUDES, COLUMNS, ROW = 6, 3, 0.225
 
 #: Names of the angles, and how a line and its label look.
 ANGLES = ("roll φ", "pitch θ", "yaw ψ")
 RATES = (("ω₁", "#000000", "-"), ("ω₂", "#5a5a5a", (0, (6, 2))), ("ω₃", "#8c8c8c", (0, (1.5, 1.2))))
 COMMANDED: dict[str, Any] = {"color": "#7a7a7a", "linewidth": 1.6, "linestyle": (0, (5, 2)), "zorder": 2}
+
+#: A run of more saved states has no mark at each of them.
+MOST_MARKED = 250
+
+#: Between the panels of the angles, as a share of the picture's height.
+GAP = 0.045
 
 #: Labels at the end of lines are at least this share of a panel's height apart.
 LABEL_DISTANCE = 0.11
@@ -67,20 +73,19 @@ def viewed(azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> Seen:
     return Seen(right, np.cross(near, right), near)
 
 
-def draw_left_and_right(figure: Figure, chart: RunPicture, bottom: float, top: float, right: float) -> None:
+def draw_panels(figure: Figure, chart: RunPicture, bottom: float, top: float, right: float) -> None:
     """All panels of the picture."""
     angle_panels(figure, chart, (0.06, bottom, 0.44, top - bottom))
-    columns, rows, left, gap = 3, ATTITUDES // 3, 0.585, 0.005
-    width, height = (right - left - gap * (columns - 1)) / columns, 0.24
+    left = 0.59
+    width = (right - left) / COLUMNS
     for i, frame in enumerate(chosen(chart)):
-        place = (left + (i % columns) * (width + gap), top - 0.03 - (i // columns + 1) * (height + 0.03) + 0.03, width, height)
-        axes = figure.add_axes(place)
+        row, column = divmod(i, COLUMNS)
+        axes = figure.add_axes((left + column * width, top - (row + 1) * ROW + 0.01, width, ROW - 0.035))
         space(axes)
-        show = aircraft(axes)
-        show(rotation(chart)[..., frame])
+        aircraft(axes)(rotation(chart)[..., frame])
         axes.set_title(f"t = {chart.run.t[frame]:.4g}", size=12, pad=2)
-    low = top - 0.03 - rows * (height + 0.03) - 0.06
-    _rates(figure.add_axes((left + 0.03, bottom, right - left - 0.06, low - bottom)), chart)
+    below = top - ATTITUDES // COLUMNS * ROW - 0.065
+    _rates(figure.add_axes((left + 0.025, bottom, right - left - 0.05, below - bottom)), chart)
 
 
 def chosen(chart: RunPicture) -> list[int]:
@@ -104,16 +109,16 @@ def angle_panels(figure: Figure, chart: RunPicture, place: tuple[float, float, f
     left, bottom, width, height = place
     system: Any = chart.run.system
     t, good = chart.run.t, chart.finite
+    few = len(t) <= MOST_MARKED
     with np.errstate(all="ignore"):
         angles = np.clip(system.angles(chart.run.y, axis=1), -LARGEST, LARGEST)
     panels: list[Axes] = []
+    each = (height - 2 * GAP) / 3
     for i, name in enumerate(ANGLES):
-        gap = 0.055
-        each = (height - 2 * gap) / 3
-        axes = figure.add_axes((left, bottom + (2 - i) * (each + gap), width, each))
+        axes = figure.add_axes((left, bottom + (2 - i) * (each + GAP), width, each))
         axes.set_title(f"{name}, degrees", loc="left", size=13.5)
-        line = broken(np.where(good, angles[:, i], np.nan))
-        axes.plot(t, line, color="black", linewidth=1.5, zorder=3)
+        line = np.where(good, angles[:, i], np.nan)
+        axes.plot(*broken(t, line), color="black", linewidth=1.5, marker="." if few else "", markersize=3.6, zorder=3)
         labels = [(name.split()[1], line, "black")]
         if i < 2 and not np.isnan(commanded := system.commanded(name.split()[0], t)).all():
             axes.plot(t, commanded, **COMMANDED)
@@ -122,6 +127,8 @@ def angle_panels(figure: Figure, chart: RunPicture, place: tuple[float, float, f
         _scaled(axes)
         label_ends(axes, t, labels)
         panels.append(axes)
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
     panels[-1].set_xlabel("time")
     return panels
 
@@ -139,12 +146,11 @@ def _rates(axes: Axes, chart: RunPicture) -> None:
     axes.set_xlabel("time")
 
 
-def broken(angles: Array) -> Array:
-    """Angles over time, with a gap where they pass ±180° or jump by more than half a turn."""
-    jumps = np.flatnonzero(np.abs(np.diff(angles)) > 180.0)
-    made = angles.copy()
-    made[jumps + 1] = np.nan
-    return made
+def broken(t: Array, angles: Array) -> tuple[Array, Array]:
+    """Angles over time, with a gap where they jump by more than half a turn, as they do at ±180°."""
+    with np.errstate(invalid="ignore"):
+        jumps = np.flatnonzero(np.abs(np.diff(angles)) > 180.0) + 1
+    return np.insert(t, jumps, t[jumps]), np.insert(angles, jumps, np.nan)
 
 
 def _scaled(axes: Axes) -> None:

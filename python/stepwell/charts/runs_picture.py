@@ -46,9 +46,10 @@ def draw(chart: RunPicture) -> Figure:
     with rc_context(FONT):
         notes: list[str] = []
         if chart.kind == "attitude":
-            from .attitude_picture import draw_left_and_right
+            from .attitude_picture import draw_panels
 
-            draw_left_and_right(figure, chart, BOTTOM, TOP, RIGHT)
+            draw_panels(figure, chart, BOTTOM, TOP, RIGHT)
+            notes.append("The dark wing is the right one. A pitch angle above zero lowers the nose.")
             text(figure, chart, notes)
             return figure
         if chart.kind == "orbits":

@@ -11,7 +11,7 @@ from ...systems import Aircraft
 from ..base import Scene
 
 
-def gimbal_trap(form: str = "euler", roll: Any = 5.0, torque: Any = -1.5) -> Scene:
+def gimbal_trap(form: str = "euler", roll: Any = 2.0, torque: Any = -1.5) -> Scene:
     """An aircraft without controllers loops, and its nose passes near the vertical, where Euler angles have no meaning.
 
     A constant torque lifts the nose; the dampers and the yaw rate by the roll angle act. The aircraft is rolled a little at the
