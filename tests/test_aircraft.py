@@ -147,7 +147,7 @@ MUTANTS = [
 ]
 
 
-def mutant(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+def mutant(old: str, new: str) -> Any:
     """The equations with one mistake."""
     with open(aircraft_equations.__file__, encoding="utf-8") as file:
         text = file.read()
@@ -159,8 +159,8 @@ def mutant(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize(("old", "new"), MUTANTS)
-def test_a_mistake_in_the_rates_is_noticed(old: str, new: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = mutant(old, new, monkeypatch)
+def test_a_mistake_in_the_rates_is_noticed(old: str, new: str) -> None:
+    wrong = mutant(old, new)
 
     def kind(command: Any, torque: Any, on: bool) -> sw.System:
         gains = np.array([0.06, 0.10, 1.0]) * (1.0 if on else np.array([0.0, 0.0, 1.0]))
@@ -333,7 +333,7 @@ QUATERNION_MUTANTS = [
 ]
 
 
-def test_both_forms_are_the_same_motion_and_mistakes_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_forms_are_the_same_motion_and_mistakes_are_noticed() -> None:
     """By adaptive steps, each right to 1e-11 or so; a mistake is noticed where it moves an axis by 1e-6."""
     one = sw.Aircraft(roll=25.0, pitch=20.0, yaw_torque=0.1)
     start, at = np.array([0.1, -0.2, 0.3]), np.linspace(0.5, 5.0, 10)
@@ -349,7 +349,7 @@ def test_both_forms_are_the_same_motion_and_mistakes_are_noticed(monkeypatch: py
     for old, new in QUATERNION_MUTANTS:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            assert not apart(mutant(old, new, monkeypatch).quaternion(roll=25.0, pitch=20.0, yaw_torque=0.1)) < 1e-6, (old, new)
+            assert not apart(mutant(old, new).quaternion(roll=25.0, pitch=20.0, yaw_torque=0.1)) < 1e-6, (old, new)
 
 
 def test_the_length_of_the_quaternion_by_each_method() -> None:
@@ -388,6 +388,34 @@ def test_a_control_keeps_the_length_near_one_and_a_projection_at_one() -> None:
         sw.integrate(sw.Aircraft(), "rk4", v=0.0, y=0.0, dt=0.1, steps=1, control=sw.Projection("norm"))
     with pytest.raises(UnsupportedError, match="tolerance: goes with systems that nothing controls"):
         sw.integrate(made.system, "merson", v=v, y=system.attitude(), tolerance=1e-6, at=[1.0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("(strength * (1.0 - square)) * q", "(strength * (square - 1.0)) * q"),
+        ("(strength * (1.0 - square)) * q", "(2.0 * strength * (1.0 - square)) * q"),
+        ("return np.sqrt(q[0] * q[0]", "return np.sqrt(0.9 * q[0] * q[0]"),
+        ("inertia[2] * (v[2] * v[2])", "inertia[2] * (v[0] * v[2])"),
+    ],
+)
+def test_mistakes_in_what_is_kept_and_recorded_are_noticed(old: str, new: str) -> None:
+    def right(kind: Any) -> bool:
+        start: dict[str, Any] = {"v": np.array([0.3, 0.4, 3.0]), "y": np.array([0.5, 0.1, -0.7, 0.6])}
+        system = kind(damping=ZERO, gains=ZERO, strength=2.0, inertia=np.full(3, 2.0))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sw.DivergenceWarning)
+            run = sw.integrate(system, "standard_euler", **start, dt=0.01, steps=1000, record=["norm", "energy"])
+        # As above: h|ω|²/(8k), to the next order in hk.
+        square, rate = (run.y[-1] ** 2).sum(), 0.3**2 + 0.4**2 + 3.0**2
+        return bool(
+            abs((square - 1.0) / (0.01 * rate / 16.0) - 1.0) < 0.03
+            and abs(run.recorded["norm"][0] - math.sqrt(square)) < 20 * U
+            and abs(run.recorded["energy"][0] - rate) < 20 * U * rate
+        )
+
+    assert right(aircraft_equations.quaternion)
+    assert not right(mutant(old, new).quaternion)
 
 
 CONTROLS = [sw.NormControl(2.0), sw.Projection("norm"), sw.Control("norm", 3.0, target=1.0), sw.Projection("energy")]
@@ -471,32 +499,7 @@ def test_the_loop_past_the_vertical_is_lost_in_euler_angles_and_not_as_a_quatern
     assert np.abs(errors["euler"][before] - errors["quaternion"][before]).max() < 0.2
 
 
-# ---- attitudes and arguments
-
-
-def test_attitudes_go_there_and_back() -> None:
-    rng = np.random.default_rng(3)
-    roll, pitch, yaw = rng.uniform(-180.0, 180.0, 99), rng.uniform(-89.0, 89.0, 99), rng.uniform(-180.0, 180.0, 99)
-    one, two = sw.Aircraft(), sw.Aircraft("quaternion")
-    q, angles = two.attitude(roll, pitch, yaw), one.attitude(roll, pitch, yaw)
-    # Some twenty roundings; the angles of a matrix divide by cos 89°, 1/57.
-    np.testing.assert_allclose(np.sqrt((q * q).sum(axis=0)), 1.0, rtol=0, atol=20 * U)
-    np.testing.assert_allclose(one.rotation(angles), two.rotation(q), rtol=0, atol=40 * U)
-    np.testing.assert_allclose(two.angles(q), angles, rtol=0, atol=57.3 * 57.3 * 40 * U)
-    np.testing.assert_array_equal(one.angles(angles), angles)
-    np.testing.assert_allclose(two.rotation(3.0 * q), two.rotation(q), rtol=0, atol=40 * U)
-    run_like = np.moveaxis(q, 0, 1)
-    np.testing.assert_array_equal(two.angles(run_like, axis=1), np.moveaxis(two.angles(q), 0, 1))
-    np.testing.assert_array_equal(two.rotation(run_like, axis=1), two.rotation(q))
-    # By hand: the printed matrix, row by row.
-    f, t, p = (math.radians(float(each[0])) for each in (roll, pitch, yaw))
-    (sf, st, sp), (cf, ct, cp) = map(math.sin, (f, t, p)), map(math.cos, (f, t, p))
-    expected = [
-        [cp * ct, -sp * cf + cp * st * sf, sp * sf + cp * st * cf],
-        [sp * ct, cp * cf + sp * st * sf, -cp * sf + sp * st * cf],
-        [-st, ct * sf, ct * cf],
-    ]
-    np.testing.assert_allclose(one.rotation(angles[:, 0]), expected, rtol=0, atol=20 * U)
+# ---- commands and arguments
 
 
 def test_commands_over_time() -> None:
