@@ -139,6 +139,8 @@ def tape() -> Figure:
 if __name__ == "__main__":
     write("tape.png", tape())
     examples()
+    turns = sw.scenes.aircraft()
+    write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panel = sw.charts.panel(each.name for each in sw.scenes.scenes())

@@ -63,6 +63,16 @@ SYSTEMS: dict[str, Make] = {
         _omega(r, b), 0.2, x=_sine(r, b), a=sw.Sampled(r.normal(size=7), interval=0.11)
     ),
     "sampled x and a, physical": lambda r, b: sw.Oscillator(_omega(r, b), x=_held(r, b), a=_held(r, b), form="physical"),
+    "aircraft": lambda r, b: sw.Aircraft(
+        inertia=r.uniform(0.5, 1.5, (3, b)), gains=r.uniform(0.02, 0.1, (3, b)), roll=r.normal(0.0, 30.0, b), pitch=_sine(r, b)
+    ),
+    "aircraft without controllers": lambda r, b: sw.Aircraft(
+        damping=r.uniform(0.0, 3.0, 3), roll_torque=_held(r, b), pitch_torque=r.normal(size=b), controllers=False
+    ),
+    "aircraft, quaternion": lambda r, b: sw.Aircraft("quaternion", damping=r.uniform(0.5, 3.0, (3, b)), roll=_held(r, b)),
+    "aircraft, quaternion, without controllers": lambda r, b: sw.Aircraft(
+        "quaternion", yaw_torque=_sine(r, b), controllers=False
+    ),
     "pendulum": lambda r, b: sw.Pendulum(_omega(r, b)),
     "pendulum, damped": lambda r, b: sw.Pendulum(_omega(r, b), r.uniform(0.0, 0.5, b)),
     "pendulum, constant a": lambda r, b: sw.Pendulum(1.1, a=r.normal(size=b)),

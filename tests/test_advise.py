@@ -33,10 +33,12 @@ from benches.advice import Brute
 QUICK = ("oscillator", "forced_oscillator", "clover", "pendulum")
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 SLOW = {
+    "aircraft": (1e-2, 1e-4),
     "arenstorf": (1e-2, 1e-5),
     "chain": (1e-3,),
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
+    "gimbal_trap": (1e-1, 1e-3),
     "kepler": (1e-1, 1e-3, 1e-6),
     "plummer": (),
     "pythagorean": (1e-3,),

@@ -283,7 +283,7 @@ def test_explain_takes_a_scene_with_its_control(capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["oscilator", "rk4"], "system: there is no 'oscilator'; expected a scene, arenstorf, "),
+        (["oscilator", "rk4"], "system: there is no 'oscilator'; expected a scene, aircraft, arenstorf, "),
         (["Chain", "rk4"], "system: Chain needs arguments"),
         (["System", "rk4"], "system: there is no 'System'"),
         (["oscillator", "rk5"], "method: there is no 'rk5'"),

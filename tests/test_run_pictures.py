@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from PIL import Image
-from stepwell.charts import runs_animation, runs_picture
+from stepwell.charts import attitude_picture, runs_animation, runs_picture
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 
 
@@ -28,6 +28,8 @@ def pictures():
     with pytest.warns(sw.AccuracyWarning, match="have another energy at the end"):
         gone = looked_at(scenes.pythagorean(), "leapfrog", every=5)
     return {
+        "attitude": looked_at(scenes.aircraft()),
+        "trapped": looked_at(scenes.gimbal_trap()),
         "orbits": looked_at(scenes.figure_eight(), "leapfrog"),
         "long": looked_at(scenes.energy_control(), "standard_euler", steps=5000),
         "space": looked_at(scenes.plummer(), "leapfrog", steps=200),
@@ -43,9 +45,17 @@ def pictures():
 
 
 KINDS = ("orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")
+#: Of an aircraft, whose pictures show angles in place of errors.
+ATTITUDES = ("attitude", "trapped")
 #: By default one of each way to lay out, and one that ends in what cannot be drawn.
-SHOWN = ("orbits", "space", "swing", "rows", "crash")
-every_kind = pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SHOWN else pytest.mark.long) for k in KINDS])
+SHOWN = ("attitude", "orbits", "space", "swing", "rows", "crash")
+
+
+def each_of(kinds):
+    return pytest.mark.parametrize("kind", [pytest.param(k, marks=() if k in SHOWN else pytest.mark.long) for k in kinds])
+
+
+every_kind, every_kind_with_errors = each_of((*ATTITUDES, *KINDS)), each_of(KINDS)
 
 
 def said(figure):
@@ -169,7 +179,7 @@ def test_nothing_in_the_picture_is_cut_off_or_covered(pictures, kind, tmp_path):
         assert not any(box.overlaps(other) for other in boxes[:i])
 
 
-@every_kind
+@every_kind_with_errors
 def test_energy_is_never_shown_alone(pictures, kind):
     """Below it the state error, or the words that there is none."""
     chart = pictures[kind]
@@ -262,6 +272,49 @@ def test_swings_and_rows_are_the_states(pictures):
     axes = pictures["many rows"].plot().axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert (labels[0], labels[-1], len(labels)) == ("1", "100", runs_picture.MOST_ROWS)
+
+
+def test_an_aircraft_is_drawn_by_its_angles_and_its_axes(pictures):
+    chart = pictures["attitude"]
+    assert (chart.kind, chart.energy_error, chart.state_error) == ("attitude", None, None)
+    figure = chart.plot()
+    roll, pitch, yaw, *_, rates = figure.axes
+    for i, axes in enumerate((roll, pitch, yaw)):
+        np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.stack([chart.run.t, chart.run.y[:, i]], axis=1))
+    np.testing.assert_array_equal(roll.lines[1].get_ydata(), chart.run.system.commanded("roll", chart.run.t))
+    assert set(pitch.lines[1].get_ydata()) == {-10.0}
+    assert [text.get_text() for text in roll.texts] == ["commanded", "φ"] or [text.get_text() for text in roll.texts] == [
+        "φ",
+        "commanded",
+    ]
+    np.testing.assert_array_equal([line.get_ydata() for line in rates.lines], chart.run.v.T)
+    # Level at t = 0: seen from behind, to the right and above, the nose is farther away and so higher, the right wing nearer.
+    level = dict(zip(attitude_picture.PARTS, figure.axes[3].patches, strict=True))
+    assert level["fuselage"].get_xy()[0, 1] > level["fin"].get_xy()[0, 1]
+    assert level["right wing"].get_zorder() > level["left wing"].get_zorder()
+    # Where it banks to the right, the right wing is down.
+    at = attitude_picture.chosen(chart)
+    banked = next(i for i, frame in enumerate(at) if chart.run.y[frame, 0] > 20.0)
+    parts = dict(zip(attitude_picture.PARTS, figure.axes[3 + banked].patches, strict=True))
+    turned = chart.run.system.rotation(chart.run.y[at[banked]])
+    tip = turned @ attitude_picture.PARTS["right wing"][0][1]
+    assert tip[2] < -0.3
+    screen = attitude_picture.viewed()
+    np.testing.assert_allclose(parts["right wing"].get_xy()[1], [tip @ screen.right, tip @ screen.up], rtol=0, atol=1e-15)
+
+
+def test_angles_that_jump_are_broken_off(pictures):
+    line = pictures["trapped"].plot().axes[0].lines[0]
+    assert np.isnan(line.get_ydata()).sum() >= 1
+    assert (np.abs(np.diff(line.get_ydata())[~np.isnan(np.diff(line.get_ydata()))]) <= 180.0).all()
+    known = line.get_ydata()[~np.isnan(line.get_ydata())]
+    np.testing.assert_array_equal(known, pictures["trapped"].run.system.angles(pictures["trapped"].run.y, axis=1)[:, 0])
+
+
+def test_a_diverged_aircraft_is_drawn_as_far_as_it_is_finite():
+    with pytest.warns(sw.DivergenceWarning):
+        chart = looked_at(sw.scenes.aircraft(), "standard_euler", 2.0, steps=900)
+    assert "Diverged at step" in said(chart.plot())
 
 
 @pytest.mark.parametrize("ending", ["svg", "pdf"])

@@ -17,6 +17,7 @@ from stepwell import charts
 from stepwell._value import Value, same
 
 FREE = sw.Oscillator(omega=2.0)
+QUATERNION: dict[str, Any] = {"v": np.ones(3), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.1, "steps": 1}
 BODIES = sw.NBody([3.0, 4.0, 5.0], force="newton", softening=0.1)
 STATE: dict[str, Any] = {"v": 0.0, "y": np.array([[1.0, 3.0], [-2.0, -1.0], [1.0, -1.0]]), "dt": 0.01}
 
@@ -63,6 +64,17 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 2.0)),
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 3.0)),
         lambda: sw.Oscillator(a=sw.Sampled([1.0, 2.0], 0.1)),
+    ],
+    "Aircraft": [
+        sw.Aircraft,
+        lambda: sw.Aircraft("quaternion"),
+        lambda: sw.Aircraft(inertia=[1.0, 2.0, 3.0]),
+        lambda: sw.Aircraft(damping=np.zeros((3, 2))),
+        lambda: sw.Aircraft(roll=sw.Sinusoid(30.0, 1.0)),
+        lambda: sw.Aircraft(pitch_torque=0.0),
+        lambda: sw.Aircraft(controllers=False),
+        lambda: sw.integrate(sw.Aircraft("quaternion"), "rk4", **QUATERNION, control=sw.NormControl(2.0)).system,
+        lambda: sw.integrate(sw.Aircraft("quaternion"), "rk4", **QUATERNION, control=sw.Projection("norm")).system,
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],

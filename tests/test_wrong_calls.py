@@ -165,6 +165,16 @@ def _of_run(name: str) -> Callable[..., Any]:
 #: several ways to call it, told apart by what follows a blank.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Oscillator": (sw.Oscillator, {"omega": 1.0, "damping": 0.1, "x": 0.0, "a": 0.0, "form": "physical"}),
+    "Aircraft": (
+        sw.Aircraft,
+        {"form": "euler", "inertia": [0.6, 1.0, 1.5], "damping": np.ones(3), "gains": np.ones(3), "roll": 30.0, "pitch": 0.0}
+        | {"roll_torque": None, "pitch_torque": 0.1, "yaw_torque": sw.Sinusoid(1.0, 1.0), "controllers": True},
+    ),
+    "Aircraft without controllers": (sw.Aircraft, {"roll": 0.0, "controllers": False}),
+    "Aircraft.attitude": (sw.Aircraft("quaternion").attitude, {"roll": 10.0, "pitch": 20.0, "yaw": 30.0}),
+    "Aircraft.angles": (sw.Aircraft("quaternion").angles, {"y": np.ones((5, 4)), "axis": 1}),
+    "Aircraft.rotation": (sw.Aircraft().rotation, {"y": np.ones((3, 2)), "axis": 0}),
+    "Aircraft.commanded": (sw.Aircraft(roll=3.0).commanded, {"name": "roll", "t": [0.0, 1.0]}),
     "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
     "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
     "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
@@ -225,6 +235,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "Run.quantity": (_of_run("quantity"), {"name": "energy"}),
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None}),
+    "scenes.aircraft": (sw.scenes.aircraft, {"form": "euler", "roll": 40.0, "pitch": 0.0}),
+    "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),

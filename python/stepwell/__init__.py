@@ -28,11 +28,13 @@ if TYPE_CHECKING:
     from .exports import ExportedStep, export
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
+    from .systems import Aircraft
 
 __version__: str = _core.__version__
 
 __all__ = [
     "AccuracyWarning",
+    "Aircraft",
     "Chain",
     "Control",
     "ControlWarning",
@@ -103,6 +105,7 @@ def isa_levels() -> list[str]:
 
 #: Attributes that are imported on first use, so that importing stepwell stays fast, and their modules.
 _LATER = {
+    "Aircraft": "systems.Aircraft",
     "advice": "advice",
     "Scene": "scenes.Scene",
     "advise": "advice.advise",

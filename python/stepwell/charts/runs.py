@@ -47,9 +47,11 @@ class RunPicture(Drawn, Value):
 
     @property
     def kind(self) -> str:
-        """What is drawn: ``"orbits"`` of bodies, ``"swing"`` of a single coordinate, or ``"rows"`` of coordinates."""
+        """What is drawn: ``"orbits"`` of bodies, an ``"attitude"``, the ``"swing"`` of one coordinate, or ``"rows"`` of some."""
         if isinstance(self.run.system, NBody):
             return "orbits"
+        if hasattr(self.run.system, "commanded"):
+            return "attitude"
         return "rows" if self.scene.system.y_shape else "swing"
 
     @property
@@ -180,6 +182,8 @@ def _begins(scene: Scene, run: Run) -> bool:
 
 
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
+    if scene.exact is None and getattr(scene.system, "torques_act", False):
+        return None, ""  # it changes in the true motion, which is not known
     try:
         energy = run.energy
     except UnsupportedError:

@@ -10,11 +10,13 @@ import numpy as np
 
 from .. import _checks
 from ..errors import ArgumentError, UnsupportedError
+from . import attitude_picture
 from .runs import RunPicture
 from .runs_picture import BODIES, EXACT, body, curves, errors, exact, left_picture, square, view
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 ENDINGS = (".gif", ".mp4", ".html")
@@ -88,15 +90,14 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
     run = chart.run
     figure.text(0.012, 0.91, f"{run.steps} steps of {run.dt:.6g}", size=15, color=GREY)
     now = figure.text(0.978, 0.945, "", size=20, ha="right", family="monospace")
-    show_left = {"orbits": _orbits, "swing": _swing, "rows": _rows}[chart.kind](figure, chart)
-    left = {"orbits": 0.56, "swing": 0.66, "rows": 0.66}[chart.kind]
-    energy = figure.add_axes((left, 0.53, 0.978 - left, 0.33))
-    state = figure.add_axes((left, 0.1, 0.978 - left, 0.33))
-    errors(energy, state, chart)
-    state.set_xlabel("time")
-    shown = [axes for axes, error in ((energy, chart.energy_error), (state, chart.state_error)) if error is not None]
-    for axes in shown:
-        axes.lines[0].set_color("#9a9a9a")
+    if chart.kind == "attitude":
+        show_left, shown = (
+            attitude_picture.animated(figure, chart),
+            attitude_picture.angle_panels(figure, chart, (0.56, 0.1, 0.36, 0.76)),
+        )
+    else:
+        show_left = {"orbits": _orbits, "swing": _swing, "rows": _rows}[chart.kind](figure, chart)
+        shown = _errors(figure, chart, {"orbits": 0.56, "swing": 0.66, "rows": 0.66}[chart.kind])
     cursors = [axes.axvline(float(run.t[0]), color="black", linewidth=2.0) for axes in shown]
     digits = max(0, min(6, 2 - int(np.floor(np.log10(max(float(run.t[-1] - run.t[0]) / 100.0, 1e-300))))))
     width = len(f"{run.t[-1]:.{digits}f}")
@@ -109,6 +110,18 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
         show_left(frame)
 
     return figure, show
+
+
+def _errors(figure: Figure, chart: RunPicture, left: float) -> list[Axes]:
+    """The errors over the run, in grey; the panels of those that are known."""
+    energy = figure.add_axes((left, 0.53, 0.978 - left, 0.33))
+    state = figure.add_axes((left, 0.1, 0.978 - left, 0.33))
+    errors(energy, state, chart)
+    state.set_xlabel("time")
+    shown = [axes for axes, error in ((energy, chart.energy_error), (state, chart.state_error)) if error is not None]
+    for axes in shown:
+        axes.lines[0].set_color("#9a9a9a")
+    return shown
 
 
 def _orbits(figure: Figure, chart: RunPicture) -> Show:

@@ -45,6 +45,13 @@ def draw(chart: RunPicture) -> Figure:
 
     with rc_context(FONT):
         notes: list[str] = []
+        if chart.kind == "attitude":
+            from .attitude_picture import draw_panels
+
+            draw_panels(figure, chart, BOTTOM, TOP, RIGHT)
+            notes.append("The dark wing is the right one. A pitch angle above zero lowers the nose.")
+            text(figure, chart, notes)
+            return figure
         if chart.kind == "orbits":
             _orbits(figure, chart, notes)
             left = 0.55 if chart.run.y.shape[2] == 2 else 0.735
@@ -209,7 +216,7 @@ def _swing(axes: Axes, chart: RunPicture, block: Array, exact: Array | None, not
         notes.append("The curve leaves the picture.")
     axes.axhline(0.0, color="#cccccc", linewidth=0.8, zorder=0)
     axes.set(ylim=(-1.12 * (size or 1.0), 1.12 * (size or 1.0)))
-    _over_time(axes, chart)
+    over_time(axes, chart)
 
 
 def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
@@ -235,10 +242,11 @@ def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
     axes.set_yticks([place * step for place in range(len(chosen))], [str(i + 1) for i in chosen.tolist()])
     axes.set_ylim(-1.15 * size, (len(chosen) - 1) * step + 1.15 * size)
     axes.set_ylabel(f"coordinate; from line to line {step:.3g}")
-    _over_time(axes, chart)
+    over_time(axes, chart)
 
 
-def _over_time(axes: Axes, chart: RunPicture) -> None:
+def over_time(axes: Axes, chart: RunPicture) -> None:
+    """The scale of the time, and a grid."""
     first, last = float(chart.run.t[0]), float(chart.run.t[-1])
     margin = 0.01 * (last - first)
     axes.set_xlim(first - margin, last + margin)
@@ -255,7 +263,7 @@ def errors(energy: Axes, state: Axes, chart: RunPicture) -> None:
         (energy, chart.energy_error, "energy error"),
         (state, chart.state_error, "state error"),
     ):
-        _over_time(axes, chart)
+        over_time(axes, chart)
         axes.set_title(f"{title} over time, relative", loc="left", size=13.5)
         if error is None:
             missing = (

@@ -1,4 +1,10 @@
-"""The systems that users describe: parameters, checks, energies. Their formulas are in ``stepwell.reference.systems``."""
+"""The systems that users describe: parameters, checks, energies. Their formulas are in ``stepwell.reference.systems``.
+
+``Aircraft`` is imported on first use: its rates are equations that are traced like users' own, and that takes modules which other
+systems do without.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from .base import System
 from .chain import Chain
@@ -9,7 +15,11 @@ from .oscillator import Oscillator
 from .pendulum import Pendulum
 from .restricted_three_body import RestrictedThreeBody
 
+if TYPE_CHECKING:
+    from .aircraft import Aircraft
+
 __all__ = [
+    "Aircraft",
     "Chain",
     "LinearSystem",
     "NBody",
@@ -20,3 +30,11 @@ __all__ = [
     "Sinusoid",
     "System",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name != "Aircraft":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .aircraft import Aircraft
+
+    return Aircraft
