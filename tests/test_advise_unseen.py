@@ -243,7 +243,11 @@ def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
         ({"dt": 0.0}, ArgumentError, "dt: expected numbers above zero"),
         ({"until": -1.0}, ArgumentError, "until: expected a time of zero or more"),
         ({"exact": 3.0}, DTypeError, "exact: expected a function of times, or None, got float"),
-        ({"control": "on"}, DTypeError, "control: expected an EnergyControl, a Control or a Projection, got str"),
+        (
+            {"control": "on"},
+            DTypeError,
+            "control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got str",
+        ),
     ],
 )
 def test_what_is_no_scene(given: dict[str, Any], error: type[Exception], said: str) -> None:
