@@ -96,6 +96,10 @@ def advise(
             f"frame: expected at most {LONGEST_FRAME:g} times the horizon of {scene.horizon:g} units of time, got {frame:g}"
         )
 
+    if frame is not None and not scene.horizon < frame * _checks.LAST_STEP:
+        frames = f"{_checks.LAST_STEP:.0e} frames or fewer in the horizon of {scene.horizon:g} units of time"
+        raise ArgumentError(f"frame: expected {frames}, got a frame of {frame:g}")
+
     known = motion_of(scene, frame, tolerance)
     most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
     trials = Trials(known, tolerance, LONG_RUN_SHARE * most)

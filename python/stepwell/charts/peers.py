@@ -23,6 +23,9 @@ from ..errors import DTypeError, ShapeError, UnsupportedError
 from ..scenes import Scene
 from ..systems import NBody
 
+#: SciPy's methods that need no derivatives of the rates.
+EXPLICIT = ("RK23", "RK45", "DOP853")
+
 #: Tolerances of a peer, and of methods with adaptive steps: two in each factor of ten.
 TOLERANCES = tuple(float(f"{10.0 ** (-k / 2):.3g}") for k in range(4, 25))
 
@@ -124,6 +127,7 @@ def scipy(method: str = "RK45", settings: Sequence[float] = TOLERANCES) -> Peer:
         UnsupportedError: if SciPy is not installed.
     """
     _need("scipy.integrate", "scipy")
+    known("method", method, EXPLICIT)
     return Peer(f"SciPy {method}", ByScipy(method), settings)
 
 

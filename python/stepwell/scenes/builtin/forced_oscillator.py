@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ..._checks import Array, frequency, number
 from ...errors import ArgumentError
 from ...systems import Oscillator, Sinusoid
 from ..base import Scene
@@ -31,15 +31,15 @@ def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 
     Raises:
         ArgumentError: what is wrong with which argument.
     """
-    omega = number("omega", omega, positive=True, unit="rad per unit of time")
+    omega = frequency("omega", omega)
     damping = number("damping", damping, positive=True)
     if damping >= 1:
         raise ArgumentError(f"damping: expected a ratio below 1, where the oscillator still swings, got {damping:g}")
     amplitude = number("amplitude", amplitude)
-    drive = number("drive", drive, positive=True, unit="rad per unit of time")
+    drive = frequency("drive", drive)
     phase = number("phase", phase, unit="rad")
-    if (largest := max(omega, drive, abs(amplitude))) > LARGEST:
-        raise ArgumentError(f"omega, drive, amplitude: expected numbers of at most {LARGEST:g}, got {largest:g}")
+    if abs(amplitude) > LARGEST:
+        raise ArgumentError(f"amplitude: expected at most {LARGEST:g}, got {amplitude:g}")
     y0, v0 = 1.0, 0.0
 
     # y = Re(steady·exp(i·drive·t) + free·exp(decay·t)); sin is the real part of −i·exp.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ..._checks import Array, frequency
 from ...systems import Oscillator
 from ..base import Scene
 
@@ -23,7 +23,7 @@ def oscillator(omega: Any = 1.0) -> Scene:
     Raises:
         ArgumentError: what is wrong with ``omega``.
     """
-    omega = number("omega", omega, positive=True, unit="rad per unit of time")
+    omega = frequency("omega", omega)
 
     def exact(t: Array) -> tuple[Array, Array]:
         return -np.sin(omega * t), np.cos(omega * t)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ..._checks import Array, frequency, number
 from ...errors import ArgumentError
 from ...systems import Pendulum
 from ..base import Scene
@@ -32,7 +32,7 @@ def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
     amplitude = number("amplitude", amplitude, unit="degrees")
     if not 0.0 < amplitude < 180.0:
         raise ArgumentError(f"amplitude: expected degrees above 0 and below 180, got {amplitude:g}")
-    omega = number("omega", omega, positive=True, unit="rad per unit of time")
+    omega = frequency("omega", omega)
     # Jacobi's modulus and its complement; the latter from the angle to the top keeps its digits for an amplitude near 180°.
     modulus = math.sin(math.radians(0.5 * amplitude))
     complement = math.sin(math.radians(0.5 * (180.0 - amplitude)))
