@@ -66,6 +66,16 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
+    "RigidBody": [
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]),
+        lambda: sw.RigidBody([1.0, 2.0, 2.5]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], [0.1, None, None]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], space_torque=[0.1, None, None]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], damping=0.1),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], weight=1.0, centre=[0.0, 0.0, 1.0]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(1.0), ()),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.Projection("norm"), ()),
+    ],
     "Chain": [
         lambda: sw.Chain(3),
         lambda: sw.Chain(4),

@@ -16,11 +16,22 @@ from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, Stepwell
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
+from .systems import (
+    Chain,
+    LinearSystem,
+    NBody,
+    Oscillator,
+    Pendulum,
+    RestrictedThreeBody,
+    RigidBody,
+    Sampled,
+    Sinusoid,
+    System,
+)
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, scenes, stability
+    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, quaternion, scenes, stability
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
@@ -49,6 +60,7 @@ __all__ = [
     "Pendulum",
     "Projection",
     "RestrictedThreeBody",
+    "RigidBody",
     "Run",
     "Sampled",
     "Scene",
@@ -79,6 +91,7 @@ __all__ = [
     "lyapunov",
     "method",
     "methods",
+    "quaternion",
     "scenes",
     "stability",
     "stability_along",
@@ -118,6 +131,7 @@ _LATER = {
     "equations": "equations",
     "export": "exports.export",
     "exports": "exports",
+    "quaternion": "quaternion",
     "scenes": "scenes",
     "system": "equations.system",
     "stability": "stability",

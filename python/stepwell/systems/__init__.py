@@ -8,6 +8,7 @@ from .nbody import NBody
 from .oscillator import Oscillator
 from .pendulum import Pendulum
 from .restricted_three_body import RestrictedThreeBody
+from .rigid_body import RigidBody
 
 __all__ = [
     "Chain",
@@ -16,6 +17,7 @@ __all__ = [
     "Oscillator",
     "Pendulum",
     "RestrictedThreeBody",
+    "RigidBody",
     "Sampled",
     "Sinusoid",
     "System",
