@@ -194,6 +194,16 @@ def test_standard_euler_settles_up_to_a_gain(phi: float) -> None:
         assert one == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+def test_at_rest_it_diverges_from_a_gain_of_two_on() -> None:
+    """n ← n·(1 + hk·(1 − n²)) maps [−a, a] to itself, a² = (2 + hk)/hk, as long as its largest value is below a: up to hk = 2."""
+    gains = np.array([1.5, 1.95, 2.05, 3.0])
+    run = sw.integrate(
+        BODY, "false_euler", v=np.zeros(3), y=1.001 * tops.UNIT, dt=0.1, steps=5000, control=sw.NormControl(gains / 0.1)
+    )
+    assert run.status.tolist() == [0, 0, 1, 1]
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_at_rest_the_gain_is_limited_by_the_method(method: str) -> None:
     """|q| − 1 decays at 2k, so hk is below half the limit on the negative real axis: 1 for Euler and Heun, 1.393 for RK4."""

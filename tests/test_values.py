@@ -166,6 +166,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
     "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
+    "NormSweep": [lambda: charts.norm(["rk4"], gains=[0.1]), lambda: charts.norm(["rk4"], gains=[0.2])],
+    "Settled": [lambda: charts.norm(["rk4"], gains=[0.1]).lines[0], lambda: charts.norm(["rk4"], gains=[0.2]).lines[0]],
     "Powers": [lambda: charts.powers("rk4")],  # with measured times
     "Solved": [
         lambda: charts.Solved(np.ones(2), np.ones(2), None, 0.1),

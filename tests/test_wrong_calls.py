@@ -310,6 +310,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         charts.powers,
         {"method": "rk4", "system": None, "v": 0.0, "y": 1.0, "dt": 0.3, "steps": [1, 10], "progress": None},
     ),
+    "charts.norm": (charts.norm, {"methods": ["rk4"], "phi": 0.1, "gains": [0.1, 0.2], "progress": None}),
     "charts.run_picture": (charts.run_picture, {"scene": KEPLER, "run": KEPLER.run("rk4", 0.1, steps=9, every=3)}),
     "charts.control": (
         charts.control,
