@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Default methods: of first, second and fourth order. False Euler steps a steady turn as Standard Euler does.
 METHODS = ("standard_euler", "standard_heun", "rk4")
 
-#: Default gains h·k: up to nearly 1, above which Euler's norm does not settle and Heun's settles elsewhere.
+#: Default gains h·k: up to nearly 1, above which Euler's norm does not converge, and Heun's does to another value.
 GAINS = tuple(float(gain) for gain in np.geomspace(0.01, 0.98, 101))
 
 #: The default angle Φ = ½h|ω| by which a true step turns the quaternion, in rad; the body turns by twice that.
