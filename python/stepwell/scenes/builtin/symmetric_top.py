@@ -50,7 +50,7 @@ def _turn(axis: Array, angle: Array) -> Array:
 
 
 def symmetric_top(axial: Any = 1.6, spin: Any = 2.0, wobble: Any = 1.0) -> Scene:
-    """A free body of moments (1, 1, C), thrown with a spin about its axis and a wobble across it, over three turns of the axis.
+    """A free body of moments (1, 1, C), thrown with a spin about its axis and a wobble across it, over ten turns of the axis.
 
     The axis goes round the angular momentum, which is vertical here, at the rate |L|, at an angle θ with cos θ = C·ω₃/|L|; in the
     body ω turns at (C − 1)·ω₃. Both are steady, so the motion has a formula.
@@ -83,6 +83,6 @@ def symmetric_top(axial: Any = 1.6, spin: Any = 2.0, wobble: Any = 1.0) -> Scene
         v=v,
         y=q,
         dt=0.3 / momentum,
-        horizon=6.0 * math.pi / momentum,
+        horizon=20.0 * math.pi / momentum,
         exact=Wobble(axial, tuple(v.tolist()), tuple(q.tolist())),
     )
