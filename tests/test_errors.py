@@ -113,7 +113,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(control=0.3),
         E.DTypeError,
-        "control: expected an EnergyControl, a Control or a Projection, got float",
+        "control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got float",
     ),
     (
         lambda: run(control=sw.EnergyControl(0.3)),

@@ -291,3 +291,37 @@ def test_quaternions() -> None:
     ):
         with pytest.raises(ArgumentError, match=message):
             call()  # type: ignore[no-untyped-call]
+
+
+# ---- what else reads a step
+
+
+@pytest.mark.parametrize("keeper", [sw.NormControl(0.7), sw.Projection("norm")], ids=repr)
+def test_a_step_under_control_is_explained_and_exported(keeper: Any) -> None:
+    """Without a state, which such a control does not need; the exported Python makes the same step."""
+    body = sw.RigidBody([1.0, 1.5, 2.0], damping=0.1)
+    assert sw.explain(body, "standard_euler", control=keeper) != sw.explain(body, "standard_euler")
+    source = sw.export(body, "rk4", "python", dt=0.1, control=keeper).source
+    assert source != sw.export(body, "rk4", "python", dt=0.1).source
+    kept = body.under(keeper, ())
+    with pytest.raises(UnsupportedError, match="tolerance: goes with systems that nothing controls"):
+        sw.integrate(kept, "merson", v=np.ones(3), y=tops.UNIT, tolerance=1e-3, at=[1.0])
+
+
+@pytest.mark.parametrize("keeper", [None, sw.NormControl(0.7), sw.Projection("norm")], ids=repr)
+def test_the_derivative_of_a_step_under_control(keeper: Any) -> None:
+    """By the complex step, as for every system here, against differences: their error is e² and a rounding by e."""
+    free = sw.RigidBody([1.0, 1.5, 2.0], weight=1.2, centre=[0.1, 0.2, 0.3])
+    body = free if keeper is None else free.under(keeper, ())
+    v, q, e = np.array([0.4, -0.8, 1.1]), 1.1 * tops.some_attitude(8), 1e-5
+    found = sw.analyse(body, "rk4", dt=0.2, at=(v, q)).P
+    columns = []
+    for i in range(7):
+        change = e * np.eye(7)[i]
+        ends = [
+            sw.integrate(free, "rk4", v=v + s * change[:3], y=q + s * change[3:], dt=0.2, steps=1, control=keeper)
+            for s in (-1.0, 1.0)
+        ]
+        low, high = (np.concatenate([run.v[-1], run.y[-1]]) for run in ends)
+        columns.append((high - low) / (2 * e))
+    np.testing.assert_allclose(found, np.stack(columns, axis=1), rtol=0, atol=1e-9)
