@@ -148,6 +148,25 @@ def test_the_wing_nut_is_that_of_the_facts() -> None:
     assert (q * q).sum() == pytest.approx(1.0, abs=1e-15)
 
 
+@pytest.mark.parametrize(("spin", "lean"), [(10.0, 30.0), (6.0, 70.0)])
+def test_the_heavy_top_nods_between_two_heights(spin: float, lean: float) -> None:
+    """Let go at u = cos θ₀, it falls to u₁ = λ − √(λ² − 2λu + 1), λ = (C·s)²/(4A·W·l), and comes up again to u, at rest.
+
+    From the energy and the momentum about both axes; ω₃ is constant. Between saved states a height is off by a share of (h·ω)².
+    """
+    scene = sw.scenes.heavy_top(spin, lean)
+    run = scene.run("dop853", scene.dt / 10, every=1)
+    height = quaternion.matrix(run.y.T)[2, 2]
+    up, strength = math.cos(math.radians(lean)), (0.5 * spin) ** 2 / 16.0
+    low = strength - math.sqrt(strength**2 - 2 * strength * up + 1.0)
+    assert height.max() == pytest.approx(up, abs=1e-12)
+    assert height.min() == pytest.approx(low, abs=1e-5)
+    assert height[int(np.argmax(height < low + 1e-5)) :].max() == pytest.approx(up, abs=1e-5)
+    np.testing.assert_allclose(run.v[:, 2], spin, rtol=1e-12)
+    momentum = run.quantity("angular_momentum")[:, 2]
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-12)
+
+
 # ---- inputs, batches, bits
 
 
