@@ -58,6 +58,16 @@ def write_best(panel: sw.charts.Panel) -> None:
     print("docs/work-precision.md")
 
 
+def wing_nut() -> None:
+    """The picture of the example of that name."""
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = Path(folder) / "wing-nut.png"
+        runpy.run_path(str(DOCS.parent / "examples" / "wing_nut.py"))["picture"](str(drawn))
+        few = Image.open(drawn).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS)
+        few.save(IMAGES / "wing-nut.png", optimize=True)
+        print("docs/images/wing-nut.png")
+
+
 def examples() -> None:
     """The pictures of the examples of own equations, drawn by these."""
     with tempfile.TemporaryDirectory() as folder:
@@ -141,6 +151,7 @@ if __name__ == "__main__":
     examples()
     turns = sw.scenes.aircraft()
     write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())
+    wing_nut()
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panel = sw.charts.panel(each.name for each in sw.scenes.scenes())
@@ -151,6 +162,7 @@ if __name__ == "__main__":
     write("stability-curves.png", stability.plot(kind="curves"))
     for method in MAPS:
         write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot(), SHADES)
+    write("quaternion-norm.png", sw.charts.norm().plot())
     write("figures.png", sw.charts.figures().plot())
     write("powers.png", sw.charts.powers().plot())
     eight = sw.scenes.figure_eight()

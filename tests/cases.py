@@ -46,6 +46,11 @@ def _masses(rng: np.random.Generator, b: int) -> sw.LinearSystem:
     return sw.LinearSystem(A, B, x=_sine(rng, b), velocities=v)
 
 
+def _moments(rng: np.random.Generator, b: int) -> Any:
+    """Principal moments of which none is above the sum of the others."""
+    return rng.uniform(1.0, 2.0, (3, b))
+
+
 #: One maker for each kernel variant of each system.
 SYSTEMS: dict[str, Make] = {
     "free": lambda r, b: sw.Oscillator(_omega(r, b)),
@@ -84,6 +89,17 @@ SYSTEMS: dict[str, Make] = {
     ),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
+    "top, free": lambda r, b: sw.RigidBody(_moments(r, b)),
+    "top, damped, torques of its own": lambda r, b: sw.RigidBody(
+        _moments(r, b), [_sine(r, b), None, _held(r, b)], damping=r.uniform(0.0, 0.3, b) * np.ones((3, 1))
+    ),
+    "top, torques of space": lambda r, b: sw.RigidBody(
+        _moments(r, b), r.normal(size=(3, b)), [None, _sine(r, b), 0.3], damping=0.1
+    ),
+    "top, heavy": lambda r, b: sw.RigidBody(_moments(r, b), weight=r.uniform(0.5, 2.0, b), centre=r.normal(size=(3, b))),
+    "top, heavy, torque of space": lambda r, b: sw.RigidBody(
+        _moments(r, b), space_torque=[_held(r, b), None, None], weight=1.3, centre=r.normal(size=(3, b))
+    ),
     "three bodies": lambda r, b: sw.NBody(G=r.uniform(0.5, 2.0, b)),
     "three bodies in space, newton": lambda r, b: sw.NBody(
         [1.0, 0.0, 2.0], force="newton", softening=r.uniform(0.1, 0.2, b), dim=3

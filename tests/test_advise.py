@@ -36,12 +36,15 @@ SLOW = {
     "aircraft": (1e-2, 1e-4),
     "arenstorf": (1e-2, 1e-5),
     "chain": (1e-3,),
+    "dzhanibekov": (1e-1, 1e-3),
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
     "gimbal_trap": (1e-1, 1e-3),
+    "heavy_top": (1e-3,),
     "kepler": (1e-1, 1e-3, 1e-6),
     "plummer": (),
     "pythagorean": (1e-3,),
+    "symmetric_top": (1e-2, 1e-5),
 }
 CASES = {scene.name: TOLERANCES if scene.name in QUICK else SLOW.get(scene.name, TOLERANCES) for scene in sw.scenes.scenes()}
 

@@ -13,6 +13,7 @@ LAST_LINES = {
     "game_loop": "t = 10 s after 2400 steps: y = -0.042682, -0.000932, 0.000000 m",
     "resonance": "peak 5.0252 at ω = 0.99; true 5.0252 there",
     "sweep": "54492 of 100000 diverged; the last good one has 19.1014 Hz",
+    "wing_nut": "the angular momentum stays within 1.0e-07, the energy within 6.3e-09",
 }
 
 

@@ -38,6 +38,18 @@ PROBLEMS: dict[str, tuple[sw.System, Any, Any, float]] = {
     "forced and damped": (sw.Oscillator(1.3, 0.2, x=sw.Sinusoid(0.8, 2.1, 0.3)), -0.7, 0.5, 2.9),
     "pendulum": (sw.Pendulum(1.3, a=sw.Sinusoid(0.8, 2.1, 0.3)), 0.4, 1.5, 2.9),
     "turning frame": (sw.RestrictedThreeBody(0.1), np.array([0.1, 0.9]), np.array([0.7, 0.3]), 1.1),
+    "rigid body": (
+        sw.RigidBody([1.0, 1.4, 2.0], [0.1, sw.Sinusoid(0.8, 2.1, 0.3), None], [None, 0.3, 0.2], 0.2),
+        np.array([0.7, 1.0, -0.4]),
+        np.array([0.5, 0.1, -0.7, 0.5]),
+        1.7,
+    ),
+    "heavy top": (
+        sw.RigidBody([1.0, 1.2, 1.9], weight=1.5, centre=[0.1, 0.2, 0.8]),
+        np.array([0.7, 0.3, 1.4]),
+        np.array([0.8, 0.6, 0.0, 0.0]),
+        1.7,
+    ),
     "chain": (sw.Chain(4), np.linspace(0.1, 0.5, 4), np.linspace(-1.0, 0.5, 4) ** 2, 2.3),
     "ellipse": (
         sw.NBody([1.0, 0.5], force="newton"),

@@ -300,6 +300,13 @@ def test_the_reference_begins_at_the_start():
     np.testing.assert_allclose(before, after, rtol=0, atol=1e-15)  # from rest, it goes back the same way
 
 
+def test_a_last_step_that_rounding_puts_behind_the_last_known_time_is_known():
+    scene = dataclasses.replace(sw.scenes.kepler(), horizon=7.853981633974483, until=7.853981633974483)
+    run = scene.run("rk4", scene.horizon / 500, steps=500)
+    assert run.t[-1] > scene.until
+    assert np.isfinite(scene.state_error(run)).all()
+
+
 def test_what_the_reference_does_not_know_is_nan():
     scene = dataclasses.replace(sw.scenes.pythagorean(), until=1.0)
     run = scene.run("rk4", 0.01, steps=150, every=50)

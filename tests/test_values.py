@@ -78,6 +78,16 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
+    "RigidBody": [
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]),
+        lambda: sw.RigidBody([1.0, 2.0, 2.5]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], [0.1, None, None]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], space_torque=[0.1, None, None]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], damping=0.1),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0], weight=1.0, centre=[0.0, 0.0, 1.0]),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(1.0), ()),
+        lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.Projection("norm"), ()),
+    ],
     "Chain": [
         lambda: sw.Chain(3),
         lambda: sw.Chain(4),
@@ -168,6 +178,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Figures": [lambda: charts.figures(["rk4"]), lambda: charts.figures(["rk4"], phi=0.4), lambda: charts.figures(["verlet"])],
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
     "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
+    "NormSweep": [lambda: charts.norm(["rk4"], gains=[0.1]), lambda: charts.norm(["rk4"], gains=[0.2])],
+    "Settled": [lambda: charts.norm(["rk4"], gains=[0.1]).lines[0], lambda: charts.norm(["rk4"], gains=[0.2]).lines[0]],
     "Powers": [lambda: charts.powers("rk4")],  # with measured times
     "Solved": [
         lambda: charts.Solved(np.ones(2), np.ones(2), None, 0.1),

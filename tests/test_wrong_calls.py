@@ -177,6 +177,11 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Aircraft.commanded": (sw.Aircraft(roll=3.0).commanded, {"name": "roll", "t": [0.0, 1.0]}),
     "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
     "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
+    "RigidBody": (
+        sw.RigidBody,
+        {"inertia": [1.0, 2.0, 3.0], "torque": [0.1, None, 0.2], "space_torque": [0.0, 0.1, 0.2], "damping": 0.1}
+        | {"weight": 1.0, "centre": [0.0, 0.0, 1.0]},
+    ),
     "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
     "LinearSystem": (
         sw.LinearSystem,
@@ -239,15 +244,21 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
+    "quaternion.from_axis_angle": (sw.quaternion.from_axis_angle, {"axis": [0.0, 1.0, 1.0], "angle": 0.5}),
+    "quaternion.matrix": (sw.quaternion.matrix, {"q": [1.0, 0.0, 0.0, 0.5]}),
+    "quaternion.product": (sw.quaternion.product, {"p": [1.0, 0.0, 0.0, 0.5], "q": np.ones((4, 2))}),
+    "scenes.dzhanibekov": (sw.scenes.dzhanibekov, {"inertia": (1.0, 2.0, 3.0), "tilt": 0.01, "spin": 1.0}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),
     "scenes.forced_oscillator": (
         sw.scenes.forced_oscillator,
         {"omega": 1.0, "damping": 0.1, "amplitude": 1.0, "drive": 0.7, "phase": 0.5},
     ),
+    "scenes.heavy_top": (sw.scenes.heavy_top, {"spin": 10.0, "lean": 30.0}),
     "scenes.kepler": (sw.scenes.kepler, {"e": 0.9, "share": 0.5}),
     "scenes.oscillator": (sw.scenes.oscillator, {"omega": 1.0}),
     "scenes.pendulum": (sw.scenes.pendulum, {"amplitude": 90.0, "omega": 1.0}),
     "scenes.plummer": (sw.scenes.plummer, {"n": 8, "seed": 1, "softening": 0.05}),
+    "scenes.symmetric_top": (sw.scenes.symmetric_top, {"axial": 1.6, "spin": 2.0, "wobble": 1.0}),
     "Scene": (sw.Scene, {"system": sw.Oscillator(), "v": 0.0, "y": 1.0, "until": 10.0}),
     "Scene.run": (KEPLER.run, {"method": "rk4", "dt": 0.1, "steps": 10, "every": None, "control": None}),
     "Scene.steps_for": (KEPLER.steps_for, {"dt": 0.1}),
@@ -311,6 +322,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         charts.powers,
         {"method": "rk4", "system": None, "v": 0.0, "y": 1.0, "dt": 0.3, "steps": [1, 10], "progress": None},
     ),
+    "charts.norm": (charts.norm, {"methods": ["rk4"], "phi": 0.1, "gains": [0.1, 0.2], "progress": None}),
     "charts.run_picture": (charts.run_picture, {"scene": KEPLER, "run": KEPLER.run("rk4", 0.1, steps=9, every=3)}),
     "charts.control": (
         charts.control,

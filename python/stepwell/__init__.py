@@ -16,11 +16,22 @@ from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, Stepwell
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
+from .systems import (
+    Chain,
+    LinearSystem,
+    NBody,
+    Oscillator,
+    Pendulum,
+    RestrictedThreeBody,
+    RigidBody,
+    Sampled,
+    Sinusoid,
+    System,
+)
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, paper, scenes, stability
+    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, paper, quaternion, scenes, stability
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
@@ -51,6 +62,7 @@ __all__ = [
     "Pendulum",
     "Projection",
     "RestrictedThreeBody",
+    "RigidBody",
     "Run",
     "Sampled",
     "Scene",
@@ -82,6 +94,7 @@ __all__ = [
     "method",
     "methods",
     "paper",
+    "quaternion",
     "scenes",
     "stability",
     "stability_along",
@@ -123,6 +136,7 @@ _LATER = {
     "export": "exports.export",
     "exports": "exports",
     "paper": "paper",
+    "quaternion": "quaternion",
     "scenes": "scenes",
     "system": "equations.system",
     "stability": "stability",

@@ -5,6 +5,7 @@ from .control import ControlSweep, Held, control
 from .data import Curve, Point, Timing, WorkPrecision
 from .figures import Figures, Samples, figures
 from .maps import Observation, StabilityMap, stability_map
+from .norm import NormSweep, Settled, norm
 from .panel import Panel, panel
 from .peers import Peer, Solved
 from .powers import Powers, powers
@@ -18,6 +19,7 @@ __all__ = [
     "Figures",
     "Held",
     "Locus",
+    "NormSweep",
     "Observation",
     "Panel",
     "Peer",
@@ -25,6 +27,7 @@ __all__ = [
     "Powers",
     "RunPicture",
     "Samples",
+    "Settled",
     "Solved",
     "Stability",
     "StabilityMap",
@@ -32,6 +35,7 @@ __all__ = [
     "WorkPrecision",
     "control",
     "figures",
+    "norm",
     "panel",
     "peers",
     "powers",

@@ -14,6 +14,7 @@ from .nbody import NBody
 from .oscillator import Oscillator
 from .pendulum import Pendulum
 from .restricted_three_body import RestrictedThreeBody
+from .rigid_body import RigidBody
 
 if TYPE_CHECKING:
     from .aircraft import Aircraft
@@ -26,6 +27,7 @@ __all__ = [
     "Oscillator",
     "Pendulum",
     "RestrictedThreeBody",
+    "RigidBody",
     "Sampled",
     "Sinusoid",
     "System",

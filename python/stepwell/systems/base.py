@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._value import Value
-from ..errors import DTypeError, UnsupportedError
+from ..errors import ArgumentError, DTypeError, UnsupportedError
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
@@ -186,6 +186,8 @@ class System(Value, ABC):
         return kept is not None and kept == self.constraint
 
     def _kept_by(self, control: Any) -> Self:
+        if getattr(control, "target", None) is not None:
+            raise ArgumentError(f"target: {control!r} keeps a constraint of {self!r}, which is its own target; leave it out")
         free = self.uncontrolled
         kept = copy.copy(free)
         kept._free, kept.kept = free, control

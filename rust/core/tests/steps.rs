@@ -124,6 +124,11 @@ fn systems() -> Vec<Given> {
     all.push(given("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
     all.push(given("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
     all.push(given("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
+    let inertia = ("inertia", 3);
+    all.push(given("rigid_body", &[], &[], &[inertia], &[]));
+    all.push(given("rigid_body", &[("keeps", "control")], &[], &[inertia, ("damping", 3), ("strength", 1)], &["torque[1]"]));
+    let heavy = [inertia, ("weight", 1), ("centre", 3), ("space_torque[2]", 1)];
+    all.push(given("rigid_body", &[("keeps", "projection")], &[("space_torque", 3)], &heavy, &[]));
     for n in [1, 4] {
         all.push(given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
     }
@@ -365,6 +370,11 @@ fn what_cannot_be_made_is_refused() {
     misshapen(given("oscillator", &[("form", "physical")], &[], &[], &[]));
     misshapen(given("pendulum", &[], &[], &[("omega", 2)], &[]));
     misshapen(given("restricted_three_body", &[], &[], &[], &[]));
+    unknown(given("rigid_body", &[("keeps", "length")], &[], &[("inertia", 3)], &[]));
+    misshapen(given("rigid_body", &[], &[], &[("inertia", 2)], &[]));
+    misshapen(given("rigid_body", &[], &[], &[("inertia", 3), ("damping", 1)], &[]));
+    misshapen(given("rigid_body", &[], &[], &[("inertia", 3), ("weight", 1)], &[]));
+    misshapen(given("rigid_body", &[("keeps", "control")], &[], &[("inertia", 3)], &[]));
     misshapen(given("chain", &[], &[], &[], &[]));
     misshapen(given("chain", &[], &[], &[("stiffness", 3), ("mass", 3)], &[]));
     misshapen(given("linear", &[], &[("n_v", 0)], &[], &[]));
