@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import SYSTEMS
+from stepwell._value import changed
 from stepwell.reference import adaptive
 from stepwell.reference.traced import Tracer
 from stepwell.systems.base import flat
@@ -31,7 +32,7 @@ def made(name: str) -> tuple[sw.System, Any, Any]:
     rng = np.random.default_rng(7)
     system = SYSTEMS[name](rng, MEMBERS)
     v, y = (0.5 * rng.normal(size=(*shape, MEMBERS)) for shape in (system.v_shape, system.y_shape))
-    system.batch = (MEMBERS,)
+    system = changed(system, batch=(MEMBERS,))
     return system, v, y
 
 

@@ -14,7 +14,7 @@ from .errors import ArgumentError, FixedError, ShapeError
 from .integrate import fits_together, goes_on_alike, velocities
 from .methods import Method
 from .methods import method as find_method
-from .systems import Sampled, Sinusoid, System
+from .systems import System
 from .systems.base import a_system
 
 
@@ -77,7 +77,7 @@ class World:
         fused: bool = False,
     ) -> None:
         how = find_method(method)
-        system = _frozen(copy.deepcopy(a_system(system).sized(v, y)))
+        system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
         dt = _checks.number("dt", dt, positive=True, unit="units of time")
         goes_on_alike(how, dt, carried_by, dt_before)
@@ -189,17 +189,3 @@ class World:
 
 def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
     return World(system, method, dt=dt, **state)
-
-
-def _frozen(what: Any) -> Any:
-    """The same object with all its arrays read-only: writing to them would have no effect."""
-    if isinstance(what, np.ndarray):
-        what.flags.writeable = False
-    elif isinstance(what, (list, tuple)):
-        for each in what:
-            _frozen(each)
-    elif isinstance(what, dict):
-        _frozen(list(what.values()))
-    elif isinstance(what, (System, Sampled, Sinusoid)):
-        _frozen(list(vars(what).values()))
-    return what

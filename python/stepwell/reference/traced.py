@@ -5,7 +5,6 @@ Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from itertools import count
 from math import prod
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .._value import changed
 from . import adaptive
 from .run import linear_step
 from .signal import Constant, Held, Sine
@@ -82,11 +82,10 @@ class Tracer:
         s = self.system.reference(h, **given)
         if self.system.control is None:
             return s
-        control: Any = copy.copy(self.system.control)
-        for name, value in control.given().items():
-            if isinstance(value, np.ndarray):
-                setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
-        return control.around(s, h)
+        control: Any = self.system.control
+        numbers = {name: value for name, value in control.given().items() if isinstance(value, np.ndarray)}
+        symbols = {name.removeprefix("control."): self.symbols(value, value.shape) for name, value in numbers.items()}
+        return changed(control, **symbols).around(s, h)
 
     def step(self, method: Any) -> list[Any]:
         """The state after a step, and what a control has added up by then."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from abc import ABC, abstractmethod
 from math import inf, prod
 from types import FunctionType
@@ -12,7 +11,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Fixed, Value, changed
 from ..errors import DTypeError, UnsupportedError
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
@@ -30,7 +29,7 @@ Given = list[tuple[str, Any]]
 TINY = 1e-200
 
 
-class System(Value, ABC):
+class System(Fixed, Value, ABC):
     """Two blocks, velocities ``v`` and coordinates ``y``, and a rate for each.
 
     Attributes:
@@ -54,8 +53,8 @@ class System(Value, ABC):
     kernel: ClassVar[str]
     reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
-    linear: ClassVar[bool] = False
-    complex_step: ClassVar[bool] = False
+    linear: bool = False
+    complex_step: bool = False
     second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
@@ -71,6 +70,13 @@ class System(Value, ABC):
     def kind_name(self) -> str:
         """What systems of its kind are called."""
         return type(self).__name__
+
+    @property
+    def _instead(self) -> str:
+        return (
+            f"make another {self.kind_name}, with what is to change. A World that goes on from here with it: "
+            f"World(system, method, dt=world.dt, **world.resume)"
+        )
 
     @property
     def keeper(self) -> AnyControl | None:
@@ -187,10 +193,8 @@ class System(Value, ABC):
 
     def _kept_by(self, control: Any) -> Self:
         free = self.uncontrolled
-        kept = copy.copy(free)
-        kept._free, kept.kept = free, control
-        kept.batch = _checks.batch_shape({"system": free.batch, "control": control.batch})
-        return cast("Self", kept)
+        batch = _checks.batch_shape({"system": free.batch, "control": control.batch})
+        return cast("Self", changed(free, _free=free, kept=control, batch=batch))
 
     def given_kept(self) -> dict[str, Any]:
         """What keeps the system's constraint, as parameters: ``keeps``, "control" or "projection", and its ``strength``."""
@@ -208,11 +212,7 @@ class System(Value, ABC):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 
     def _held_by(self, control: EnergyControl | Projection) -> Self:
-        held = copy.copy(self)
-        held._free = self.uncontrolled
-        held.control = control
-        held.velocity_term = "energy control"
-        return held
+        return changed(self, _free=self.uncontrolled, control=control, velocity_term="energy control")
 
     # What the transition-matrix form and the analysis ask of a linear system.
 
