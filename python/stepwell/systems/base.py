@@ -13,6 +13,7 @@ from .. import _checks
 from .._checks import Array, Shape
 from .._value import Fixed, Value, changed
 from ..errors import DTypeError, UnsupportedError
+from ..reference.around import surrounded
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
@@ -46,6 +47,7 @@ class System(Fixed, Value, ABC):
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
+        rubbing: by how much friction that sticks reduces each velocity in a unit of time, or None; broadcasts over the batch.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
     """
@@ -62,6 +64,7 @@ class System(Fixed, Value, ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
     control: EnergyControl | Projection | None = None
+    rubbing: Array | None = None
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
     _free: System | None = None
@@ -108,15 +111,23 @@ class System(Fixed, Value, ABC):
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
         return self.reference(h, **self.given(batch))
 
-    def scaled(self, h: float, batch: Shape) -> Any:
-        """The NumPy reference of this system with its control, scaled to the step h, for states of that batch shape."""
+    def scaled(self, h: float, batch: Shape, force: Array | None = None) -> Any:
+        """The NumPy reference of this system with its control and friction, scaled to the step h, for states of that batch shape.
+
+        ``force`` is added to v̇.
+        """
         s = self.alone(h, batch)
-        return s if self.control is None else self.control.around(s, h)
+        s = s if self.control is None else self.control.around(s, h)
+        return s if force is None and self.rubbing is None else surrounded(s, h, force, self.rubbing)
+
+    def given_around(self) -> dict[str, Any]:
+        """Parameters of what is around its equations, by name: control and friction."""
+        given = {} if self.control is None else self.control.given()
+        return given if self.rubbing is None else given | {"friction.limit": self.rubbing}
 
     def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system and of its control, in the form that the core takes."""
-        given = self.given(batch)
-        return flat(given if self.control is None else given | self.control.given(), batch)
+        """The parameters of this system, of its control and its friction, in the form that the core takes."""
+        return flat(self.given(batch) | self.given_around(), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
