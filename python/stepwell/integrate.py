@@ -116,8 +116,8 @@ def integrate(
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
-        force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force per
-            mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all; see ``World``, where it may change.
+        force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
+            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
@@ -342,8 +342,8 @@ def _adapt(
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
     if system.rubbing is not None:
         raise UnsupportedError(
-            f"tolerance: goes with forces that are smooth or jump seldom, and {system!r} has friction, which sticks: what it does "
-            f"in a step depends on the step; use dt= and steps="
+            f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
+            f"estimated; use dt= and steps="
         )
     if system.keeper is not None:
         raise UnsupportedError(f"tolerance: goes with systems that nothing controls, got {system!r}; use its .uncontrolled")

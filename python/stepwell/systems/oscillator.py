@@ -20,8 +20,8 @@ class Oscillator(System):
     """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3), and less friction·sgn ẏ where that is given (§8).
 
     Args:
-        omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block on a
-            plane, without a spring.
+        omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block
+            on a plane, without a spring.
         damping: damping ratio D, without a unit; broadcasts. None leaves the term out.
         x: input, the point to which the spring pulls: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
         a: acceleration by an external force, likewise.
@@ -109,4 +109,4 @@ class Oscillator(System):
 
     def _driven(self, inputs: dict[str, Input]) -> Oscillator:
         terms: dict[str, Any] = {"drag": self.drag, "friction": self.friction, "form": self.form}
-        return Oscillator(self.omega, self.damping, **terms, **inputs)
+        return Oscillator(self.omega, self.damping, **terms | inputs)

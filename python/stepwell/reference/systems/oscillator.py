@@ -23,10 +23,9 @@ class Oscillator:
         inputs = [signal.scaled(by) for signal, by in ((x, by_x), (a, by_a)) if signal is not None]
         if damping is None and inputs:
             damping = np.zeros(())
-        if drag is not None:
-            self.drag = h * drag
-        else:
-            self.drag = None if damping is None else (2.0 * damping) * (h * omega)
+        self.drag = None if drag is None else h * drag
+        if drag is None and damping is not None:
+            self.drag = (2.0 * damping) * (h * omega)
         self.inputs = inputs
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
