@@ -63,6 +63,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 2.0)),
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 3.0)),
         lambda: sw.Oscillator(a=sw.Sampled([1.0, 2.0], 0.1)),
+        lambda: sw.Oscillator(friction=0.1),
+        lambda: sw.Oscillator(drag=0.1),
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
@@ -107,6 +109,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Run": [
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, force=0.0),
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]),
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]),
         diverged,
@@ -157,6 +160,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Stability": [lambda: charts.stability(["rk4"]), lambda: charts.stability(["verlet"])],
     "StabilityMap": [lambda: charts.stability_map("rk4"), lambda: charts.stability_map("merson")],
     "Powers": [lambda: charts.powers("rk4")],  # with measured times
+    "VerletFriction": [charts.verlet_friction, lambda: charts.verlet_friction(0.05)],
     "Solved": [
         lambda: charts.Solved(np.ones(2), np.ones(2), None, 0.1),
         lambda: charts.Solved(np.ones(2), np.ones(3), None, 0.1),

@@ -224,7 +224,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         | {"t0": 0.0, "record": ["energy"], "backend": "rust", "progress": False},
     ),
     "Run.quantity": (_of_run("quantity"), {"name": "energy"}),
-    "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None}),
+    "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None, "force": None}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),
@@ -299,6 +299,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         charts.powers,
         {"method": "rk4", "system": None, "v": 0.0, "y": 1.0, "dt": 0.3, "steps": [1, 10], "progress": None},
     ),
+    "charts.verlet_friction": (charts.verlet_friction, {"dt": 0.05}),
     "charts.run_picture": (charts.run_picture, {"scene": KEPLER, "run": KEPLER.run("rk4", 0.1, steps=9, every=3)}),
     "charts.control": (
         charts.control,

@@ -121,7 +121,7 @@ def changed(one: Object, **changes: Any) -> Object:
 
 
 def complete(one: Any, **found: Any) -> None:
-    """Give attributes to an object that cannot be changed and that nobody has seen yet."""
+    """Give attributes to an object that cannot be changed and that was just made."""
     read_only(found)
     vars(one).update(found)
 

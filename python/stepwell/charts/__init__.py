@@ -9,6 +9,7 @@ from .panel import Panel, panel
 from .peers import Peer, Solved
 from .powers import Powers, powers
 from .runs import RunPicture, run_picture
+from .verlet_friction import VerletFriction, verlet_friction
 from .work_precision import work_precision
 from .zplane import Locus, Stability, stability
 
@@ -29,6 +30,7 @@ __all__ = [
     "Stability",
     "StabilityMap",
     "Timing",
+    "VerletFriction",
     "WorkPrecision",
     "control",
     "figures",
@@ -38,5 +40,6 @@ __all__ = [
     "run_picture",
     "stability",
     "stability_map",
+    "verlet_friction",
     "work_precision",
 ]

@@ -57,7 +57,7 @@ class Rubbing(Around):
         forward = bits.where(bits.less(limit, moved), f - limit, -v)
         return np.asarray(bits.where(bits.less(moved, -limit), f + limit, forward))
 
-    def settle(self, t: float, v: Array, y: Array, new_v: Array) -> Array:
+    def bring_to_rest(self, t: float, v: Array, y: Array, new_v: Array) -> Array:
         """The velocity after a step from v and y: zero if the first stage stops it, and friction can hold it there.
 
         A method of several stages mixes their increments, so by itself it would only divide v by some number in each step.
@@ -78,6 +78,6 @@ def surrounded(s: Any, h: float, force: Array | None, friction: Array | None) ->
 def whole_step(step: Callable[..., Blocks], s: Any, t: float, h: float, v: Array, y: Array) -> Blocks:
     """A step of a method, and what comes after it: coming to rest, and projection."""
     new_v, new_y = step(s, t, h, v, y)
-    if hasattr(s, "settle"):
-        new_v = s.settle(t, v, y, new_v)
+    if hasattr(s, "bring_to_rest"):
+        new_v = s.bring_to_rest(t, v, y, new_v)
     return s.project(new_v, new_y) if hasattr(s, "project") else (new_v, new_y)

@@ -49,7 +49,7 @@ pub trait System<N: Number> {
     }
 
     /// The velocities after a step from `before` at time `t`, if the step may have missed that they come to rest.
-    fn settle(&self, _t: N, _before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
+    fn bring_to_rest(&self, _t: N, _before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
         v
     }
 

@@ -193,7 +193,7 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
     let s = system(kind, &parameters(given, h), Symbol::new(Op::State((shape.v + shape.y) as u32)));
     let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
     let (new_v, new_y) = (made.next().unwrap_or_else(|| v.clone()), made.next().unwrap_or_else(|| y.clone()));
-    let (v, y) = s.project(s.settle(t, (&v, &y), new_v), new_y);
+    let (v, y) = s.project(s.bring_to_rest(t, (&v, &y), new_v), new_y);
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));

@@ -63,7 +63,7 @@ impl<N: Number> System<N> for Rubbing<N> {
         self.system.velocity(d)
     }
 
-    fn settle(&self, t: N, before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
+    fn bring_to_rest(&self, t: N, before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
         let limit = self.limit;
         let within = |x: N| (-limit).at_most(x) & x.at_most(limit);
         let stops = self.system.dv(t, before.0, before.1).zip_map(before.0, |f, v| (f, v + f));

@@ -72,7 +72,7 @@ impl Model<'_> {
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let single = members == 1;
-        // Operations are fused on the tape of the whole step, and friction looks at its start.
+        // Operations are fused on the tape of the whole step, and friction needs the state at its start.
         if self.scene.fused || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
