@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import pickle
 from collections.abc import Callable
 from typing import Any
@@ -100,6 +101,14 @@ def test_parameters_of_own_equations_are_not_changed() -> None:
 def test_the_error_is_one_of_the_projects_and_pythons() -> None:
     assert issubclass(FixedError, StepwellError)
     assert issubclass(FixedError, AttributeError)
+
+
+def test_its_arguments_are_known() -> None:
+    """To ``help`` and to editors, though objects are made in a way of their own."""
+    assert list(inspect.signature(sw.Sinusoid).parameters) == ["amplitude", "omega", "phase"]
+    assert list(inspect.signature(sw.Projection).parameters) == ["way", "target"]
+    assert not inspect.signature(sw.System).parameters
+    assert "friction" in inspect.signature(sw.Oscillator).parameters
 
 
 def test_the_users_own_array_stays_writeable() -> None:

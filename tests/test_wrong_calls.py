@@ -235,6 +235,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "scenes.kepler": (sw.scenes.kepler, {"e": 0.9, "share": 0.5}),
     "scenes.oscillator": (sw.scenes.oscillator, {"omega": 1.0}),
     "scenes.pendulum": (sw.scenes.pendulum, {"amplitude": 90.0, "omega": 1.0}),
+    "scenes.sliding_block": (sw.scenes.sliding_block, {"friction": 4.9, "speed": 3.0}),
+    "scenes.sticking_block": (sw.scenes.sticking_block, {"friction": 0.13}),
     "scenes.plummer": (sw.scenes.plummer, {"n": 8, "seed": 1, "softening": 0.05}),
     "Scene": (sw.Scene, {"system": sw.Oscillator(), "v": 0.0, "y": 1.0, "until": 10.0}),
     "Scene.run": (KEPLER.run, {"method": "rk4", "dt": 0.1, "steps": 10, "every": None, "control": None}),

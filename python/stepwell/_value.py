@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from abc import ABCMeta
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -75,12 +75,25 @@ def same(a: Any, b: Any) -> bool:
 class Maker(ABCMeta):
     """Makes objects that cannot be changed once ``__init__`` is over."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        """A new object; its arrays are read-only from now on."""
-        made = super().__call__(*args, **kwargs)
-        read_only(vars(made))
-        vars(made)[DONE] = True
-        return made
+    if not TYPE_CHECKING:  # which takes the arguments from ``__init__``
+
+        def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+            """A new object; its arrays are read-only from now on."""
+            made = super().__call__(*args, **kwargs)
+            read_only(vars(made))
+            vars(made)[DONE] = True
+            return made
+
+    @property
+    def __signature__(cls) -> Any:
+        """That of ``__init__``, for ``help`` and ``inspect``."""
+        import inspect  # which takes as long to import as much else together
+
+        init: Any = cls.__init__  # type: ignore[misc]
+        if init is object.__init__:
+            return inspect.Signature()
+        whole = inspect.signature(init)
+        return whole.replace(parameters=list(whole.parameters.values())[1:])
 
 
 class Fixed(metaclass=Maker):
