@@ -104,6 +104,7 @@ def explain(
     batch = system.batch if count == own else (count // own, *system.batch)
     _checks.batch_shape({"system": batch, "control": () if control is None else control.batch})
     if control is not None:
+        _checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
         system = system.under(control, batch)
         fits_together(system, how)
     plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice)
