@@ -165,6 +165,7 @@ if __name__ == "__main__":
     write("quaternion-norm.png", sw.charts.norm().plot())
     write("figures.png", sw.charts.figures().plot())
     write("powers.png", sw.charts.powers().plot())
+    write("verlet-friction.png", sw.charts.verlet_friction().plot())
     eight = sw.scenes.figure_eight()
     assert eight.period is not None
     periods: dict[str, Any] = {"horizon": 100 * eight.period, "evaluations": 100_000}

@@ -53,6 +53,14 @@ def _moments(rng: np.random.Generator, b: int) -> Any:
 
 #: One maker for each kernel variant of each system.
 SYSTEMS: dict[str, Make] = {
+    "block with friction": lambda r, b: sw.Oscillator(0.0, friction=r.uniform(0.0, 0.5, b), form="physical"),
+    "block with drag": lambda r, b: sw.Oscillator(0.0, drag=r.uniform(0.0, 1.0, b), a=r.normal(size=b), form="physical"),
+    "drag": lambda r, b: sw.Oscillator(_omega(r, b), drag=r.uniform(0.0, 1.0, b)),
+    "friction": lambda r, b: sw.Oscillator(_omega(r, b), friction=r.uniform(0.0, 0.5, b)),
+    "friction and damping, sampled x, physical": lambda r, b: sw.Oscillator(
+        _omega(r, b), 0.1, x=_held(r, b), friction=0.2, form="physical"
+    ),
+    "friction, sinusoid a": lambda r, b: sw.Oscillator(1.25, a=_sine(r, b), friction=r.uniform(0.0, 1.0, b)),
     "free": lambda r, b: sw.Oscillator(_omega(r, b)),
     "free, physical": lambda r, b: sw.Oscillator(_omega(r, b), form="physical"),
     "one omega for all": lambda r, b: sw.Oscillator(1.25),
@@ -137,6 +145,10 @@ SYSTEMS: dict[str, Make] = {
     "own: as SciPy has it": lambda r, b: own.scipys().sized(),
     "linear, seventeen states": lambda r, b: sw.LinearSystem(0.5 * _gentle(r, 17), r.normal(size=17), x=_sine(r, b)),
 }
+
+
+#: Those that go with adaptive steps: what friction does depends on the step.
+ADAPTIVE = [name for name, make in SYSTEMS.items() if make(np.random.default_rng(0), 1).rubbing is None]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepwell._value import changed
 
 ALL = list(cases())
 DIRECT = [c for c in ALL if c.form == "direct"]
@@ -183,11 +183,8 @@ def _member(system: sw.System, i: int, b: int) -> sw.System:
             case dict():
                 return {name: one(each) for name, each in value.items()}
             case sw.System() | sw.Sinusoid() | sw.Sampled():
-                alone = copy.copy(value)
-                vars(alone).update({name: one(each) for name, each in vars(value).items()})
-                return alone
+                return changed(value, **{name: one(each) for name, each in vars(value).items()})
         return value
 
-    alone: sw.System = one(system)
-    alone.batch = ()
+    alone: sw.System = changed(one(system), batch=())
     return alone

@@ -101,7 +101,7 @@ def test_the_carry_has_the_same_exponents_as_the_state() -> None:
     found = [sw.lyapunov(unstable, method, **given).exponents for method in ("false_euler", "leapfrog", "verlet")]
     true = np.log(sw.analyse(unstable, "false_euler", dt=0.1).radii) / 0.1
     for each in found:
-        # Verlet divides by the step, which costs 1/dt of the digits; directions settle as e^(−50·0.5).
+        # Verlet divides by the step, which costs 1/dt of the digits; directions bring_to_rest as e^(−50·0.5).
         np.testing.assert_allclose(each, np.sort(true)[::-1], rtol=0, atol=1e4 * EPS / 0.1)
 
 

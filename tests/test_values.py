@@ -64,6 +64,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 2.0)),
         lambda: sw.Oscillator(x=sw.Sinusoid(1.0, 3.0)),
         lambda: sw.Oscillator(a=sw.Sampled([1.0, 2.0], 0.1)),
+        lambda: sw.Oscillator(friction=0.1),
+        lambda: sw.Oscillator(drag=0.1),
     ],
     "Aircraft": [
         sw.Aircraft,
@@ -129,6 +131,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "Run": [
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, force=0.0),
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-3, at=[1.0]),
         lambda: sw.integrate(FREE, "merson", v=0.0, y=[1.0, 2.0], tolerance=1e-4, at=[1.0]),
         diverged,
@@ -181,6 +184,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "NormSweep": [lambda: charts.norm(["rk4"], gains=[0.1]), lambda: charts.norm(["rk4"], gains=[0.2])],
     "Settled": [lambda: charts.norm(["rk4"], gains=[0.1]).lines[0], lambda: charts.norm(["rk4"], gains=[0.2]).lines[0]],
     "Powers": [lambda: charts.powers("rk4")],  # with measured times
+    "VerletFriction": [charts.verlet_friction, lambda: charts.verlet_friction(0.05)],
     "Solved": [
         lambda: charts.Solved(np.ones(2), np.ones(2), None, 0.1),
         lambda: charts.Solved(np.ones(2), np.ones(3), None, 0.1),

@@ -341,18 +341,18 @@ def _fields(path: str) -> dict[str, int]:
     return {line[0]: int(line[1]) for line in map(str.split, _read(path).splitlines()) if len(line) > 1}
 
 
-def in_place(argument: str, array: Any, shape: Shape) -> Array:
-    """Return ``array`` if it can be stepped in place; it is never copied."""
+def in_place(argument: str, array: Any, shape: Shape, what: str = "to step in place", *, written: bool = True) -> Array:
+    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied."""
     if not isinstance(array, np.ndarray):
-        raise DTypeError(f"{argument}: expected a NumPy array to step in place, got {type(array).__name__}")
+        raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != np.float64 or not array.dtype.isnative:
-        raise DTypeError(f"{argument}: expected dtype float64 to step in place, got {array.dtype}")
+        raise DTypeError(f"{argument}: expected dtype float64 {what}, got {array.dtype}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:
-        raise ArgumentError(f"{argument}: expected a C-contiguous array to step in place, got strides {array.strides}")
-    if not array.flags.writeable:
-        raise ArgumentError(f"{argument}: expected a writeable array to step in place, got a read-only one")
+        raise ArgumentError(f"{argument}: expected a C-contiguous array {what}, got strides {array.strides}")
+    if written and not array.flags.writeable:
+        raise ArgumentError(f"{argument}: expected a writeable array {what}, got a read-only one")
     numbers(argument, array)
     return array
 

@@ -44,7 +44,12 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
         start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
     """
     told = [run.system.doubt(run.y)]
-    if isinstance(run.system, NBody) and run.system.keeps_energy and (ends := _ends(run, run.system, start)) is not None:
+    if (
+        isinstance(run.system, NBody)
+        and run.system.keeps_energy
+        and run.force is None
+        and (ends := _ends(run, run.system, start)) is not None
+    ):
         told.append(_of_energy(run.method.name, ends))
     for text in told:
         if text is not None:

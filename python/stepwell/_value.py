@@ -1,13 +1,21 @@
-"""Equality by value, for objects that hold arrays: ``==`` of arrays is an array, and a copy or a pickle is another object."""
+"""Objects that are what they hold: equality by value, although ``==`` of arrays is an array; and no change once they are made."""
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from typing import Any, TypeVar
+from abc import ABCMeta
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from .errors import FixedError
+
 Kind = TypeVar("Kind")
+Object = TypeVar("Object")
+
+#: Among the attributes of an object that cannot be changed any more.
+DONE = "_done"
 
 
 class Value:
@@ -17,7 +25,7 @@ class Value:
         """What counts, by name: the fields of a dataclass (and not what it has cached), or else all attributes."""
         if dataclasses.is_dataclass(self):
             return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.compare}
-        return vars(self)
+        return {name: value for name, value in vars(self).items() if name != DONE}
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -62,3 +70,98 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, (tuple, list)) and type(a) is type(b):
         return len(a) == len(b) and all(map(same, a, b))
     return bool(a == b)
+
+
+class Maker(ABCMeta):
+    """Makes objects that cannot be changed once ``__init__`` is over."""
+
+    if not TYPE_CHECKING:  # which takes the arguments from ``__init__``
+
+        def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+            """A new object; its arrays are read-only from now on."""
+            made = super().__call__(*args, **kwargs)
+            read_only(vars(made))
+            vars(made)[DONE] = True
+            return made
+
+    @property
+    def __signature__(cls) -> Any:
+        """That of ``__init__``, for ``help`` and ``inspect``."""
+        import inspect  # which takes as long to import as much else together
+
+        init: Any = cls.__init__  # type: ignore[misc]
+        if init is object.__init__:
+            return inspect.Signature()
+        whole = inspect.signature(init)
+        return whole.replace(parameters=list(whole.parameters.values())[1:])
+
+
+class Fixed(metaclass=Maker):
+    """An object that cannot be changed, since what was made of it would not see the change.
+
+    Attributes cannot be assigned, except those that begin with ``_``, and its arrays are read-only. ``changed`` makes another
+    object.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        self._refuse(name, "assigned")
+        object.__setattr__(self, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        self._refuse(name, "deleted")
+        object.__delattr__(self, name)
+
+    def _refuse(self, name: str, what: str) -> None:
+        if not name.startswith("_") and DONE in vars(self):
+            raise FixedError(f"{name}: the {name} of {type(self).__name__} cannot be {what}; {self._instead}")
+
+    @property
+    def _instead(self) -> str:
+        """What to do in place of a change."""
+        return f"make another {type(self).__name__}, with what is to change"
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """After a copy or a pickle, whose arrays may be new."""
+        vars(self).update(state)
+        read_only(vars(self))
+
+
+def changed(one: Object, **changes: Any) -> Object:
+    """A copy of an object that cannot be changed, with other attributes."""
+    other = copy.copy(one)
+    complete(other, **changes)
+    return other
+
+
+def complete(one: Any, **found: Any) -> None:
+    """Give attributes to an object that cannot be changed and that was just made."""
+    read_only(found)
+    vars(one).update(found)
+
+
+def read_only(attributes: dict[str, Any]) -> None:
+    """Replace arrays by read-only views, and dictionaries of them by some that cannot be changed."""
+    for name, value in attributes.items():
+        if isinstance(value, np.ndarray):
+            if value.flags.writeable:
+                attributes[name] = view = value.view()
+                view.flags.writeable = False
+        elif type(value) is dict and not name.startswith("_"):
+            attributes[name] = FixedDict(value)
+
+
+class FixedDict(dict[str, Any]):
+    """A dictionary that cannot be changed, of which arrays are read-only."""
+
+    def __init__(self, items: dict[str, Any]) -> None:
+        items = dict(items)
+        read_only(items)
+        super().__init__(items)
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise FixedError("parameters: those of a system cannot be assigned; make another system, with what is to change")
+
+    __setitem__ = __delitem__ = __ior__ = update = pop = popitem = clear = setdefault = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FixedDict, (dict(self),)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import warnings
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -11,14 +10,14 @@ import numpy as np
 
 from . import _checks
 from ._checks import Array, Shape
-from ._value import Value
+from ._value import Fixed, Value, changed
 from .errors import ArgumentError, ControlWarning, DTypeError
 from .reference import control as reference
 
 FORMS = ("limited", "printed")
 
 
-class EnergyControl(Value):
+class EnergyControl(Fixed, Value):
     """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
 
     In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
@@ -59,14 +58,13 @@ class EnergyControl(Value):
         Warns:
             ControlWarning: if h·C·K is 1 or more at the start in the printed form, which then overshoots.
         """
-        aimed = copy.copy(self)
-        if self.gain is None:
+        gain = self.gain
+        if gain is None:
             if not (kinetic > 0).all():
                 raise ArgumentError("relative: a start at rest has no kinetic energy to relate the gain to; give gain")
-            aimed.gain = np.asarray(np.asarray(self.relative) / (dt * kinetic))
-        if aimed.target is None:
-            aimed.target = np.asarray(energy)
-        strength = np.max(dt * np.asarray(aimed.gain) * kinetic)
+            gain = np.asarray(np.asarray(self.relative) / (dt * kinetic))
+        aimed = changed(self, gain=gain, target=np.asarray(energy) if self.target is None else self.target)
+        strength = np.max(dt * gain * kinetic)
         if self.form == "printed" and strength >= 1.0:
             warnings.warn(
                 f"gain: h·C·K = {strength:.3g} at the start, expected below 1: the printed form overshoots and may overflow; "
@@ -87,12 +85,10 @@ class EnergyControl(Value):
 
     def member(self, one: Callable[[Array], Array]) -> EnergyControl:
         """The same for a single member."""
-        alone = copy.copy(self)
-        alone.gain, alone.target = one(np.asarray(self.gain)), one(np.asarray(self.target))
-        return alone
+        return changed(self, gain=one(np.asarray(self.gain)), target=one(np.asarray(self.target)))
 
 
-class Control(Value):
+class Control(Fixed, Value):
     """Keeps an invariant I of a system near a target, by a push −gain·(I − target)·∇I/|∇I|² on both rates in every stage.
 
     The error of the invariant then decays as exp(−gain·t) (Baumgarte 1972). ∇I is derived from the operations of the invariant.
@@ -130,9 +126,7 @@ class Control(Value):
 
     def aimed(self, kinetic: Array, value: Array, dt: float) -> Control:
         """The same control with its target in numbers."""
-        aimed = copy.copy(self)
-        if aimed.target is None:
-            aimed.target = np.asarray(value)
+        aimed = self if self.target is not None else changed(self, target=np.asarray(value))
         strength = float(np.max(dt * self.gain))
         if self.form == "printed" and strength >= 1.0:
             warnings.warn(
@@ -148,7 +142,7 @@ class Control(Value):
         return {"control.gain": self.gain, "control.target": np.asarray(self.target)}
 
 
-class ConstraintControl(Value):
+class ConstraintControl(Fixed, Value):
     """Adds to the rates of a system what returns its own constraint; the system has the equations.
 
     Attributes:
@@ -208,7 +202,7 @@ class NormControl(ConstraintControl):
 WAYS = ("scaling", "nacozy")
 
 
-class Projection(Value):
+class Projection(Fixed, Value):
     """Projects the state back to the target energy, or to that of another invariant, after every step.
 
     ``"scaling"`` multiplies all velocities by one factor, between ½ and 2. ``"nacozy"`` makes the smallest change of the state
@@ -241,10 +235,7 @@ class Projection(Value):
 
     def aimed(self, kinetic: Array, energy: Array, dt: float) -> Projection:
         """The same projection with a number for its target."""
-        aimed = copy.copy(self)
-        if aimed.target is None:
-            aimed.target = np.asarray(energy)
-        return aimed
+        return self if self.target is not None else changed(self, target=np.asarray(energy))
 
     def around(self, s: Any, h: float) -> reference.Projected:
         """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
@@ -261,9 +252,7 @@ class Projection(Value):
 
     def member(self, one: Callable[[Array], Array]) -> Projection:
         """The same for a single member."""
-        alone = copy.copy(self)
-        alone.target = one(np.asarray(self.target))
-        return alone
+        return changed(self, target=one(np.asarray(self.target)))
 
 
 AnyControl = EnergyControl | Projection | Control | ConstraintControl

@@ -19,6 +19,7 @@ from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
 from .reference import run as reference
+from .reference.around import whole_step
 from .reference.types import Blocks, Whole
 from .systems import Sampled, System
 from .systems.base import flat, rows
@@ -31,7 +32,7 @@ Looped = tuple[Array, Array, Blocks, Whole]
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay."""
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇."""
 
     system: System
     method: Method
@@ -48,6 +49,7 @@ class Plan(NamedTuple):
     progress: Callable[[float], object] | None = None
     record: tuple[str, ...] = ()
     fused: bool = False
+    force: Array | None = None
 
     @property
     def saves(self) -> Whole:
@@ -63,6 +65,10 @@ class Plan(NamedTuple):
     def kept(self) -> int:
         """How many states are kept."""
         return 1 if self.every is None else -(-self.steps // min(self.every, self.steps)) + 1
+
+    def scaled(self) -> Any:
+        """The NumPy reference of the system, scaled to the step, with the force."""
+        return self.system.scaled(self.dt, self.batch, self.force)
 
     @property
     def members(self) -> int:
@@ -136,12 +142,10 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
-    steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
-    project = getattr(s, "project", None)  # only what keeps a system on its energy has it
+    steps, s = plan.method.steps, plan.scaled()
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
-        v, y = steps.step(s, t, plan.dt, v, y)
-        return project(v, y) if project else (v, y)
+        return whole_step(steps.step, s, t, plan.dt, v, y)
 
     step = _fused_step(plan, s) if plan.fused else plain
     slot = v if carried else _start(plan, v, y)
@@ -166,7 +170,7 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
 
     _core.check(model(plan))
     tape = _core.Tape()
-    tracer = Tracer(plan.system, tape)
+    tracer = Tracer(plan.system, tape, plan.force)
     match what:
         case "step":
             symbols = tracer.step(plan.method)
@@ -241,7 +245,7 @@ def _velocity(plan: Plan) -> reference.Velocity | None:
         return None
     if plan.fused:
         return _fused_slot(plan, "finish")
-    return partial(plan.method.steps.finish, plan.system.scaled(plan.dt, plan.batch), plan.choice)
+    return partial(plan.method.steps.finish, plan.scaled(), plan.choice)
 
 
 def _loop(
@@ -274,7 +278,7 @@ def _start(plan: Plan, v: Array, y: Array) -> Array:
     with np.errstate(all="ignore"):
         if plan.fused:
             return _fused_slot(plan, "start")(t, v, y)
-        return np.asarray(plan.method.steps.start(plan.system.scaled(plan.dt, plan.batch), plan.choice, t, v, y))
+        return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
 
 def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
@@ -292,6 +296,8 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     given = plan.system.parameters(plan.batch)
+    if plan.force is not None:
+        given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if not plan.record and not plan.fused:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)

@@ -70,6 +70,7 @@ def integrate(
     dt_before: float | None = None,
     control: AnyControl | None = None,
     form: str = "direct",
+    force: Any = None,
     fused: bool = False,
     threads: int | None = None,
     backend: str = "rust",
@@ -115,6 +116,8 @@ def integrate(
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
+        force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
+            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
@@ -151,6 +154,7 @@ def integrate(
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
             "control": control,
+            "force": force,
         }
         if not isinstance(form, str) or form != "direct":
             fixed["form"] = form
@@ -170,6 +174,8 @@ def integrate(
     backend = _checks.known("backend", backend, BACKENDS)
     if fused and form != "direct":
         raise UnsupportedError(f"fused: goes with form='direct' only, got form={form!r}")
+    if form != "direct" and force is not None:
+        raise UnsupportedError(f"force: goes with form='direct' only, got form={form!r}; a linear system has inputs")
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
     control = a_control(control)
@@ -202,7 +208,13 @@ def integrate(
         v = _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
     y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-    batch = _checks.batch_shape(batches if control is None else batches | {"control": control.batch})
+    if control is not None:
+        batches["control"] = control.batch
+    if force is not None:
+        forced(system)
+        force = _checks.block("force", force, system.v_shape, system.axes)
+        batches["force"] = force.shape[len(system.v_shape) :]
+    batch = _checks.batch_shape(batches)
     rows = prod(system.v_shape) + prod(system.y_shape)
     plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused)
     # What the core does not record is computed from the saved states, with some of them in between.
@@ -222,6 +234,8 @@ def integrate(
         fits_together(system, how)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
+    if force is not None:
+        plan = plan._replace(force=_spread(force, system.v_shape, batch))
     if record or control is not None:
         plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
     if _checks.flag("progress", progress):
@@ -251,6 +265,7 @@ def integrate(
         collision=partial(_collision, plan, v, y, carry is not None) if collides else None,
         recorded=out.recorded,
         work=out.work,
+        force=plan.force,
     )
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
@@ -258,6 +273,12 @@ def integrate(
         _warn(run, before)
     warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
     return run
+
+
+def forced(system: System) -> None:
+    """Raise if a system has no v̇ that a force could be added to."""
+    if prod(system.v_shape) == 0:
+        raise UnsupportedError(f"force: it is added to the rates of v, and {system!r} has no v; give it an input or a parameter")
 
 
 def velocities(system: System, v: Any) -> Any:
@@ -319,6 +340,11 @@ def _adapt(
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if system.rubbing is not None:
+        raise UnsupportedError(
+            f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
+            f"estimated; use dt= and steps="
+        )
     if system.keeper is not None:
         raise UnsupportedError(f"tolerance: goes with systems that nothing controls, got {system!r}; use its .uncontrolled")
     if carry is not None and not isinstance(carry, AdaptiveState):
@@ -457,7 +483,8 @@ def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tupl
     assert isinstance(system, NBody)
     alone, y = system.member(index, plan.batch), _checks.member(y, index)
     if steps > 0:
-        again = plan._replace(system=alone, batch=(), steps=steps, every=None, form="direct", progress=None, record=())
+        force = None if plan.force is None else _checks.member(plan.force, index)
+        again = plan._replace(system=alone, batch=(), steps=steps, every=None, progress=None, record=(), force=force)
         y = engine.advance(again, _checks.member(v, index), y, carried=carried).y[-1]
     bodies, distance = alone.closest(y)
     return Collision(index, step, bodies, distance)

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, Protocol, cast
 
 from . import _checks, _core
+from ._value import Fixed
 from .errors import ArgumentError
 from .reference.types import Array, Blocks, Scaled
 
@@ -25,7 +26,7 @@ class Steps(Protocol):
         """The velocity from the carry."""
 
 
-class Method:
+class Method(Fixed):
     """A method with its metadata, read from its record in the core."""
 
     #: The name by which it is chosen.
@@ -65,6 +66,10 @@ class Method:
         for key, value in record.items():
             setattr(self, key, tuple(value) if isinstance(value, list) else value)
         self.__doc__ = self._text()
+
+    @property
+    def _instead(self) -> str:
+        return "it is that of the core; another method is chosen by its name, stepwell.method(name)"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """There is one object for each name: a copy or an unpickled method is that object."""

@@ -106,6 +106,7 @@ class Run(Value):
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
+        force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
     """
@@ -132,6 +133,7 @@ class Run(Value):
         paces: Paces | None = None,
         stand: AdaptiveState | None = None,
         fused: bool = False,
+        force: Array | None = None,
     ) -> None:
         self.t = t
         self.v = v
@@ -154,6 +156,7 @@ class Run(Value):
         #: The state of a run with a tolerance at ``paces.t``; None for other runs.
         self.stand = stand
         self.fused = fused
+        self.force = force
 
     def _held(self) -> dict[str, Any]:
         """All attributes but the function that finds collisions, which follows from the others."""
@@ -223,6 +226,8 @@ class Run(Value):
             state["first_bad_step"] = self.first_bad_step
         if self.system.keeper is not None:
             state["control"] = self.system.keeper
+        if self.force is not None:
+            state["force"] = self.force
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
 
     def __repr__(self) -> str:

@@ -11,10 +11,10 @@ from . import _checks, _core, engine
 from ._checks import Array
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
-from .integrate import fits_together, goes_on_alike, velocities
+from .integrate import fits_together, forced, goes_on_alike, velocities
 from .methods import Method
 from .methods import method as find_method
-from .systems import Sampled, Sinusoid, System
+from .systems import System
 from .systems.base import a_system
 
 
@@ -31,6 +31,9 @@ class World:
         start_step: number of the first step.
         start: how to start a method that has several ways; see ``method(…).starts``.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
+        force: what is added to v̇ in every stage: wind, or the push of a player. A C-contiguous float64 array of the shape of v,
+            yours to write to: each call of ``step`` reads it once and takes it as constant over its steps. In the units of v per
+            unit of time: for bodies a force per mass, that is an acceleration.
         carry: what the method carries in place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
             the same step.
         carried_by: the method of that carry, from the ``resume`` of a run or a world. Any other method is then refused.
@@ -57,7 +60,7 @@ class World:
         >>> finer = sw.World(world.system, "rk4", dt=0.01, v=v.copy(), y=y.copy(), t0=world.t)
     """
 
-    __slots__ = ("_core", "_dt", "_fused", "_given", "_method", "_start", "_system", "_t0", "_v", "_y", "step")
+    __slots__ = ("_core", "_dt", "_force", "_fused", "_given", "_method", "_start", "_system", "_t0", "_v", "_y", "step")
 
     def __init__(
         self,
@@ -71,13 +74,14 @@ class World:
         start_step: int = 0,
         start: str | None = None,
         control: AnyControl | None = None,
+        force: Array | None = None,
         carry: Array | None = None,
         carried_by: str | None = None,
         dt_before: float | None = None,
         fused: bool = False,
     ) -> None:
         how = find_method(method)
-        system = _frozen(copy.deepcopy(a_system(system).sized(v, y)))
+        system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
         dt = _checks.number("dt", dt, positive=True, unit="units of time")
         goes_on_alike(how, dt, carried_by, dt_before)
@@ -88,6 +92,11 @@ class World:
         y = _checks.in_place("y", y, (*system.y_shape, *batch))
         if np.shares_memory(v, y):
             raise ArgumentError("v and y: expected two arrays to step in place, got arrays that share memory")
+        if force is not None:
+            forced(system)
+            force = _checks.in_place("force", force, v.shape, "to read before the steps", written=False)
+            if np.shares_memory(force, v) or np.shares_memory(force, y):
+                raise ArgumentError("force: expected an array of its own, got one that shares memory with v or y")
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
         first = _checks.count("start_step", start_step, 0)
@@ -106,12 +115,13 @@ class World:
             stepped = system.controlled(control, v, y, dt)
             fits_together(stepped, how)
         stepped.check_time(abs(t0) + first * dt)
-        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=_checks.flag("fused", fused))
+        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=_checks.flag("fused", fused), force=force)
         # Views: the core knows rows, not axes.
-        loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry)
+        watched = None if force is None else force.reshape(-1)
+        loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry, watched)
         self._core = loop
         self._given, self._system, self._method, self._dt = system, stepped, how, dt
-        self._t0, self._start, self._v, self._y, self._fused = t0, start, v, y, plan.fused
+        self._t0, self._start, self._v, self._y, self._force, self._fused = t0, start, v, y, force, plan.fused
         #: ``step(n=1)`` makes n steps in place.
         object.__setattr__(self, "step", loop.step)
 
@@ -154,6 +164,8 @@ class World:
             state["fused"] = True
         if self._system.keeper is not None:
             state["control"] = self._system.keeper
+        if self._force is not None:
+            state["force"] = self._force.copy()
         carry = self._core.carry() if self._method.carry is not None else None
         return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
 
@@ -177,6 +189,11 @@ class World:
         return self._y
 
     @property
+    def force(self) -> Array | None:
+        """What is added to v̇, the array that was given, or None."""
+        return self._force
+
+    @property
     def t(self) -> float:
         """The time at which the world stands: t0 + k·dt."""
         return self._core.t
@@ -189,17 +206,3 @@ class World:
 
 def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
     return World(system, method, dt=dt, **state)
-
-
-def _frozen(what: Any) -> Any:
-    """The same object with all its arrays read-only: writing to them would have no effect."""
-    if isinstance(what, np.ndarray):
-        what.flags.writeable = False
-    elif isinstance(what, (list, tuple)):
-        for each in what:
-            _frozen(each)
-    elif isinstance(what, dict):
-        _frozen(list(what.values()))
-    elif isinstance(what, (System, Sampled, Sinusoid)):
-        _frozen(list(vars(what).values()))
-    return what

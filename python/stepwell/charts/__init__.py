@@ -10,6 +10,7 @@ from .panel import Panel, panel
 from .peers import Peer, Solved
 from .powers import Powers, powers
 from .runs import RunPicture, run_picture
+from .verlet_friction import VerletFriction, verlet_friction
 from .work_precision import work_precision
 from .zplane import Locus, Stability, stability
 
@@ -32,6 +33,7 @@ __all__ = [
     "Stability",
     "StabilityMap",
     "Timing",
+    "VerletFriction",
     "WorkPrecision",
     "control",
     "figures",
@@ -42,5 +44,6 @@ __all__ = [
     "run_picture",
     "stability",
     "stability_map",
+    "verlet_friction",
     "work_precision",
 ]

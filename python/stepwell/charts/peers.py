@@ -143,6 +143,10 @@ class ByScipy(Value):
     def __call__(self, scene: Scene, times: Array, tolerance: float) -> Solved:
         """The states at these times."""
         solver = _need("scipy.integrate", "scipy")
+        if scene.system.rubbing is not None:
+            raise UnsupportedError(
+                f"SciPy is given rates, and {scene.system!r} has friction that sticks, which depends on the step"
+            )
         system = scene.system.scaled(1.0, ())
         cut = scene.v.size
 

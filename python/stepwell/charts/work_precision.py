@@ -60,7 +60,8 @@ def work_precision(
         steps: numbers of steps over the horizon, each 4 or more; if None, ten in each factor of ten, from steps of 24
             times the scene's down to a 3000th of it, or to two million steps.
         tolerances: for a second curve, "merson, tolerance", of each method that estimates its error; if None, 1e-2 to
-            1e-12, two in each factor of ten; no such curves if empty. Such a run saves its state at ten times.
+            1e-12, two in each factor of ten; no such curves if empty, or if the system has friction. Such a run saves its
+            state at ten times.
         peers: other programs, such as ``peers.scipy("DOP853")``; see ``stepwell.charts.peers``.
         fused: compute with fused multiply-adds; ``"both"`` for a curve of each, "rk4" and "rk4, fused". A scene whose step is too
             long to be fused is refused.
@@ -92,7 +93,8 @@ def work_precision(
     reasons = {method.name: measure.refusal(scene, method) for method in chosen}
     refused = {name: reason for name, reason in reasons.items() if reason is not None}
     able = [method for method in chosen if reasons[method.name] is None]
-    adaptive = [method for method in able if method.error_order is not None and asked]
+    goes = asked and scene.system.rubbing is None
+    adaptive = [method for method in able if method.error_order is not None and goes]
     curves: list[Curve] = []
 
     def done() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._core import Symbol, Tape
-from ..errors import ShapeError
+from ..errors import ShapeError, UnsupportedError
 from ..methods import Method
 from ..reference.marks import Marks, recording
 from ..reference.traced import Tracer
@@ -87,6 +87,11 @@ def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
     """The symbols of the rates at step 1, of a step's next slots, or of what finishes a slot."""
     found: list[Symbol]
     if method is None:
+        if tracer.system.rubbing is not None:
+            raise UnsupportedError(
+                f"rates: {tracer.system!r} has friction that sticks; what it does depends on the step, so there are no rates "
+                f"without one"
+            )
         s, (v, y, _) = tracer.scaled(1.0), tracer.state()
         t = tracer.tape.time()
         found = tracer.flat(*_wide(tracer.system, s.dv(t, v, y), s.dy(t, v, y)))

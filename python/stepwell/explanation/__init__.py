@@ -83,6 +83,8 @@ def explain(
     if attempt and how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if attempt and system.rubbing is not None:
+        raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
     if attempt and (control is not None or system.keeper is not None):
         raise ArgumentError("control: goes with fixed steps only, and attempt=True was given")
     own = prod(system.batch)
@@ -102,6 +104,7 @@ def explain(
     batch = system.batch if count == own else (count // own, *system.batch)
     _checks.batch_shape({"system": batch, "control": () if control is None else control.batch})
     if control is not None:
+        _checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
         system = system.under(control, batch)
         fits_together(system, how)
     plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice)

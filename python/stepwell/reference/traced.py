@@ -5,7 +5,6 @@ Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from itertools import count
 from math import prod
@@ -13,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from .._value import changed
 from . import adaptive
+from .around import surrounded, whole_step
 from .run import linear_step
 from .signal import Constant, Held, Sine
 
@@ -38,15 +39,15 @@ class Sampled(Held):
 
 
 class Tracer:
-    """A system of symbols, for one member, and what can be traced of it.
+    """A system of symbols, for one member, and what can be traced of it; a force from outside is of shape (*block, *batch).
 
     Attributes:
         numbers: what stands behind the parameters: of each symbol its number for every member.
         tables: what stands behind the sampled inputs.
     """
 
-    def __init__(self, system: Any, tape: Any) -> None:
-        self.system, self.tape = system, tape
+    def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
+        self.system, self.tape, self.force = system, tape, force
         self._params, self._tables = map(tape.param, count()), count()
         self.numbers: list[Any] = []
         self.tables: list[Held] = []
@@ -80,13 +81,19 @@ class Tracer:
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
         s = self.system.reference(h, **given)
-        if self.system.control is None:
-            return s
-        control: Any = copy.copy(self.system.control)
-        for name, value in control.given().items():
-            if isinstance(value, np.ndarray):
-                setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
-        return control.around(s, h)
+        s = s if self.system.control is None else self._controlled(s, h)
+        rubbing, force = self.system.rubbing, self.force
+        if rubbing is not None:
+            rubbing = self.symbols(rubbing, rubbing.shape)
+        if force is not None:
+            force = self.symbols(force, force.shape[len(self.system.v_shape) :])
+        return surrounded(s, h, force, rubbing)
+
+    def _controlled(self, s: Any, h: Any) -> Any:
+        control: Any = self.system.control
+        numbers = {name: value for name, value in control.given().items() if isinstance(value, np.ndarray)}
+        symbols = {name.removeprefix("control."): self.symbols(value, value.shape) for name, value in numbers.items()}
+        return changed(control, **symbols).around(s, h)
 
     def step(self, method: Any) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
@@ -94,9 +101,7 @@ class Tracer:
         s, (v, y, more) = self.scaled(h), self.state()
         if hasattr(s, "work"):
             s.work = next(more)
-        v, y = method.steps.step(s, self.tape.time(), h, v, y)
-        if hasattr(s, "project"):
-            v, y = s.project(v, y)
+        v, y = whole_step(method.steps.step, s, self.tape.time(), h, v, y)
         return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:

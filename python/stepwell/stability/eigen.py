@@ -202,7 +202,10 @@ def tolerance(matrix: Array) -> Array:
     which move by the square root.
     """
     n = len(matrix)
-    squares = matrix[0, 0] ** 2 if n == 1 else matrix[0, 0] ** 2 + matrix[1, 1] ** 2 + 2.0 * np.abs(matrix[0, 1] * matrix[1, 0])
+    with np.errstate(over="ignore"):  # of steps so long that nothing can be said of them
+        squares = matrix[0, 0] ** 2
+        if n > 1:
+            squares = squares + matrix[1, 1] ** 2 + 2.0 * np.abs(matrix[0, 1] * matrix[1, 0])
     return np.asarray(16.0 * n * EPS * np.maximum(1.0, squares))
 
 

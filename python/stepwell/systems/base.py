@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from abc import ABC, abstractmethod
 from math import inf, prod
 from types import FunctionType
@@ -12,8 +11,9 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Fixed, Value, changed
 from ..errors import ArgumentError, DTypeError, UnsupportedError
+from ..reference.around import surrounded
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
@@ -30,7 +30,7 @@ Given = list[tuple[str, Any]]
 TINY = 1e-200
 
 
-class System(Value, ABC):
+class System(Fixed, Value, ABC):
     """Two blocks, velocities ``v`` and coordinates ``y``, and a rate for each.
 
     Attributes:
@@ -47,6 +47,7 @@ class System(Value, ABC):
         input_names: the inputs that it can be given, each a number.
         batch: shape to which the parameters broadcast.
         control: the control or projection of its energy, or None; ``integrate`` sets it.
+        rubbing: by how much friction that sticks reduces each velocity in a unit of time, or None; broadcasts over the batch.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
     """
@@ -54,8 +55,8 @@ class System(Value, ABC):
     kernel: ClassVar[str]
     reference: ClassVar[type[Any]]
     axes: ClassVar[str] = ""
-    linear: ClassVar[bool] = False
-    complex_step: ClassVar[bool] = False
+    linear: bool = False
+    complex_step: bool = False
     second_order: bool = True
     v_shape: Shape = ()
     y_shape: Shape = ()
@@ -63,6 +64,7 @@ class System(Value, ABC):
     input_names: tuple[str, ...] = ()
     batch: Shape = ()
     control: EnergyControl | Projection | None = None
+    rubbing: Array | None = None
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
     _free: System | None = None
@@ -71,6 +73,13 @@ class System(Value, ABC):
     def kind_name(self) -> str:
         """What systems of its kind are called."""
         return type(self).__name__
+
+    @property
+    def _instead(self) -> str:
+        return (
+            f"make another {self.kind_name}, with what is to change. A World that goes on from here with it: "
+            f"World(system, method, dt=world.dt, **world.resume)"
+        )
 
     @property
     def keeper(self) -> AnyControl | None:
@@ -102,15 +111,23 @@ class System(Value, ABC):
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
         return self.reference(h, **self.given(batch))
 
-    def scaled(self, h: float, batch: Shape) -> Any:
-        """The NumPy reference of this system with its control, scaled to the step h, for states of that batch shape."""
+    def scaled(self, h: float, batch: Shape, force: Array | None = None) -> Any:
+        """The NumPy reference of this system with its control and friction, scaled to the step h, for states of that batch shape.
+
+        ``force`` is added to v̇.
+        """
         s = self.alone(h, batch)
-        return s if self.control is None else self.control.around(s, h)
+        s = s if self.control is None else self.control.around(s, h)
+        return s if force is None and self.rubbing is None else surrounded(s, h, force, self.rubbing)
+
+    def given_around(self) -> dict[str, Any]:
+        """Parameters of what is around its equations, by name: control and friction."""
+        given = {} if self.control is None else self.control.given()
+        return given if self.rubbing is None else given | {"friction.limit": self.rubbing}
 
     def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system and of its control, in the form that the core takes."""
-        given = self.given(batch)
-        return flat(given if self.control is None else given | self.control.given(), batch)
+        """The parameters of this system, of its control and its friction, in the form that the core takes."""
+        return flat(self.given(batch) | self.given_around(), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
@@ -189,10 +206,8 @@ class System(Value, ABC):
         if getattr(control, "target", None) is not None:
             raise ArgumentError(f"target: {control!r} keeps a constraint of {self!r}, which is its own target; leave it out")
         free = self.uncontrolled
-        kept = copy.copy(free)
-        kept._free, kept.kept = free, control
-        kept.batch = _checks.batch_shape({"system": free.batch, "control": control.batch})
-        return cast("Self", kept)
+        batch = _checks.batch_shape({"system": free.batch, "control": control.batch})
+        return cast("Self", changed(free, _free=free, kept=control, batch=batch))
 
     def given_kept(self) -> dict[str, Any]:
         """What keeps the system's constraint, as parameters: ``keeps``, "control" or "projection", and its ``strength``."""
@@ -210,11 +225,7 @@ class System(Value, ABC):
             raise UnsupportedError(f"control: {self!r} has no energy control")
 
     def _held_by(self, control: EnergyControl | Projection) -> Self:
-        held = copy.copy(self)
-        held._free = self.uncontrolled
-        held.control = control
-        held.velocity_term = "energy control"
-        return held
+        return changed(self, _free=self.uncontrolled, control=control, velocity_term="energy control")
 
     # What the transition-matrix form and the analysis ask of a linear system.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Shape
-from .._value import Value
+from .._value import Fixed, Value
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import Constant, Held, Sine
 
@@ -16,7 +16,7 @@ from ..reference.signal import Constant, Held, Sine
 LAST_ANGLE = 2.0**50
 
 
-class Sinusoid(Value):
+class Sinusoid(Fixed, Value):
     """amplitude · sin(omega·t + phase).
 
     Args:
@@ -49,7 +49,7 @@ class Sinusoid(Value):
         return Sine(self.amplitude, self.omega, self.phase)
 
 
-class Sampled(Value):
+class Sampled(Fixed, Value):
     """Samples, each held until the next (zero-order hold); the first also holds before its time, the last one for ever.
 
     Args:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from .._value import changed
 from ..errors import ShapeError
 from ..reference.systems import nbody as reference
 from .base import System, aligned
@@ -58,11 +58,8 @@ class NBody(System):
         self.G = _checks.numbers("G", G, positive=True)
         self.softening = _checks.not_negative("softening", softening, "lengths")
         self.dim = None if dim is None else _checks.count("dim", dim, 2, 3)
-        self._shape(self.dim or 2)
+        self.v_shape = self.y_shape = (len(self.masses), self.dim or 2)
         self.batch = _checks.batch_shape({"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape})
-
-    def _shape(self, dim: int) -> None:
-        self.v_shape = self.y_shape = (len(self.masses), dim)
 
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
@@ -85,11 +82,10 @@ class NBody(System):
             dims |= set(shape[1:2])
         if len(dims) > 1:
             raise ShapeError(f"v and y: expected as many dimensions in both, got shapes {shapes[0]} and {shapes[1]}")
-        bound = copy.copy(self)
-        if dims:
-            (bound.dim,) = dims
-            bound._shape(bound.dim)
-        return bound
+        if not dims:
+            return self
+        (dim,) = dims
+        return changed(self, dim=dim, v_shape=(n, dim), y_shape=(n, dim))
 
     def member(self, index: tuple[int, ...], batch: Shape) -> NBody:
         """One member of a batch, alone."""
@@ -97,12 +93,9 @@ class NBody(System):
         def one(values: Array, own: int = 0) -> Array:
             return _checks.member(np.broadcast_to(aligned(values, own, batch), (*values.shape[:own], *batch)), index)
 
-        alone = copy.copy(self)
-        alone.masses, alone.G, alone.softening = one(self.masses, 1), one(self.G), one(self.softening)
-        alone.batch = ()
-        if self.control is not None:
-            alone.control = self.control.member(one)
-        return alone
+        numbers = {"masses": one(self.masses, 1), "G": one(self.G), "softening": one(self.softening)}
+        alone = changed(self, **numbers, batch=())
+        return alone if self.control is None else changed(alone, control=self.control.member(one))
 
     def closest(self, y: Array) -> tuple[tuple[int, int], float]:
         """The two bodies that are nearest to each other in one state, and their distance."""

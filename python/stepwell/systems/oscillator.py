@@ -1,11 +1,14 @@
-"""The linear oscillator (§3)."""
+"""The oscillator (§3), also with friction that sticks (§8)."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from .. import _checks
 from .._checks import Array, Shape
+from ..errors import ArgumentError
 from ..reference.systems.oscillator import Oscillator as Reference
 from .base import System, shown
 from .inputs import Input, Sampled, as_input, signal
@@ -14,18 +17,26 @@ FORMS = ("canonical", "physical")
 
 
 class Oscillator(System):
-    """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3).
+    """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3), and less friction·sgn ẏ where that is given (§8).
 
     Args:
-        omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch.
+        omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block
+            on a plane, without a spring.
         damping: damping ratio D, without a unit; broadcasts. None leaves the term out.
         x: input, the point to which the spring pulls: a number, an array over the batch, ``Sinusoid`` or ``Sampled``.
         a: acceleration by an external force, likewise.
+        friction: deceleration by Coulomb's friction, μN/m, in units of length per unit of time squared, zero or more; broadcasts.
+            It acts against the motion, and at rest against the other forces: where these are not larger, the mass sticks.
+        drag: d/m of a viscous force −d·ẏ, in 1 per unit of time, in place of ``damping``: both name one term, 2Dω₀ = d/m.
         form: ``"canonical"``, where v is the velocity divided by ω₀ and the phase diagram is a circle, or ``"physical"``, where
             v is the velocity.
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> block = sw.Oscillator(0.0, friction=0.5 * 9.81, form="physical")  # slides on a plane, μ = 0.5
+        >>> sw.integrate(block, "false_euler", v=3.0, y=0.0, dt=1e-3, steps=1000).y[-1]  # 3²/(2·0.5·9.81) = 0.917
     """
 
     kernel = "oscillator"
@@ -34,22 +45,42 @@ class Oscillator(System):
     linear = True
     input_names = ("x", "a")
 
-    def __init__(self, omega: Any = 1.0, damping: Any = None, *, x: Any = None, a: Any = None, form: str = "canonical") -> None:
-        self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
+    def __init__(
+        self,
+        omega: Any = 1.0,
+        damping: Any = None,
+        *,
+        x: Any = None,
+        a: Any = None,
+        friction: Any = None,
+        drag: Any = None,
+        form: str = "canonical",
+    ) -> None:
+        self.form = _checks.known("form", form, FORMS)
+        if self.form == "canonical":
+            self.omega = _checks.numbers("omega", omega, positive=True, unit="rad per unit of time")
+        else:
+            self.omega = _checks.not_negative("omega", omega, "rad per unit of time")
+        if damping is not None and drag is not None:
+            raise ArgumentError("damping, drag: expected one of them, got both; they name one term, 2·damping·omega = drag")
         self.damping = None if damping is None else _checks.numbers("damping", damping)
+        self.drag = None if drag is None else _checks.not_negative("drag", drag)
+        self.friction = None if friction is None else _checks.not_negative("friction", friction)
         self.x = as_input("x", x)
         self.a = as_input("a", a)
-        self.form = _checks.known("form", form, FORMS)
-        self.velocity_term = None if damping is None else "damping"
-        self.batch = _checks.batch_shape(
-            {"omega": self.omega.shape}
-            | ({} if self.damping is None else {"damping": self.damping.shape})
-            | {name: given.batch for name, given in self.given_inputs().items()}
-        )
+        terms = {"damping": self.damping, "drag": self.drag, "friction": self.friction}
+        given = {name: term.shape for name, term in terms.items() if term is not None}
+        self.velocity_term = " and ".join(given) or None
+        inputs = {name: given.batch for name, given in self.given_inputs().items()}
+        self.batch = _checks.batch_shape({"omega": self.omega.shape} | given | inputs)
+        if self.friction is not None:
+            self.linear = self.complex_step = False
+            self.rubbing = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
 
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
-        return [*shown(omega=self.omega, damping=self.damping, x=self.x, a=self.a), f"form={self.form!r}"]
+        terms = shown(omega=self.omega, damping=self.damping, x=self.x, a=self.a, friction=self.friction, drag=self.drag)
+        return [*terms, f"form={self.form!r}"]
 
     def given_inputs(self) -> dict[str, Input]:
         """Its inputs by name, without those that were not given."""
@@ -60,7 +91,7 @@ class Oscillator(System):
     def given(self, batch: Shape) -> dict[str, Any]:
         """Form, parameters, inputs."""
         inputs = {"x": signal(self.x), "a": signal(self.a)}
-        return {"form": self.form, "omega": self.omega, "damping": self.damping} | inputs
+        return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag} | inputs
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""
@@ -70,9 +101,12 @@ class Oscillator(System):
 
     def without_inputs(self) -> Oscillator:
         """The same oscillator without inputs."""
-        return Oscillator(self.omega, self.damping, form=self.form)
+        return self._driven({})
 
     def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:
         """The same oscillator with these samples as its only input."""
-        pulse: dict[str, Any] = {name: Sampled(values, interval)}
-        return Oscillator(self.omega, self.damping, form=self.form, **pulse)
+        return self._driven({name: Sampled(values, interval)})
+
+    def _driven(self, inputs: dict[str, Input]) -> Oscillator:
+        terms: dict[str, Any] = {"drag": self.drag, "friction": self.friction, "form": self.form}
+        return Oscillator(self.omega, self.damping, **terms | inputs)

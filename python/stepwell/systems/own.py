@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array, Shape
+from .._value import changed, complete
 from ..control import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
 from ..equations.trace import Equations
@@ -83,17 +84,15 @@ class OwnSystem(System):
         return f"{self.definition.name}({', '.join(said)})"
 
     def _held(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name not in FOUND_LATER}
+        return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self._held() | {"_core": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
-        again = copy.copy(self)
-        again.parameters_given = copy.deepcopy(self.parameters_given, memo)
+        again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
         if self.control is not None:
-            again.control = copy.deepcopy(self.control, memo)
-        again._bounds, again._met = {}, {}
+            complete(again, control=copy.deepcopy(self.control, memo))
         return again
 
     def own_axes(self, name: str) -> int:
@@ -160,14 +159,12 @@ class OwnSystem(System):
         if (known := self._bounds.get((v_shape, y_shape))) is not None:
             return known
         definition = self.definition
-        bound = copy.copy(self)
-        bound._bounds, bound._met = {}, {}
-        bound.v_shape, bound.y_shape = v_shape, y_shape
         shapes = {
             name: value.shape[: self.own_axes(name)] if isinstance(value, np.ndarray) else None
             for name, value in self.parameters_given.items()
         }
-        bound.equations = Equations(definition, v_shape, y_shape, shapes)
+        equations = Equations(definition, v_shape, y_shape, shapes)
+        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _bounds={}, _met={})
         bound._trace()
         self._bounds[v_shape, y_shape] = bound
         return bound
@@ -176,8 +173,7 @@ class OwnSystem(System):
         """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
         equations, definition = self.equations, self.definition
         assert equations is not None
-        plain = copy.copy(self)
-        plain.control = None  # a projection comes after the step, and is the core's
+        plain = changed(self, control=None)  # a projection comes after the step, and is the core's
         tape = _core.Tape()
         traced = []
         for _ in range(2):
@@ -201,7 +197,7 @@ class OwnSystem(System):
         self._core = tape.equations(
             dv if equations.v_shape != (0,) else [], None if equations.second_order else dy, quantities, kept
         )
-        self.velocity_term = "forces that do" if self._core.reads_v else None
+        complete(self, velocity_term="forces that do" if self._core.reads_v else None)
 
     def _known(self) -> OwnSystem:
         """The same system with known shapes of its blocks."""
@@ -291,18 +287,18 @@ class OwnSystem(System):
         known = self._known().uncontrolled  # one control takes the place of another
         assert isinstance(known, OwnSystem)
         assert known.equations is not None
-        kept = copy.copy(known)
-        kept._bounds, kept._met = {}, {}
-        kept._free = known
-        kept.batch = _checks.batch_shape({"system": known.batch, "control": control.batch})
         pushed = isinstance(control, Control)
-        kept.equations = known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed)
-        if pushed:
-            kept.push, kept.second_order = control, False
-        else:
-            kept.control = control
+        kept = changed(
+            known,
+            _bounds={},
+            _met={},
+            _free=known,
+            batch=_checks.batch_shape({"system": known.batch, "control": control.batch}),
+            equations=known.equations.keeping(name, limited=pushed and control.form == "limited", pushed=pushed),
+        )
+        complete(kept, **({"push": control, "second_order": False} if pushed else {"control": control}))
         kept._trace()
-        kept.velocity_term = kept.velocity_term or "a control of an invariant"
+        complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
         return kept
 
     def given_inputs(self) -> dict[str, Input]:

@@ -48,6 +48,11 @@ pub trait System<N: Number> {
         None
     }
 
+    /// The velocities after a step from `before` at time `t`, if the step may have missed that they come to rest.
+    fn bring_to_rest(&self, _t: N, _before: (&Block<N>, &Block<N>), v: Block<N>) -> Block<N> {
+        v
+    }
+
     /// The state after a step, projected onto what should be constant.
     fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
         (v, y)
@@ -116,8 +121,9 @@ impl Kind {
     /// A system that passes this check can be made and stepped.
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
-        controls::check(self, given)?;
-        let term = (self.velocity_term)(given).or(controls::is_given(given).then_some("energy control"));
+        controls::check(self, given, shape)?;
+        let around = [(controls::friction::is_given(given), "friction"), (controls::is_given(given), "energy control")];
+        let term = (self.velocity_term)(given).or(around.into_iter().find_map(|(given, term)| given.then_some(term)));
         match term {
             Some(term) if method.needs == Needs::Acceleration => {
                 Err(Error::VelocityDependent { method: method.name, system: self.name, term })

@@ -192,8 +192,8 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let s = system(kind, &parameters(given, h), Symbol::new(Op::State((shape.v + shape.y) as u32)));
     let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
-    let (v, y) = (made.next().unwrap_or(v), made.next().unwrap_or(y));
-    let (v, y) = s.project(v, y);
+    let (new_v, new_y) = (made.next().unwrap_or_else(|| v.clone()), made.next().unwrap_or_else(|| y.clone()));
+    let (v, y) = s.project(s.bring_to_rest(t, (&v, &y), new_v), new_y);
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));
@@ -236,7 +236,8 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
     Ok(record(tape, || {
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let s = (kind.symbols)(&parameters(given, h));
+        let p = parameters(given, h);
+        let s = controls::force::wrap(&p, (kind.symbols)(&p));
         let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
         ids([&made.next().unwrap_or(v), &y])
     }))
@@ -315,6 +316,7 @@ impl Scene {
                 (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
             }
             if let How::Attempts { name } = &self.how {
+                controls::only_fixed(&self.given)?;
                 method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
             }
             let traced = Traced {

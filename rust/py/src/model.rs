@@ -8,6 +8,7 @@ use pyo3::{
     types::{PyString, PyTuple, PyType},
 };
 use stepwell_core::{
+    controls::force,
     error::Error,
     run::Model,
     spec::{Given, Row, Spec, Table},
@@ -130,7 +131,8 @@ impl ModelSpec {
                 Value::Whole(whole) => names.wholes.push((name, whole)),
                 Value::Rows(array) => {
                     let [count, members] = [0, 1].map(|axis| array.bind(py).readonly().as_array().shape()[axis]);
-                    names.rows.push((name, vec![members == 1; count]));
+                    // A force changes between steps, so it is never computed with beforehand for all members at once.
+                    names.rows.push((name.clone(), vec![members == 1 && name != force::NAME; count]));
                     rows.push(array);
                 }
                 Value::Equations(rates) => names.equations = Some(rates),

@@ -45,6 +45,36 @@ impl Arrays {
     }
 }
 
+/// The array of the force, which the caller changes.
+enum ForceArray {
+    /// A few numbers are copied.
+    Few { buffer: PyBuffer<f64>, copy: Vec<f64> },
+    /// Many are read where they are.
+    Many(Py<PyArray1<f64>>),
+}
+
+impl ForceArray {
+    fn new(py: Python<'_>, array: Py<PyArray1<f64>>) -> PyResult<ForceArray> {
+        let numbers = array.bind(py).len()?;
+        if numbers > COPIED_NUMBERS {
+            return Ok(ForceArray::Many(array));
+        }
+        Ok(ForceArray::Few { buffer: PyBuffer::get(array.bind(py))?, copy: vec![0.0; numbers] })
+    }
+
+    /// Gives the world what is in the array now.
+    fn read(&mut self, py: Python<'_>, world: &mut world::World) -> PyResult<()> {
+        match self {
+            ForceArray::Few { buffer, copy } => {
+                buffer.copy_to_slice(py, copy)?;
+                world.set_force(copy);
+            }
+            ForceArray::Many(array) => world.set_force(array.bind(py).try_readonly()?.as_slice()?),
+        }
+        Ok(())
+    }
+}
+
 /// Arrays of up to so many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
 /// Steps above this are no longer exact as floating-point numbers.
@@ -62,12 +92,16 @@ pub struct World {
 struct Loop {
     world: world::World,
     arrays: Arrays,
+    force: Option<ForceArray>,
 }
 
 impl Loop {
     /// `n` steps; long calls let other threads run and check for Ctrl-C.
     fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
-        let Loop { world, arrays } = self;
+        let Loop { world, arrays, force } = self;
+        if let Some(force) = force {
+            force.read(py, world)?;
+        }
         arrays.with(py, |v, y| {
             let Some(steps_between_checks) = world.steps_between_checks() else {
                 let result = interruptible(py, None, |monitor| world.step_in_background(n, v, y, monitor));
@@ -100,7 +134,7 @@ struct WorldPlan {
 #[pymethods]
 impl World {
     #[new]
-    #[pyo3(signature = (model, plan, v, y, carry = None))]
+    #[pyo3(signature = (model, plan, v, y, carry = None, force = None))]
     fn new(
         py: Python<'_>,
         model: &ModelSpec,
@@ -108,6 +142,7 @@ impl World {
         v: Py<PyArrayDyn<f64>>,
         y: Py<PyArrayDyn<f64>>,
         carry: Option<PyReadonlyArray1<f64>>,
+        force: Option<Py<PyArray1<f64>>>,
     ) -> PyResult<Self> {
         let WorldPlan { t0, dt, choice, first, members } = plan;
         let (clock, machine) =
@@ -125,13 +160,14 @@ impl World {
         if let Some(carry) = carry {
             world.carry_on(carry.as_slice()?, v_now, y_now);
         }
+        let force = force.map(|array| ForceArray::new(py, array)).transpose()?;
         let arrays = if sizes.0.max(sizes.1) <= COPIED_NUMBERS {
             let buffers = (PyBuffer::get(v.bind(py))?, PyBuffer::get(y.bind(py))?);
             Arrays::Few { buffers, copies: (vec![0.0; sizes.0], vec![0.0; sizes.1]) }
         } else {
             Arrays::Many { v, y }
         };
-        Ok(World { loop_: Mutex::new(Loop { world, arrays }), clock, step: AtomicI64::new(first) })
+        Ok(World { loop_: Mutex::new(Loop { world, arrays, force }), clock, step: AtomicI64::new(first) })
     }
 
     /// `n` steps, in place.
@@ -154,7 +190,7 @@ impl World {
 
     /// The carry, by rows; None if the next step begins with v itself.
     fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        let carry = self.alone(|Loop { world, arrays }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
+        let carry = self.alone(|Loop { world, arrays, .. }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
         Ok(carry.map(|carry| carry.into_pyarray(py)))
     }
 

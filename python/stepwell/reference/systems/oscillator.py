@@ -8,10 +8,12 @@ from ..types import Array, Signal
 class Oscillator:
     """Canonical: v̇ = −ω₀(y + 2Dv − x) + a/ω₀, ẏ = ω₀v. Physical: v̇ = −ω₀²y − 2Dω₀v + ω₀²x + a, ẏ = v.
 
-    ``damping`` None means that there is no such term; a driven oscillator always has it.
+    ``damping`` None means that there is no such term; a driven oscillator always has it. ``drag`` is 2Dω₀ in its place.
     """
 
-    def __init__(self, h: float, form: str, omega: Array, damping: Array | None, x: Signal | None, a: Signal | None) -> None:
+    def __init__(
+        self, h: float, form: str, omega: Array, damping: Array | None, drag: Array | None, x: Signal | None, a: Signal | None
+    ) -> None:
         if form == "canonical":
             self.stiffness = self.speed = by_x = h * omega
             by_a = h / omega
@@ -21,7 +23,9 @@ class Oscillator:
         inputs = [signal.scaled(by) for signal, by in ((x, by_x), (a, by_a)) if signal is not None]
         if damping is None and inputs:
             damping = np.zeros(())
-        self.drag = None if damping is None else (2.0 * damping) * (h * omega)
+        self.drag = None if drag is None else h * drag
+        if drag is None and damping is not None:
+            self.drag = (2.0 * damping) * (h * omega)
         self.inputs = inputs
 
     def dv(self, t: float, v: Array, y: Array) -> Array:

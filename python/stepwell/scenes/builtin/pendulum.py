@@ -37,6 +37,8 @@ def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
     modulus = math.sin(math.radians(0.5 * amplitude))
     complement = math.sin(math.radians(0.5 * (180.0 - amplitude)))
     period = 4.0 * quarter(complement) / omega
+    if not 3.0 * period < math.inf:
+        raise ArgumentError(f"omega: expected one of which three periods are a finite time, got {omega:g}")
 
     def exact(t: Array) -> tuple[Array, Array]:
         # sin ½y = k·cn/dn and cos ½y = k'/dn.

@@ -4,17 +4,21 @@
 //! A *projection* returns the state to the target energy after the step. Both wrap any system that has
 //! an energy, and are a system themselves. Energies are scaled to the step, as everything is.
 //!
+//! Beside them [`force`] adds a force from outside, and [`friction`] Coulomb's friction.
+//!
 //! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`; or it is
 //! `projection`, with the word `control.way` and the `control.target`.
 
 pub mod energy;
+pub mod force;
+pub mod friction;
 pub mod projection;
 
 use crate::{
     error::Error,
     number::Number,
     spec::{Given, Parameters},
-    system::{Kind, System},
+    system::{Kind, Shape, System},
 };
 
 /// Whether a system is given any control.
@@ -22,8 +26,10 @@ pub fn is_given(given: &Given) -> bool {
     !given.word("control").is_empty()
 }
 
-/// An error if the control that is given is wrong.
-pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
+/// An error if what is given around the system is wrong.
+pub fn check(kind: &Kind, given: &Given, shape: Shape) -> Result<(), Error> {
+    force::check(given, shape)?;
+    friction::check(given)?;
     let name = match given.word("control") {
         "" => return Ok(()),
         "energy" => "control.form",
@@ -43,14 +49,24 @@ pub fn check(kind: &Kind, given: &Given) -> Result<(), Error> {
     given.expect("control.target", 1)
 }
 
-/// A system under the control that is given, or the system itself. The tally starts from this number: h times the energy that control or
-/// projection added.
+/// An error if something is given that goes with steps of fixed length only.
+pub fn only_fixed(given: &Given) -> Result<(), Error> {
+    let name = [force::NAME, friction::NAME].into_iter().find(|name| given.count(name) > 0);
+    match name {
+        None => Ok(()),
+        Some(name) => Err(Error::Options { system: given.system.clone(), options: format!("{name}, with adaptive steps") }),
+    }
+}
+
+/// A system with all that is given around it: control or projection, force from outside, friction, in that order, for friction resists
+/// all other forces. The tally starts from this number: h times the energy that control or projection added.
 pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
-    match p.given.word("control") {
+    let system: Box<dyn System<N>> = match p.given.word("control") {
         "energy" => Box::new(energy::Controlled::new(p, system, tally)),
         "projection" => Box::new(projection::Projected::new(p, system, tally)),
         _ => system,
-    }
+    };
+    friction::wrap(p, force::wrap(p, system))
 }
 
 /// √x with x clamped between ¼ and 4: a factor of velocities between ½ and 2.

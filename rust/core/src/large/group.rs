@@ -11,7 +11,12 @@ use crate::{
     error::Error,
     isa::Level,
     program::{Block, Program},
-    run::{aligned::Aligned, group::Group, stage::Clock, workers::Stop},
+    run::{
+        aligned::Aligned,
+        group::Group,
+        stage::{Clock, Force},
+        workers::Stop,
+    },
     spec::Spec,
     system::Shape,
     trace::{How, method},
@@ -143,6 +148,10 @@ impl Group for LargeGroup {
             self.blocks.rates.prepare(spec, first, count);
         }
         self.blocks.rates.tally_mut().fill(0.0);
+    }
+
+    fn set_force(&mut self, force: &Force, first: usize, count: usize) {
+        self.blocks.rates.set_force(force, first, count);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {

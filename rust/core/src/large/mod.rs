@@ -15,6 +15,7 @@ pub mod chain;
 pub mod control;
 pub mod course;
 pub mod executor;
+pub mod force;
 pub mod group;
 mod inputs;
 pub mod linear;
@@ -23,7 +24,7 @@ mod panels;
 pub mod tapes;
 
 use crate::{
-    run::{Machine, workers::Stop},
+    run::{Machine, stage::Force, workers::Stop},
     spec::{Given, Spec},
     system::Shape,
 };
@@ -55,6 +56,9 @@ pub trait Rates: Send + Sync {
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Takes the force from outside for the members from `first`, of rows of a number for each of all members.
+    fn set_force(&mut self, _rows: &Force, _first: usize, _count: usize) {}
 
     /// Sets the flag at which a rate that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}
@@ -130,7 +134,7 @@ pub struct Long {
     pub make: fn(&Asked) -> Box<dyn Rates>,
 }
 
-/// Rates of one member by the kernel of the system, under the control that is given.
+/// Rates of one member by the kernel of the system, under the control and the force that are given.
 pub fn single(long: Long, asked: &Asked) -> Box<dyn Rates> {
-    control::wrap((long.make)(asked), asked)
+    force::wrap(control::wrap((long.make)(asked), asked), asked)
 }

@@ -10,7 +10,7 @@ use crate::{
     number::{Symbol, record},
     run::{
         aligned::Aligned,
-        stage::{Clock, PreparedStage, Stage},
+        stage::{Clock, Force, PreparedStage, Stage},
     },
     spec::{Given, Spec},
     system::{Block, Kind, Shape, System},
@@ -109,7 +109,8 @@ impl Rated {
         let quantities = |with_dv: bool| {
             record(Tape::default(), || {
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-                let s = (kind.symbols)(&parameters(given, Symbol::new(Op::Step)));
+                let p = parameters(given, Symbol::new(Op::Step));
+                let s = controls::force::wrap(&p, (kind.symbols)(&p));
                 let mut next = ids([&v, &y]);
                 let made = names.iter().filter_map(|name| s.record(name, &v, &y)).flatten();
                 next.extend(made.map(|symbol| symbol.0));
@@ -194,6 +195,24 @@ impl TapeRates {
         (self.rated.shape.v * self.lanes, self.rated.shape.y * self.lanes)
     }
 
+    /// Does something with all stages that changes the rates.
+    fn stages(&mut self, act: impl Fn(&mut PreparedStage, &Stage)) {
+        let TapeRates { rated, dv, dy, velocity, project, record, .. } = self;
+        let all = [
+            (dv, rated.dv.as_ref()),
+            (dy, rated.dy.as_ref()),
+            (velocity, rated.velocity.as_ref()),
+            (project, rated.project.as_ref().map(|(stage, _)| stage)),
+            (record, rated.record.as_ref().map(|(stage, _)| stage)),
+        ];
+        for (prepared, stage) in all {
+            if let (Some(prepared), Some(stage)) = (prepared, stage) {
+                act(prepared, stage);
+            }
+        }
+        self.is_known = false;
+    }
+
     /// Copies a state to where the tapes read it.
     fn set_state(&mut self, v: &[f64], y: &[f64]) {
         let at = self.sizes().0;
@@ -220,19 +239,11 @@ impl Rates for TapeRates {
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
-        let TapeRates { rated, dv, dy, velocity, project, record, .. } = self;
-        let all = [
-            (dv, rated.dv.as_ref()),
-            (dy, rated.dy.as_ref()),
-            (velocity, rated.velocity.as_ref()),
-            (project, rated.project.as_ref().map(|(stage, _)| stage)),
-            (record, rated.record.as_ref().map(|(stage, _)| stage)),
-        ];
-        for (prepared, stage) in all {
-            if let (Some(prepared), Some(stage)) = (prepared, stage) {
-                prepared.prepare(stage, spec, first, count);
-            }
-        }
+        self.stages(|prepared, stage| prepared.prepare(stage, spec, first, count));
+    }
+
+    fn set_force(&mut self, force: &Force, first: usize, count: usize) {
+        self.stages(|prepared, stage| prepared.set_force(stage, force, first, count));
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, Kit, Numbers, PreparedStage, Stage},
+    stage::{Clock, Force, Kit, Numbers, PreparedStage, Stage},
     workers::Stop,
 };
 use crate::{
@@ -25,6 +25,9 @@ pub trait Group: Send + Sync {
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
+
+    /// Takes the force from outside for the members from `first`, for the steps to come.
+    fn set_force(&mut self, _force: &Force, _first: usize, _count: usize) {}
 
     /// Compiles now instead of after some interpreted steps: for real-time loops.
     fn compile_now(&mut self) {}
@@ -163,6 +166,13 @@ impl Group for Lanes {
             side.prepared.prepare(stage, spec, first, count);
         }
         self.tally_mut().fill(0.0);
+    }
+
+    fn set_force(&mut self, force: &Force, first: usize, count: usize) {
+        self.step.set_force(&self.tapes.step, force, first, count);
+        for (side, stage) in self.side_stages() {
+            side.prepared.set_force(stage, force, first, count);
+        }
     }
 
     fn compile_now(&mut self) {

@@ -19,6 +19,7 @@ use self::{
     stage::Clock,
 };
 use crate::{
+    controls,
     error::Error,
     isa::Level,
     large::{
@@ -71,8 +72,9 @@ impl Model<'_> {
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let single = members == 1;
-        if self.scene.fused {
-            return Way::Tape; // operations are fused on the tape of the whole step
+        // Operations are fused on the tape of the whole step, and friction needs the state at its start.
+        if self.scene.fused || controls::friction::is_given(&self.scene.given) {
+            return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {
             // Kernels for one member fill whole vectors with it, so a few members one by one are as fast as a vector of them.

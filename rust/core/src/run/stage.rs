@@ -6,7 +6,7 @@ use super::aligned::Aligned;
 use crate::{
     isa::Level,
     kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner, writer},
-    spec::Spec,
+    spec::{Row, Spec},
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
 };
@@ -159,6 +159,24 @@ impl Clock {
     }
 }
 
+/// A force from outside that changes between steps: rows of one number for each member.
+#[derive(Clone, Copy, Debug)]
+pub struct Force<'a> {
+    /// The rows, one for each number of v.
+    pub numbers: &'a [f64],
+    /// How long a row is.
+    pub members: usize,
+    /// The number of the first row among all parameters.
+    pub place: usize,
+}
+
+impl Force<'_> {
+    /// A row.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.numbers[i * self.members..][..self.members]
+    }
+}
+
 /// Tables of steps that are kept, in numbers: groups after the first find them there.
 const MOST_ENTRIES: usize = 1 << 16;
 
@@ -263,10 +281,26 @@ impl PreparedStage {
         for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
             spec.rows[*param as usize].fill(first, count, raw);
         }
+        self.find_rows();
+        self.take_samples(stage, spec, |row, to| row.fill(first, count, to));
+    }
+
+    /// Takes the force for the members that were prepared.
+    pub fn set_force(&mut self, stage: &Stage, force: &Force, first: usize, count: usize) {
+        let (lanes, rows) = (self.lanes(), force.numbers.len() / force.members);
+        for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
+            if let Some(i) = (*param as usize).checked_sub(force.place).filter(|i| *i < rows) {
+                Row(force.row(i)).fill(first, count, raw);
+            }
+        }
+        self.find_rows();
+    }
+
+    /// Computes what is constant for each member from its parameters.
+    fn find_rows(&mut self) {
         let (rows, given) = (&mut self.rows, &self.given);
         let tile = &mut Tile { state: rows, rows: &self.raw, pool: given, steps: 1, per_step: &[], held: &[] };
         self.kit.member.run(tile, &mut self.scratch);
-        self.take_samples(stage, spec, |row, to| row.fill(first, count, to));
     }
 
     /// Takes the parameters of a member into one lane.

@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering::Relaxed;
 use super::{
     Machine, Model,
     group::Group,
-    stage::Clock,
+    stage::{Clock, Force},
     workers::{self, GoOn, Stop, Workers},
 };
-use crate::error::Error;
+use crate::{controls::force::NAME, error::Error};
 
 struct Share {
     group: Box<dyn Group>,
@@ -49,6 +49,8 @@ pub struct World {
     /// Steps between two checks of whether to stop; none if a single step may take long.
     steps_between_checks: Option<i64>,
     stop: Stop,
+    /// The number of the first row of the force among all parameters, if there is one.
+    force: Option<usize>,
 }
 
 /// How often a world will be stepped is unknown; kernels are chosen for many steps.
@@ -104,7 +106,8 @@ impl World {
         let sizes = (traced.shape.v * members, traced.shape.y * members);
         let carries = traced.carries;
         let written = if carries { (vec![0.0; sizes.0], vec![0.0; sizes.1]) } else { Default::default() };
-        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop })
+        let force = model.spec.given.place(NAME);
+        Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop, force })
     }
 
     /// How many numbers each array holds.
@@ -125,6 +128,14 @@ impl World {
     /// How many steps are made in some milliseconds; none if a single one may take long, and is for [`World::step_in_background`].
     pub fn steps_between_checks(&self) -> Option<i64> {
         self.steps_between_checks
+    }
+
+    /// Takes the force from outside for the steps to come, as rows of one number per member.
+    pub fn set_force(&mut self, rows: &[f64]) {
+        if let Some(place) = self.force {
+            let force = Force { numbers: rows, members: self.members, place };
+            self.shares.iter_mut().for_each(|share| share.group.set_force(&force, share.first, share.count));
+        }
     }
 
     /// Whether these arrays are not what the slots hold.

@@ -13,11 +13,11 @@ use crate::{
     system::{Block, Kind, Shape, System},
 };
 
-/// What the core knows of it. Given: `form`; `omega`, `damping` (maybe); the inputs `x` and `a` (maybe).
+/// What the core knows of it. Given: `form`; `omega`, `damping` or `drag` (maybe); the inputs `x` and `a` (maybe).
 pub const KIND: Kind = Kind {
     name: "oscillator",
     shape,
-    velocity_term: |given| given.has("damping").then_some("damping"),
+    velocity_term: |given| ["damping", "drag"].into_iter().find(|term| given.has(term)),
     quantities: |_| Vec::new(),
     operations: |_| 40,
     long: None,
@@ -49,7 +49,7 @@ fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
         [(p.signal("x"), stiffness), (p.signal("a"), by_a)].into_iter().filter_map(|(x, by)| Some(x?.scaled(by))).collect();
     // A driven oscillator always has its damping term.
     let damping = p.maybe("damping").or((!inputs.is_empty()).then(|| N::of(0.0)));
-    let drag = damping.map(|damping| (N::of(2.0) * damping) * (h * omega));
+    let drag = p.maybe("drag").map(|drag| h * drag).or(damping.map(|damping| (N::of(2.0) * damping) * (h * omega)));
     Box::new(Oscillator { stiffness, speed, drag, inputs })
 }
 

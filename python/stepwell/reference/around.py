@@ -1,0 +1,83 @@
+"""A force from outside, and friction: systems around a system, itself scaled to the step."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from . import bits
+from .types import Array, Blocks, Scaled
+
+
+class Around:
+    """A system with all that another one has."""
+
+    def __init__(self, s: Scaled) -> None:
+        self.s = s
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.s, name)
+
+    @property
+    def work(self) -> Any:
+        """What a control within it has added up, if there is one."""
+        return self.s.work  # type: ignore[attr-defined]
+
+    @work.setter
+    def work(self, work: Any) -> None:
+        self.s.work = work  # type: ignore[attr-defined]
+
+
+class Forced(Around):
+    """A force is added to v̇."""
+
+    def __init__(self, s: Scaled, h: float, force: Array) -> None:
+        super().__init__(s)
+        self.push = h * force
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇ and h times the force."""
+        return np.asarray(self.s.dv(t, v, y) + self.push)
+
+
+class Rubbing(Around):
+    """Coulomb's friction that sticks (§8): v + f is reduced by the limit towards zero, where it stays if it gets there.
+
+    f is h·v̇ without friction, and the limit is h times the deceleration by friction.
+    """
+
+    def __init__(self, s: Scaled, h: float, deceleration: Array) -> None:
+        super().__init__(s)
+        self.limit = h * deceleration
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """The change of v, which is −v where friction stops it."""
+        f, limit = self.s.dv(t, v, y), self.limit
+        moved = v + f
+        forward = bits.where(bits.less(limit, moved), f - limit, -v)
+        return np.asarray(bits.where(bits.less(moved, -limit), f + limit, forward))
+
+    def bring_to_rest(self, t: float, v: Array, y: Array, new_v: Array) -> Array:
+        """The velocity after a step from v and y: zero if the first stage stops it, and friction can hold it there.
+
+        A method of several stages mixes their increments, so by itself it would only divide v by some number in each step.
+        """
+        f = self.s.dv(t, v, y)
+        return np.asarray(bits.where(self._within(v + f) & self._within(f), 0.0, new_v))
+
+    def _within(self, x: Array) -> Any:
+        return bits.at_most(-self.limit, x) & bits.at_most(x, self.limit)
+
+
+def surrounded(s: Any, h: float, force: Array | None, friction: Array | None) -> Any:
+    """A system with what is given: friction comes last, for it resists all other forces."""
+    s = s if force is None else Forced(s, h, force)
+    return s if friction is None else Rubbing(s, h, friction)
+
+
+def whole_step(step: Callable[..., Blocks], s: Any, t: float, h: float, v: Array, y: Array) -> Blocks:
+    """A step of a method, and what comes after it: coming to rest, and projection."""
+    new_v, new_y = step(s, t, h, v, y)
+    if hasattr(s, "bring_to_rest"):
+        new_v = s.bring_to_rest(t, v, y, new_v)
+    return s.project(new_v, new_y) if hasattr(s, "project") else (new_v, new_y)

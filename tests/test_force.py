@@ -1,0 +1,370 @@
+"""A force from outside: read by a world before its steps, to the bit as in the reference, and free where there is none."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import sys
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS
+from stepwell import _core, engine
+from stepwell.errors import ArgumentError, DTypeError, FixedError, ShapeError, UnsupportedError
+from stepwell.reference import around
+from stepwell.reference.traced import Tracer
+from test_graphs import assert_one_graph, methods
+from test_tracing import made
+
+PUSHED = [name for name, make in SYSTEMS.items() if make(np.random.default_rng(0), 1).v_shape != (0,)]
+METHODS = [method.name for method in sw.methods()]
+
+
+def forced(name: str, members: int = 5, seed: int = 3) -> tuple[sw.System, Any, Any, Any]:
+    """A system, a state and a force."""
+    rng = np.random.default_rng(seed)
+    system = SYSTEMS[name](rng, members)
+    shapes = (system.v_shape, system.y_shape, system.v_shape)
+    return (system, *(rng.normal(size=(*shape, members)) for shape in shapes))
+
+
+def able(system: sw.System, method: str) -> bool:
+    return not sw.method(method).needs_acceleration or (system.second_order and system.velocity_term is None)
+
+
+# ---- the reference, and the core
+
+
+@pytest.mark.parametrize("name", PUSHED)
+def test_one_graph(name: str) -> None:
+    """For every input: the core's step and the reference's are one graph of operations, and so is what a method carries."""
+    system, v, _ = made(name)
+    for method in methods(system):
+        plan = engine.Plan(system, method, system.batch, 0.1, force=np.ones_like(v))
+        tape = _core.Tape()
+        tracer = Tracer(system, tape, plan.force)
+        assert_one_graph(tape, tape.trace(engine.model(plan), "step"), tracer.step(method))
+        for which in ("start", "finish") if method.carry else ():
+            tape = _core.Tape()
+            tracer = Tracer(system, tape, plan.force)
+            assert_one_graph(tape, tape.trace(engine.model(plan), f"{which} 0"), tracer.slot(method, which, 0))
+
+
+#: Where sums with a force are others altogether: friction compares them, and a body alone has no other force.
+OTHERWISE = ("block with friction", "one body", *(name for name in PUSHED if name.startswith("friction")))
+
+
+@pytest.mark.parametrize("name", [name for name in PUSHED if name not in OTHERWISE])
+def test_without_a_force_the_step_is_the_one_before(name: str) -> None:
+    """With one, each rate evaluation takes an addition more for each number of v, and nothing else is done in a step."""
+    system, _, _ = made(name)
+    for method in methods(system):
+        plan = engine.Plan(system, method, system.batch, 0.1)
+        counts = []
+        for force in (None, np.ones((*system.v_shape, *system.batch))):
+            tape = _core.Tape()
+            lines, _ = tape.operations(tape.trace(engine.model(plan._replace(force=force)), "step"))
+            counts.append(Counter(line[0] for line in lines))
+        without, pushed = counts
+        numbers = int(np.prod(system.v_shape))
+        # h·force once for each number of v, and a sum for each that is computed; equal ones are one.
+        assert pushed["multiply"] - without["multiply"] == numbers
+        sums = ("add", "subtract", "negate")  # of which one may be written as another
+        assert 0 < sum(pushed[each] - without[each] for each in sums) <= numbers * method.evaluations
+        others = set(without) - {"multiply", "parameter", "step", *sums}
+        assert {each: without[each] for each in others} == {each: pushed[each] for each in others}
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_world_equals_pieces_of_a_run(method: str, backend: str) -> None:
+    """The force changes between the calls of step; the run is made in pieces, each with the force of its own."""
+    rng = np.random.default_rng(1)
+    for name in ("free", "pendulum, damped", "friction", "three bodies", "chain of nineteen", "linear, masses", "own: Duffing"):
+        for members in (1, 5, 97):
+            system, v, y, force = forced(name, members)
+            if not able(system, method):
+                continue
+            world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.1, t0=0.3, force=force)
+            state: dict[str, Any] = {"v": v, "y": y, "t0": 0.3}
+            for steps in (3, 1, 7):
+                world.step(steps)
+                run = sw.integrate(system, method, dt=0.1, steps=steps, backend=backend, **state | {"force": force})
+                np.testing.assert_array_equal(world.y, run.y[-1])
+                np.testing.assert_array_equal(world.v, run.v[-1])
+                state = run.resume
+                force[...] = rng.normal(size=force.shape)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "rk4"])
+@pytest.mark.parametrize(
+    ("system", "members"),
+    [
+        (sw.NBody(np.full(60, 1 / 60), softening=0.1), 1),
+        (sw.NBody(np.full(60, 1 / 60), softening=0.1, dim=3), 3),
+        (sw.NBody(np.full(40, 1 / 40), softening=0.1), 9),
+        (sw.Chain(3000), 1),
+        (sw.Chain(1500), 2),
+        (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 1),
+        (sw.LinearSystem(-np.eye(80) - np.ones((80, 80)) / 80), 9),
+        (SYSTEMS["own: springs in space"](np.random.default_rng(0), 1).definition().sized(None, np.zeros((300, 3))), 2),  # type: ignore[attr-defined]
+    ],
+    ids=repr,
+)
+def test_large_systems(system: sw.System, members: int, method: str) -> None:
+    """By kernels written by hand and by tapes of the rates, with more numbers than are copied."""
+    rng = np.random.default_rng(2)
+    system = system.sized(np.zeros(system.v_shape or 1), np.zeros(system.y_shape)) if system.v_shape else system
+    shape, shape_y = ((*each, members) if members > 1 else each for each in (system.v_shape, system.y_shape))
+    if not able(system, method):
+        pytest.skip("the method needs an acceleration")
+    v, y, force = rng.normal(size=shape), rng.normal(size=shape_y), rng.normal(size=shape)
+    world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force)
+    state: dict[str, Any] = {"v": v, "y": y}
+    for steps in (2, 1):
+        world.step(steps)
+        run = sw.integrate(system, method, dt=0.01, steps=steps, backend="numpy", **state | {"force": force})
+        np.testing.assert_array_equal(world.y, run.y[-1])
+        np.testing.assert_array_equal(world.v, run.v[-1])
+        state = run.resume
+        force[...] = rng.normal(size=force.shape)
+
+
+@pytest.mark.parametrize("control", [sw.EnergyControl(0.3), sw.Projection(), sw.Projection("nacozy")], ids=repr)
+@pytest.mark.parametrize("bodies", [3, 30, 60])
+@pytest.mark.parametrize("members", [1, 2, 9])
+def test_under_control(control: Any, bodies: int, members: int) -> None:
+    """The force is no part of the energy that is kept; the same to the bit in every way of stepping."""
+    rng = np.random.default_rng(5)
+    system = sw.NBody(np.full(bodies, 1.0), softening=0.2)
+    v, y, force = (rng.normal(size=(bodies, 2, members)) for _ in range(3))
+    for method in ("false_euler", "rk4"):
+        world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force, control=control)
+        world.step(4)
+        run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=4, backend="numpy", force=force, control=control)
+        np.testing.assert_array_equal(world.y, run.y[-1])
+        np.testing.assert_array_equal(world.v, run.v[-1])
+        other = sw.integrate(
+            system, method, v=v, y=y, dt=0.01, steps=4, force=force, control=control, every=1, record=["energy", "momentum"]
+        )
+        np.testing.assert_array_equal(other.y[-1], run.y[-1])
+        np.testing.assert_array_equal(other.work, run.work)
+        plain = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=4, force=force, control=control)
+        np.testing.assert_array_equal(plain.y[-1], run.y[-1])
+
+
+@pytest.mark.parametrize("method", ["false_euler", "rk4"])
+@pytest.mark.parametrize("bodies", [12, 16, 24, 30])
+def test_a_rate_that_was_kept_is_not_used_with_another_force(bodies: int, method: str) -> None:
+    """Whatever is kept from one step for the next, the next has the new force."""
+    rng = np.random.default_rng(5)
+    system = sw.NBody(np.full(bodies, 1.0), force="newton", softening=0.2)
+    v, y, force = (rng.normal(size=(bodies, 2, 9)) for _ in range(3))
+    state: dict[str, Any] = {"v": v, "y": y}
+    world = sw.World(system, method, v=v.copy(), y=y.copy(), dt=0.01, force=force, control=sw.Projection())
+    state["control"] = sw.Projection()
+    for _ in range(3):
+        world.step(1)
+        run = sw.integrate(system, method, dt=0.01, steps=1, backend="numpy", **state | {"force": force})
+        np.testing.assert_array_equal(world.y, run.y[-1])
+        np.testing.assert_array_equal(world.v, run.v[-1])
+        state = run.resume
+        force[...] = rng.normal(size=force.shape)
+
+
+@pytest.mark.parametrize("name", ["free", "friction", "three bodies", "sampled x, sinusoid a"])
+def test_fused(name: str) -> None:
+    system, v, y, force = forced(name)
+    world = sw.World(system, "rk4", v=v.copy(), y=y.copy(), dt=0.1, fused=True, force=force)
+    world.step(9)
+    run = sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=9, fused=True, force=force, backend="numpy")
+    np.testing.assert_array_equal((world.v, world.y), (run.v[-1], run.y[-1]))
+
+
+def test_wrong_forces_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those tests would fail if the reference added the force once, without h, or with another sign."""
+    system, v, y, force = forced("pendulum, damped")
+    arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.1, "steps": 3, "force": force}
+    right = sw.integrate(system, "rk4", **arguments).y
+
+    class Twice(around.Forced):
+        def dv(self, t: Any, v: Any, y: Any) -> Any:
+            return super().dv(t, v, y) + self.push
+
+    class Once(around.Forced):
+        def dv(self, t: Any, v: Any, y: Any) -> Any:
+            self.push, push = 0.0 * self.push, self.push
+            return self.s.dv(t, v, y) + push
+
+    class Without(around.Forced):
+        def __init__(self, s: Any, h: float, force: Any) -> None:
+            super().__init__(s, 1.0, force)
+
+    class Against(around.Forced):
+        def __init__(self, s: Any, h: float, force: Any) -> None:
+            super().__init__(s, h, -force)
+
+    np.testing.assert_array_equal(sw.integrate(system, "rk4", backend="numpy", **arguments).y, right)
+    for wrong in (Twice, Once, Without, Against):
+        monkeypatch.setattr(around, "Forced", wrong)
+        assert not np.array_equal(sw.integrate(system, "rk4", backend="numpy", **arguments).y, right)
+
+
+# ---- what it does
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_constant_force_moves_the_place_of_rest(method: str) -> None:
+    """ÿ = −y + f is the free oscillator about y = f. Both runs make the same steps from v = 0, so they differ by rounding only:
+    some ten operations a step of numbers below 4, over 200 steps whose map has powers below 3."""
+    force, y = np.linspace(-1.0, 1.0, 7), np.linspace(0.0, 2.0, 7)
+    run = sw.integrate(sw.Oscillator(), method, v=0.0, y=y, dt=0.05, steps=200, force=force)
+    free = sw.integrate(sw.Oscillator(), method, v=0.0, y=y - force, dt=0.05, steps=200)
+    assert np.abs(run.y[-1] - force - free.y[-1]).max() < 10 * 200 * 4 * 3 * 2.0**-53
+    assert np.abs(run.v[-1] - free.v[-1]).max() < 10 * 200 * 4 * 3 * 2.0**-53
+
+
+def test_it_is_the_acceleration_that_the_oscillator_takes_as_an_input() -> None:
+    """In physical form the input a is the same term, added in another place of the sum: rounding apart, over 300 steps."""
+    a = np.linspace(-1.0, 1.0, 5)
+    one = sw.integrate(sw.Oscillator(1.3, form="physical"), "rk4", v=0.1, y=1.0, dt=0.1, steps=300, force=a)
+    two = sw.integrate(sw.Oscillator(1.3, a=a, form="physical"), "rk4", v=0.1, y=1.0, dt=0.1, steps=300)
+    assert np.abs(one.y - two.y).max() < 300 * 40 * 4 * 2.0**-53
+    assert not np.array_equal(one.y, sw.integrate(sw.Oscillator(1.3, form="physical"), "rk4", v=0.1, y=1.0, dt=0.1, steps=300).y)
+
+
+def test_friction_resists_it() -> None:
+    """A block at rest stays, to the bit, up to μN, and is moved by more: v = (force − μN)·t, a sum of 100 equal terms."""
+    force = np.array([0.0, 0.5, -0.5, 0.5 + 1e-9, -0.75, 2.0])
+    v, y = np.zeros(6), np.full(6, 3.0)
+    world = sw.World(sw.Oscillator(0.0, friction=0.5, form="physical"), "rk4", v=v, y=y, dt=0.01, force=force)
+    world.step(100)
+    np.testing.assert_array_equal(v[:3], 0.0)
+    np.testing.assert_array_equal(y[:3], 3.0)
+    np.testing.assert_allclose(v[3:], [1e-9, -0.25, 1.5], rtol=1e-6, atol=0)
+    force[...] = 0.0
+    world.step(2000)
+    np.testing.assert_array_equal(v, 0.0)
+
+
+# ---- the world's array
+
+
+@pytest.mark.parametrize("members", [3, 700])
+def test_it_allocates_nothing(members: int) -> None:
+    system, v, y, force = forced("free", members)
+    step = sw.World(system, "rk4", v=v, y=y, dt=1e-3, force=force).step
+    step(3)
+    before = sys.getallocatedblocks()
+    for _ in range(1000):
+        force[0] += 1e-3
+        step(2)
+    assert sys.getallocatedblocks() - before < 20  # as in test_world.py
+
+
+COPIES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda w: pickle.loads(pickle.dumps(w)),
+    "resume": lambda w: sw.World(w.system, w.method, dt=w.dt, **w.resume),
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("method", ["verlet", "rk4"])
+def test_a_copy_has_a_force_of_its_own(method: str, how: str) -> None:
+    system, v, y, force = forced("pendulum")
+    world = sw.World(system, method, v=v, y=y, dt=0.1, force=force)
+    world.step(3)
+    other = COPIES[how](world)
+    np.testing.assert_array_equal(other.force, force)
+    assert not np.shares_memory(other.force, force)
+    world.step(4)
+    other.step(4)
+    np.testing.assert_array_equal(other.y, world.y)
+    other.force[...] = 0.0
+    assert force.all()
+
+
+def test_a_run_goes_on_with_its_force() -> None:
+    system, v, y, force = forced("pendulum")
+    whole = sw.integrate(system, "leapfrog", v=v, y=y, dt=0.1, steps=9, force=force)
+    half = sw.integrate(system, "leapfrog", v=v, y=y, dt=0.1, steps=5, force=force)
+    rest = sw.integrate(system, "leapfrog", steps=4, **half.resume)
+    np.testing.assert_array_equal(rest.y, whole.y)
+    world = sw.World(system, "leapfrog", v=v, y=y, dt=0.1, force=force)
+    world.step(5)
+    rest = sw.integrate(system, "leapfrog", dt=0.1, steps=4, **world.resume)
+    np.testing.assert_array_equal(rest.y, whole.y)
+
+
+def test_which_bodies_collided_is_found_under_the_force_too() -> None:
+    """Bodies without mass that a force brings together: by False Euler both are at −3 + ½ + 1 + 1½ = 0 after three steps."""
+    y, force = np.array([[-3.0, 0.0], [3.0, 0.0]]), np.array([[0.5, 0.0], [-0.5, 0.0]])
+    y, force = np.stack([y, y], axis=-1), np.stack([force, 0.0 * force], axis=-1)
+    with pytest.warns(sw.DivergenceWarning, match="1 of 2 member"):
+        run = sw.integrate(sw.NBody([0.0, 0.0]), "false_euler", v=0.0, y=y, dt=1.0, steps=20, force=force)
+    assert run.first_bad_step.tolist() == [4, -1]
+    assert [each.distance for each in run.collisions] == [0.0]
+
+
+def test_it_cannot_be_assigned() -> None:
+    world = sw.World(sw.Oscillator(), "rk4", v=np.zeros(2), y=np.ones(2), dt=0.1, force=np.zeros(2))
+    with pytest.raises(FixedError, match="force: a world's force cannot be assigned; write into"):
+        world.force = np.ones(2)  # type: ignore[misc]
+    assert sw.World(sw.Oscillator(), "rk4", v=np.zeros(2), y=np.ones(2), dt=0.1).force is None
+
+
+BOTH = np.zeros((2, 3))
+
+
+@pytest.mark.parametrize(
+    ("force", "error", "message"),
+    [
+        (1.0, DTypeError, "force: expected a NumPy array to read before the steps, got float"),
+        (np.zeros(3, np.float32), DTypeError, "force: expected dtype float64 to read before the steps, got float32"),
+        (np.zeros(2), ShapeError, "force: expected shape (3,), got (2,)"),
+        (np.zeros(6)[::2], ArgumentError, "force: expected a C-contiguous array to read before the steps, got strides (16,)"),
+        (np.full(3, np.nan), sw.errors.NotFiniteError, "force: expected finite numbers, got nan at [0]"),
+        (BOTH[1], ArgumentError, "force: expected an array of its own, got one that shares memory with v or y"),
+    ],
+    ids=str,
+)
+def test_wrong_arrays(force: Any, error: Any, message: str) -> None:
+    with pytest.raises(error) as caught:
+        sw.World(sw.Oscillator(), "rk4", v=BOTH[0], y=BOTH[1], dt=0.1, force=force)
+    assert str(caught.value).startswith(message.split(" at [")[0])
+
+
+def test_a_read_only_array_will_do() -> None:
+    force = np.broadcast_to(0.5, (3,)).copy()
+    force.flags.writeable = False
+    world = sw.World(sw.Oscillator(), "rk4", v=np.zeros(3), y=np.ones(3), dt=0.1, force=force)
+    world.step()
+    assert world.v[0] != sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1).v[-1]
+
+
+def test_what_has_no_velocity_takes_no_force() -> None:
+    lorenz = SYSTEMS["own: Lorenz"](np.random.default_rng(0), 2)
+    y = np.ones((3, 2))
+    for call in (
+        lambda: sw.World(lorenz, "rk4", y=y, dt=0.1, force=np.zeros((0, 2))),
+        lambda: sw.integrate(lorenz, "rk4", y=y, dt=0.1, steps=1, force=1.0),
+        lambda: sw.integrate(sw.LinearSystem(np.eye(2), velocities=0), "rk4", v=0.0, y=np.ones(2), dt=0.1, steps=1, force=1.0),
+    ):
+        with pytest.raises(UnsupportedError, match=r"force: it is added to the rates of v, and .* has no v; give it an input"):
+            call()
+
+
+@pytest.mark.parametrize("form", ["matrix", "power"])
+def test_it_goes_with_the_direct_form(form: str) -> None:
+    with pytest.raises(UnsupportedError, match="force: goes with form='direct' only"):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, force=1.0, form=form)
+
+
+def test_it_goes_with_fixed_steps() -> None:
+    with pytest.raises(ArgumentError, match="force: goes with fixed steps only"):
+        sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0], force=1.0)
