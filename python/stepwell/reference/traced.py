@@ -79,14 +79,18 @@ class Tracer:
         """The system under its control, scaled to the step h."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        s = self.system.reference(h, **given)
+        s, control = self.system.reference(h, **given), self._control()
+        return s if control is None else control.around(s, h)
+
+    def _control(self) -> Any:
+        """The control with symbols for its numbers, which come behind those of the system; None without one."""
         if self.system.control is None:
-            return s
+            return None
         control: Any = copy.copy(self.system.control)
         for name, value in control.given().items():
             if isinstance(value, np.ndarray):
                 setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
-        return control.around(s, h)
+        return control
 
     def step(self, method: Any) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
@@ -106,12 +110,15 @@ class Tracer:
 
     def attempt(self, method: Any) -> list[Any]:
         """The state and the pace after an attempt at an adaptive step."""
-        s, (v, y, more) = self.scaled(1.0), self.state()
+        batch = self.system.batch
+        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
+        system = adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+        v, y, more = self.state()
         pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
         axes = len(self.system.v_shape), len(self.system.y_shape)
         steps: Any = method.steps
         assert method.error_order is not None
-        following, v, y = adaptive.attempt(steps, s, method.error_order, axes, pace, self.tape.budget(), v, y)
+        following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following)
 
     def record(self, names: Sequence[str]) -> list[Any]:

@@ -117,7 +117,9 @@ impl Kind {
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
         controls::check(self, given)?;
-        let term = (self.velocity_term)(given).or(controls::is_given(given).then_some("energy control"));
+        // What a method carries in place of v would have to change with v.
+        let apart = controls::is_after_the_step(given) && method.carry.is_none();
+        let term = (self.velocity_term)(given).or((controls::is_given(given) && !apart).then_some("energy control"));
         match term {
             Some(term) if method.needs == Needs::Acceleration => {
                 Err(Error::VelocityDependent { method: method.name, system: self.name, term })
