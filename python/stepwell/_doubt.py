@@ -11,7 +11,8 @@ import numpy as np
 
 from . import _encounters
 from ._checks import Array, Shape
-from .errors import AccuracyWarning
+from .control import EnergyControl
+from .errors import AccuracyWarning, ControlWarning
 from .result import Run
 from .systems import NBody
 
@@ -56,10 +57,42 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
     for text in told:
         if text is not None:
             warnings.warn(text, AccuracyWarning, stacklevel=3)
+    if (text := _of_a_control(run, start)) is not None:
+        warnings.warn(text, ControlWarning, stacklevel=3)
+
+
+def _of_a_control(run: Run, start: State | None) -> str | None:
+    """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
+
+    It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
+    """
+    control, bodies = run.system.control, run.system
+    if not (isinstance(control, EnergyControl) and control.form == "printed" and isinstance(bodies, NBody)):
+        return None
+    if run.paces is not None or start is None or run.overshoots is None or not _is_heard(ControlWarning):
+        return None
+    with np.errstate(all="ignore"):
+        gain = run.dt * np.asarray(control.gain)
+        began = gain * bodies.kinetic(np.broadcast_to(start[0], run.y.shape[1:]))
+        if (began >= 1.0).any():
+            return None
+        saved = (gain * bodies.kinetic(np.moveaxis(run.v, 0, 2)) >= 1.0).any(axis=0)
+    over = saved | (run.status != 0)
+    if not over.any():
+        return None
+    index = tuple(np.argwhere(over)[0].tolist())
+    found = run.overshoots(index, _encounters.MAX_RERUN)
+    if found is None:
+        return None
+    step, strength = found
+    return (
+        f"gain: h·C·K = {strength:.3g} at step {step} (t = {run.t0 + step * run.dt:g}) of {in_words(index)}, expected below 1: "
+        f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
+    )
 
 
 def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple[int, ...] | None) -> str | None:
-    """Two bodies that passed each other within a step, if there is reason to look for them and it takes a moment.
+    """Two bodies that met within a step, if there is reason to look for them and it takes a moment.
 
     Args:
         run: which.
@@ -67,7 +100,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
         start: where it began; None if it went on.
         doubtful: a member whose energy is doubtful, or None.
     """
-    if not _is_heard():
+    if not _is_heard(AccuracyWarning):
         return None
     suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
     left = float(_encounters.MAX_RERUN)
@@ -75,27 +108,30 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
         assert run.encounter is not None
         if left <= 0.0:
             break
+        if run.status[index]:
+            continue  # it diverged, which was told with the pair
         if (met := run.encounter(index, left)) is not None:
             i, j = met.bodies
             return (
-                f"bodies {i} and {j} of {in_words(index)} passed each other within step {met.step} "
+                f"bodies {i} and {j} of {in_words(index)} met within step {met.step} "
                 f"(t = {run.t0 + met.step * run.dt:g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
             )
         left -= run.steps * float(np.prod(bodies.y_shape))
     return None
 
 
-def _is_heard() -> bool:
-    """Whether an AccuracyWarning is not ignored altogether: nothing need be looked for then."""
+def _is_heard(kind: type[Warning]) -> bool:
+    """Whether such a warning is not ignored altogether: nothing need be looked for then."""
     for action, message, category, module, _ in warnings.filters:
-        if message is None and module is None and issubclass(AccuracyWarning, category):
+        if message is None and module is None and issubclass(kind, category):
             return action != "ignore"
     return True
 
 
 def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
-    """Members of whom two bodies would pass each other within a step if they went on alone, from the start or from a saved state,
-    or did before the end.
+    """Members of whom two bodies would meet within a step.
+
+    If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
     """
     n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
     h, time = run.dt, run.steps * run.dt

@@ -1,8 +1,8 @@
-"""Bodies that pass each other within one step, which no method can follow: whether a run may have such, and where it has.
+"""Bodies that meet within one step, which no method can follow: whether a run may have such, and where it has.
 
-In such a step the line from one body to the other turns by more than a right angle. Looking for it takes the run again with all
-of its states. So it is done on request (``Run.encounters``), and by itself only where two bodies alone, begun as some saved state
-has them, would pass each other so.
+In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more than
+twice the distance at which they begin or end. Looking for it takes the run again with all of its states. So it is done on
+request (``Run.encounters``), and by itself only where two bodies alone, begun as some saved state has them, would meet so.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NUMBERS_AT_ONCE = 1 << 18
 
 
 class Encounter(NamedTuple):
-    """Two bodies that passed each other within one step.
+    """Two bodies that met within one step.
 
     Attributes:
         member: index of the member in the batch.
@@ -45,8 +45,8 @@ class Encounter(NamedTuple):
     distance: float
 
 
-def passed(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], float] | None:
-    """The first step in which two bodies of one member passed each other.
+def met_in(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], float] | None:
+    """The first step in which two bodies of one member met.
 
     Softened bodies pass each other above one another, at the distance ε.
 
@@ -66,14 +66,21 @@ def passed(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
         before, after = d[:-1], d[1:]
         moved = after - before
         way2 = (moved * moved).sum(axis=-1)
-        turned = (before * after).sum(axis=-1) + bodies.softening**2 < 0.0
+        soft2 = bodies.softening**2
+        turned = (before * after).sum(axis=-1) + soft2 < 0.0
+        distances2 = (d * d).sum(axis=-1) + soft2
+        turned |= way2 > 4.0 * np.minimum(distances2[:-1], distances2[1:])
         if not turned.any():
             return None
-        nearest = before - moved * ((before * moved).sum(axis=-1) / way2)[..., np.newaxis]
+        share = np.clip(-(before * moved).sum(axis=-1) / way2, 0.0, 1.0)
+        nearest = before + moved * share[..., np.newaxis]
         q2 = (nearest * nearest).sum(axis=-1)
-        speed2 = way2 / (h * h)
+        # A step too near may fling them apart: the speed is that with which they came, in the step before.
+        came2 = way2.copy()
+        came2[1:] = np.where(way2[:-1] > 0.0, np.minimum(way2[1:], way2[:-1]), way2[1:])
+        speed2 = came2 / (h * h)
         # The tangent of half the angle by which the pair should turn there.
-        should = attraction / speed2 / (np.sqrt(q2 + bodies.softening**2) if bodies.force == "newton" else 1.0)
+        should = attraction / speed2 / (np.sqrt(q2 + soft2) if bodies.force == "newton" else 1.0)
         met = np.argwhere(turned & (should > WEAK / 2.0))
     if not len(met):
         return None
@@ -81,8 +88,8 @@ def passed(bodies: NBody, y: Array, h: float) -> tuple[int, tuple[int, int], flo
     return step + 1, (int(first[pair]), int(second[pair])), float(math.sqrt(q2[step, pair]))
 
 
-def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, steps: int) -> Iterator[tuple[int, Array]]:
-    """All states of a run of one member again, some at once: the number of steps before, and coordinates."""
+def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, steps: int) -> Iterator[tuple[int, Array, Array]]:
+    """All states of a run of one member again, some at once: the number of steps before, velocities and coordinates."""
     length = max(16, NUMBERS_AT_ONCE // (y.size * len(y)))
     done = 0
     while done < steps:
@@ -91,7 +98,7 @@ def pieces(plan: engine.Plan, bodies: NBody, v: Array, y: Array, carried: bool, 
             system=bodies, batch=(), first=plan.first + done, steps=number, every=1, form="direct", progress=None, record=()
         )
         out = engine.advance(again, v, y, carried=carried)
-        yield done, out.y
+        yield done, out.v, out.y
         # What the method carries is in the slot; where it carries v, that is the last v.
         v, y, carried, done = out.slot, out.y[-1], True, done + number
 
@@ -103,11 +110,33 @@ def of_member(
     assert isinstance(plan.system, NBody)
     bodies = plan.system.member(index, plan.batch)
     v, y = _checks.member(v, index), _checks.member(y, index)
-    for done, states in pieces(plan, bodies, v, y, carried, steps):
-        if (met := passed(bodies, states, plan.dt)) is not None:
+    begin = y
+    for done, _, states in pieces(plan, bodies, v, y, carried, steps):
+        # Each step is looked at with the one before it.
+        if (met := met_in(bodies, np.concatenate([begin[np.newaxis], states]), plan.dt)) is not None:
             step, pair, distance = met
-            return Encounter(index, plan.first + done + step, pair, distance)
+            return Encounter(index, plan.first + done + step - 1, pair, distance)
+        begin = states[-2]
         if (done + len(states)) * y.size > bound:
+            break
+    return None
+
+
+def overshoots(
+    plan: engine.Plan, v: Array, y: Array, carried: bool, steps: int, index: tuple[int, ...], bound: float = math.inf
+) -> tuple[int, float] | None:
+    """The first step before which h·C·K of a member under a control was 1 or more, and that number; None if that is not found."""
+    assert isinstance(plan.system, NBody)
+    bodies = plan.system.member(index, plan.batch)
+    assert bodies.control is not None
+    gain = float(getattr(bodies.control, "gain", 0.0))
+    v, y = _checks.member(v, index), _checks.member(y, index)
+    for done, velocities, _ in pieces(plan, bodies, v, y, carried, steps):
+        with np.errstate(all="ignore"):
+            strength = plan.dt * gain * bodies.kinetic(np.moveaxis(velocities, 0, -1))
+        if (wrong := np.flatnonzero(strength >= 1.0)).size:
+            return plan.first + done + int(wrong[0]), float(strength[wrong[0]])
+        if (done + len(velocities)) * y.size > bound:
             break
     return None
 

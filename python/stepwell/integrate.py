@@ -135,7 +135,7 @@ def integrate(
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
-            sine; bodies that nothing controls ended with an energy of another size; bodies passed each other within one step,
+            sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
             (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` looks at every step.
     """
@@ -254,6 +254,7 @@ def integrate(
         fused=fused,
         collision=partial(_collision, plan, v, y, carry is not None) if collides else None,
         encounter=partial(_encounters.of_member, plan, v, y, carry is not None, steps) if collides else None,
+        overshoots=partial(_encounters.overshoots, plan, v, y, carry is not None, steps) if collides else None,
         recorded=out.recorded,
         work=out.work,
     )

@@ -129,6 +129,7 @@ class Run(Value):
         start: str | None,
         collision: Callable[[tuple[int, ...], int], Collision] | None = None,
         encounter: Callable[..., Encounter | None] | None = None,
+        overshoots: Callable[..., tuple[int, float] | None] | None = None,
         recorded: dict[str, Array] | None = None,
         work: Array | None = None,
         paces: Paces | None = None,
@@ -150,8 +151,10 @@ class Run(Value):
         self.start = start
         #: Finds the two nearest bodies when the member of that index diverged at that step; see ``collisions``.
         self.collision = collision
-        #: Finds the first step in which two bodies of the member of that index passed each other; see ``encounters``.
+        #: Finds the first step in which two bodies of the member of that index met; see ``encounters``.
         self.encounter = encounter
+        #: Finds the first step before which h·C·K of the member of that index was 1 or more, under a control in the printed form.
+        self.overshoots = overshoots
         self.recorded = recorded or {}
         self.work = work
         self.paces = paces
@@ -160,8 +163,8 @@ class Run(Value):
         self.fused = fused
 
     def _held(self) -> dict[str, Any]:
-        """All attributes but the functions that find collisions and encounters, which follow from the others."""
-        return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter")}
+        """All attributes but the functions that look at the steps again, which follow from the others."""
+        return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter", "overshoots")}
 
     def quantity(self, name: str) -> Array:
         """A quantity that can be recorded, computed now for every saved state, shape (saved, *shape of it, *batch).
@@ -210,11 +213,12 @@ class Run(Value):
 
     @property
     def encounters(self) -> tuple[Encounter, ...]:
-        """For bodies that attract each other: the first step in which two of them passed each other, for each such member.
+        """For bodies that attract each other: the first step in which two of them met, for each such member.
 
-        The line from one body to the other turns by more than a right angle in such a step, so the step did not follow the
-        motion, whatever the energy says. Encounters that turn the bodies themselves by less than 0.01 rad are left out. They are
-        found by repeating the run with all of its states, which takes some times as long as it took before.
+        In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more
+        than twice the distance at which they begin or end. So it did not follow the motion, whatever the energy says.
+        Encounters that turn the bodies themselves by less than 0.01 rad are left out. They are found by repeating the run with
+        all of its states, which takes some times as long as it took before.
 
         Raises:
             UnsupportedError: if the system has no bodies, or the run has a tolerance, which chooses steps that follow encounters.
