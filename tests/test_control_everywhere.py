@@ -80,8 +80,8 @@ def test_a_projection_keeps_the_energy_of_every_saved_state(way: str, method: st
 def test_the_energy_decays_as_it_should_with_a_tolerance(form: str, method: str) -> None:
     """dE/dt = −2CK·ΔE on a circle with K to 1e-3: over a time with 2CKt = 1 to 1/e.
 
-    The limited form takes the step of the attempt: its rate is 1/(1 + 2hCK) of that, and 2CK = 1. With the step 1 to which systems
-    are scaled for adaptive steps it would be half of it, e^−½.
+    The limited form takes the step of the attempt: its rate is 1/(1 + 2hCK) of that, and 2CK = 1. With the step 1 to which
+    systems are scaled for adaptive steps it would be half of it, e^−½.
     """
     v = np.array([[0.0, -0.5], [0.0, 0.5]]) * math.sqrt(1.001)
     y = np.array([[-0.5, 0.0], [0.5, 0.0]])
@@ -121,7 +121,7 @@ def test_a_relative_gain_needs_a_step() -> None:
 
 
 def test_a_constraint_of_its_own_is_kept_by_the_same_projection() -> None:
-    """The reference of a system that projects onto its own constraint: an accepted state is on it, and a rejected one is not taken."""
+    """The reference of a system that projects onto its own constraint: accepted states are on it, rejected ones are not taken."""
 
     class Wheel:
         def dv(self, t: Any, v: Any, y: Any) -> Any:
