@@ -137,7 +137,7 @@ def integrate(
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
             sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` looks at every step.
+            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)

@@ -163,7 +163,7 @@ class Run(Value):
         self.fused = fused
 
     def _held(self) -> dict[str, Any]:
-        """All attributes but the functions that look at the steps again, which follow from the others."""
+        """All attributes but the functions that go through the steps again, which follow from the others."""
         return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter", "overshoots")}
 
     def quantity(self, name: str) -> Array:
