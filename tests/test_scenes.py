@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import math
+import re
 import warnings
 from pathlib import Path
 
@@ -398,19 +399,31 @@ def test_the_bodies_of_appendix_d_start_as_it_says():
     assert printed.v[2, 0] == 0.5
 
 
+@pytest.mark.filterwarnings("ignore::stepwell.AccuracyWarning", "ignore::stepwell.ControlWarning")  # told of below
 @pytest.mark.parametrize("form", ["limited", "printed"])
 @pytest.mark.parametrize("pair", ["matching", "printed"])
 def test_energy_control_keeps_the_bodies_together(pair, form):
     """FACTS §3: under about 3.5 with the control, over 20 and growing without, 100 000 steps."""
     scene = sw.scenes.energy_control(pair, form=form)
     assert np.abs(scene.run("standard_euler", every=1).y).max() < 3.6
-    with warnings.catch_warnings():
-        if pair == "matching":  # the printed pair has no energy that is constant
-            warnings.filterwarnings("ignore", "1 of 1 .* have another energy", sw.AccuracyWarning)
-        free = np.abs(scene.run("standard_euler", every=1, control=None).y)
+    free = np.abs(scene.run("standard_euler", every=1, control=None).y)
     assert free[:10_000].max() < 20 < free.max() < 100
 
 
+@pytest.mark.parametrize("form", ["limited", "printed"])
+def test_the_documents_own_start_meets_in_a_step(form):
+    """Of every run is told what its steps did not follow; in the printed form also that h·C·K passed 1, long after the start."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sw.scenes.energy_control(form=form).run("standard_euler", every=1)
+    told = {each.category: str(each.message) for each in caught}
+    assert set(told) == {sw.AccuracyWarning} | ({sw.ControlWarning} if form == "printed" else set())
+    assert told[sw.AccuracyWarning].startswith("bodies 1 and 2 of the only member met within step 349 (t = 3.49)")
+    if form == "printed":
+        assert re.match(r"gain: h·C·K = [\d.]+ at step \d+ \(t = [\d.]+\) of the only member", told[sw.ControlWarning])
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.ControlWarning")
 def test_three_bodies_that_meet_at_the_centre_are_reported():
     """ε = 0: what the user sees is the step, and the states up to it."""
     scene = sw.scenes.energy_control(eps=0.0, form="printed")
