@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use stepwell_core::{
+    controls,
     error::Error,
     isa::Level,
     large::{
