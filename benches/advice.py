@@ -70,7 +70,10 @@ class Brute:
     ) -> None:
         self.prices: dict[str, float] = {}
         for method in sw.methods():
-            self.prices |= dict.fromkeys((method.name, f"{method.name}, tolerance"), float(method.evaluations))
+            self.prices |= {
+                method.name: float(method.evaluations),
+                f"{method.name}, tolerance": float(method.attempt_evaluations),
+            }
         self.prices |= prices or {}
         horizon = scene.horizon
         self.frames = None if frame is None else math.ceil(horizon / frame - 1e-9)
@@ -157,7 +160,9 @@ class Brute:
         """The run itself, as wrong as it is at the times at which it is asked."""
         run = self._integrated(method, tolerance, self.asked())
         assert run.paces is not None
-        tried = int(run.paces.evaluations) // sw.method(method).evaluations - 2 * (len(self.asked()) - 1) * (self.frame is None)
+        tried = int(run.paces.evaluations) // sw.method(method).attempt_evaluations - 2 * (len(self.asked()) - 1) * (
+            self.frame is None
+        )
         error = math.inf if run.status else float(self.scene.state_error(run).max())
         return Try(method, tried, tolerance, tried * self.prices[f"{method}, tolerance"], error)
 

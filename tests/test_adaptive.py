@@ -83,7 +83,7 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
     assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
     # For each asked time the step that passes it is made twice, and an extra one.
     tried = whole.paces.accepted + whole.paces.rejected + 2 * 2
-    assert np.array_equal(whole.paces.evaluations, sw.method(method).evaluations * tried)
+    assert np.array_equal(whole.paces.evaluations, sw.method(method).attempt_evaluations * tried)
 
 
 @pytest.mark.parametrize("method", ABLE)
@@ -188,7 +188,8 @@ def test_what_stopped_goes_on_with_more_steps() -> None:
         ({"at": [0.5]}, "at: expected times that ascend from the last time of the run that goes on, 1, on"),
         ({"method": "dop853"}, "carry: expected that of a run by merson"),
         ({"v": np.zeros(2)}, "carry: expected that of a run of batch"),
-        ({"carry": 3.0}, "carry: with a tolerance expected that of run.resume, got float"),
+        ({"carry": 3.0}, "carry: with a tolerance expected that of run.resume, 20 numbers for each member"),
+        ({"carried_by": None}, "carried_by: expected the method by which the run goes on"),
         ({"at": None, "dt": 0.1, "steps": 3}, "carry: it is that of a run with a tolerance"),
     ],
 )

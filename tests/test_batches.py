@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from typing import Any
 
@@ -11,6 +10,7 @@ import pytest
 import stepwell as sw
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepwell import _encounters
 
 FREE = sw.Oscillator(1.0)
 
@@ -270,7 +270,7 @@ def test_collisions_say_who_met_whom_and_when() -> None:
 
 
 def test_a_warning_does_not_run_a_long_run_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["stepwell.integrate"], "MAX_RERUN", 0)  # the name alone is the function
+    monkeypatch.setattr(_encounters, "MAX_RERUN", 0)
     equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     with pytest.warns(sw.DivergenceWarning) as caught:
         run = sw.integrate(sw.NBody(), "rk4", v=0.0, y=equal, dt=0.01, steps=3)

@@ -75,6 +75,28 @@ def test_a_real_peer_solves_the_scene(package, make, scene):
     assert fine.cost >= coarse.cost > 0
 
 
+# ---- a right energy does not make a motion right
+
+
+@pytest.mark.parametrize("of", ["chart", "panel"])
+def test_the_energy_error_is_never_alone(of, tmp_path):
+    """Beside the curves of the energy error are those of the state error, in a picture of one scene and in a panel."""
+    panel = sw.charts.panel(["clover", "oscillator"], methods=["false_euler", "rk4"], steps=[100, 400, 1600], tolerances=[])
+    shown = panel if of == "panel" else panel.charts[0]
+    figure = shown.plot(tmp_path / "energy.png", error="energy_error")
+    for chart in panel.charts[: len(panel.charts) if of == "panel" else 1]:
+        for kind in ("energy_error", "state_error"):
+            for curve in chart.curves:
+                wanted = [point.error(kind) if point.usable else math.nan for point in curve.points]
+                drawn = [line for axes in figure.axes for line in axes.lines if list(line.get_xdata()) == curve.costs()]
+                assert any(np.array_equal(line.get_ydata(), wanted, equal_nan=True) for line in drawn), (kind, curve.name)
+    labels = " ".join([*(text.get_text() for text in figure.texts), *(axes.get_ylabel() for axes in figure.axes)]).replace(
+        "\n", " "
+    )
+    assert "largest energy error of the run, relative" in labels
+    assert "largest state error of the run, relative" in labels
+
+
 # ---- the panel
 
 

@@ -135,7 +135,7 @@ def test_run_takes_fused_multiply_adds(capsys):
 
 def test_run_takes_a_control(capsys):
     def last(*words):
-        code, out, err = told(capsys, "run", "energy_control", "--method", "standard_euler", "--steps", "500", "--json", *words)
+        code, out, err = told(capsys, "run", "energy_control", "--method", "standard_euler", "--steps", "300", "--json", *words)
         assert (code, err) == (0, "")
         return json.loads(out)["last_y"]
 
@@ -147,7 +147,7 @@ def test_run_takes_a_control(capsys):
         (("--control", "0.5:printed"), sw.EnergyControl(0.5, "printed")),
         (("--control", "scaling"), sw.Projection("scaling")),
     ):
-        assert last(*words) == scene.run("standard_euler", steps=500, control=control).y[-1].tolist()
+        assert last(*words) == scene.run("standard_euler", steps=300, control=control).y[-1].tolist()
 
 
 def test_a_control_that_overshoots_is_warned_of(capsys):
@@ -396,15 +396,53 @@ def test_figures_writes_a_picture_for_each_method(capsys, tmp_path):
     code, out, err = told(capsys, "figures", "-o", str(tmp_path / "all"))
     assert (code, err) == (0, "")
     written = sorted(path.name for path in (tmp_path / "all").iterdir())
-    assert written == sorted(["overview.png", *(samples.file for samples in sw.charts.figures().samples)])
+    assert written == sorted(
+        ["overview.png", *(each.file for each in sw.charts.figures().samples), "04-harmonic.png", "figures.csv", "figures.json"]
+    )
     assert "07-false_euler.png" in written
     for name in written:
         assert name in out.replace("\n", " ") or len(str(tmp_path)) > 40  # a long path is broken within a cell
     code, out, err = told(capsys, "figures", "false_heun", "-o", str(tmp_path), "--phi", "1", "--periods", "2", "--json")
     report = json.loads(out)
     assert (code, err, report["phi"]) == (0, "", 1.0)
-    assert report["files"] == [str(tmp_path / name) for name in ("overview.png", "10-false_heun.png")]
+    assert report["files"] == [
+        str(tmp_path / name) for name in ("overview.png", "10-false_heun.png", "figures.csv", "figures.json")
+    ]
     assert report["summary"][0]["r1_squared"] == pytest.approx(0.5)
+
+
+# ---- scenes with arguments
+
+
+def test_the_documents_pair_is_reached(capsys, tmp_path):
+    """Appendix D as it is printed: force, potential, form of the control, method and steps."""
+    words = ("--method", "standard_euler", "--control", "0.3:printed", "--steps", "1000", "--json")
+    code, out, err = told(capsys, "run", "energy_control:pair=printed", *words)
+    assert code == 0
+    assert "bodies 0 and 1 of the only member met within step 370" in err
+    printed = json.loads(out)
+    scene = sw.scenes.energy_control("printed", form="printed")
+    with pytest.warns(sw.AccuracyWarning, match="met within step 370"):
+        run = scene.run("standard_euler", steps=1000)
+    assert printed["last_y"] == run.y[-1].tolist()
+    assert printed["last_energy"] == run.energy[-1]
+    assert json.loads(told(capsys, "run", "energy_control", *words)[1])["last_energy"] != printed["last_energy"]
+
+
+def test_arguments_of_a_scene_are_numbers_or_words(capsys):
+    assert sw.scenes.scene("energy_control:pair=printed, eps=0").system == sw.scenes.energy_control("printed", 0.0).system
+    assert sw.scenes.scene("kepler:e=0.5").v.tolist() == sw.scenes.kepler(0.5).v.tolist()
+    assert len(sw.scenes.scene("plummer:n=8,seed=3").y) == 8
+    for name, message in (
+        ("energy_control:par=printed", "scene energy_control: there is no 'par'; did you mean 'pair'?"),
+        ("energy_control:pair", "scene: expected arguments as energy_control:NAME=VALUE,NAME=VALUE, got 'pair'"),
+        ("energy_control:pair=3", "pair: there is no 3"),
+        ("kepler:e=much", "e: expected real numbers"),
+        ("clovr:x=1", "did you mean 'clover'?"),
+    ):
+        code, _, err = told(capsys, "run", name, "--method", "rk4")
+        assert code == 2
+        assert message in err
 
 
 # ---- what goes wrong
@@ -427,7 +465,7 @@ def test_figures_writes_a_picture_for_each_method(capsys, tmp_path):
         (["run", "clover", "--method", "rk4", "--control", "x"], "--control: expected a gain and a form, such as 0.3:printed"),
         (["run", "clover", "--method", "rk4", "--control", "1:prnted"], "form: there is no 'prnted'; did you mean 'printed'?"),
         (["run", "clover", "--method", "rk4", "--control=-1"], "gain: expected numbers of zero or more"),
-        (["run", "clover", "--method", "verlet", "--control", "1"], "use false_euler, or leave energy control out"),
+        (["run", "clover", "--method", "verlet", "--control", "1"], "control: verlet goes on with y_prev in place of v"),
         (["run", "clover", "--method", "rk4", "-o", "run.gif", "--fps", "0"], "fps: expected numbers above zero"),
         (["chart", "oscillator", "clovr"], "did you mean 'clover'?"),
         (["chart", "oscillator", "--methods", "rk4,"], "method: there is no ''"),

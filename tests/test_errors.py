@@ -123,7 +123,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(sw.NBody(), "leapfrog", y=np.eye(3, 2), control=sw.Projection()),
         E.UnsupportedError,
-        "leapfrog needs forces that do not depend on the velocity",
+        "control: leapfrog goes on with v_half in place of v, so it cannot be combined with Projection",
     ),
     # numbers
     (lambda: run(dt=0.0), E.ArgumentError, "dt: expected numbers above zero in units of time, got 0"),

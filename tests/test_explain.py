@@ -377,7 +377,7 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
         if fused:
             following, v1, y1 = engine._fused_attempt(plan, 9)(pace, 9, v, y)
         else:
-            s, steps = system.scaled(1.0, system.batch), method.steps
+            s, steps = adaptive.Attempted(system.scaled(1.0, system.batch)), method.steps
             axes = len(system.v_shape), len(system.y_shape)
             with np.errstate(all="ignore"):
                 following, v1, y1 = adaptive.attempt(steps, s, method.error_order, axes, pace, 9.0, v, y)  # type: ignore[arg-type]
@@ -586,6 +586,17 @@ def test_json(tmp_path: Path) -> None:
     }
 
 
+def test_an_attempt_under_control_is_explained() -> None:
+    """The push is in the listing, with the step of the attempt, and the energy that it adds."""
+    free, held = (
+        sw.explain(sw.NBody([1.0, 1.0], force="newton"), "merson", attempt=True, control=control)
+        for control in (None, sw.EnergyControl(0.1))
+    )
+    assert "control.gain" in str(held.listing)
+    assert re.search(r"work' += work \+|work' += a\d+", str(held.listing))
+    assert sum(held.computed.values()) > sum(free.computed.values())
+
+
 def test_what_cannot_be_explained_says_so() -> None:
     with pytest.raises(sw.errors.ShapeError, match="batch shapes do not broadcast"):
         sw.explain(sw.NBody(), "rk4", members=3, control=sw.EnergyControl([0.1, 0.2]))
@@ -593,8 +604,8 @@ def test_what_cannot_be_explained_says_so() -> None:
         sw.explain(sw.Oscillator([1.0, 2.0]), "rk4", members=3)
     with pytest.raises(sw.errors.UnsupportedError, match="attempt: rk4 does not estimate its error"):
         sw.explain(sw.Oscillator(), "rk4", attempt=True)
-    with pytest.raises(sw.errors.ArgumentError, match="control: goes with fixed steps only"):
-        sw.explain(sw.NBody(), "merson", attempt=True, control=sw.EnergyControl(0.1))
+    with pytest.raises(sw.errors.UnsupportedError, match="give gain in place of relative"):
+        sw.explain(sw.NBody(), "merson", attempt=True, control=sw.EnergyControl(relative=0.1))
     with pytest.raises(sw.errors.UnsupportedError, match=r"control: .* has no energy control"):
         sw.explain(sw.Oscillator(), "rk4", control=sw.EnergyControl(0.1))
     with pytest.raises(sw.errors.UnsupportedError, match="verlet needs forces"):

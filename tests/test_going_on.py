@@ -13,7 +13,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
 
-METHODS = ("verlet", "leapfrog", "false_euler")
+METHODS = [m.name for m in sw.methods()]
 
 
 def chain() -> sw.Chain:
@@ -44,8 +44,9 @@ def test_what_one_method_carries_is_not_for_another(method: str, other: str) -> 
     half = piece(method, 10)
     with pytest.raises(ArgumentError, match=f"method: expected '{method}', by which the run goes on"):
         piece(other, 10, **half.resume)
-    with pytest.raises(ArgumentError, match="carried_by: goes with fixed steps only"):
-        sw.integrate(chain(), "merson", v=0.0, y=0.0, tolerance=1e-3, at=[1.0], carried_by=method)
+    going_on = sw.integrate(chain(), "merson", v=0.0, y=0.0, tolerance=1e-3, at=[1.0]).resume
+    with pytest.raises(ArgumentError, match=f"carry: expected that of a run by merson, got one by {method}"):
+        sw.integrate(chain(), "merson", at=[2.0], **(going_on | {"carried_by": method}))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -54,9 +55,7 @@ def test_the_step_need_not_be_given_again(method: str, way: str) -> None:
     whole, half = piece(method, 800, start="first_order" if method == "verlet" else None), None
     state: Any = piece(method, 400, start="first_order" if method == "verlet" else None).resume
     if way == "file of arrays":
-        np.savez(file := io.BytesIO(), **state)
-        file.seek(0)
-        state = np.load(file)
+        state = filed(state)
     elif way == "pickle":
         state = pickle.loads(pickle.dumps(state))
     half = piece(method, 400, **state)
@@ -64,6 +63,40 @@ def test_the_step_need_not_be_given_again(method: str, way: str) -> None:
         np.testing.assert_array_equal(getattr(half, name), getattr(whole, name))
     again = piece(method, 400, dt=0.1, **state)
     np.testing.assert_array_equal(again.y, whole.y)
+
+
+def filed(state: dict[str, Any], *, pickles: bool = False) -> Any:
+    """Written to a file of arrays, and read."""
+    np.savez(file := io.BytesIO(), **state)
+    file.seek(0)
+    return np.load(file, allow_pickle=pickles)
+
+
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+@pytest.mark.parametrize("members", [(), (3,)])
+@pytest.mark.parametrize("fused", [False, True])
+def test_adaptive_steps_go_on_from_a_file_of_arrays(method: str, members: tuple[int, ...], fused: bool) -> None:
+    """The state of the step-size controller was an object, which such a file does not hold."""
+    start: dict[str, Any] = {"v": np.full(members, 0.1), "y": 1.0, "tolerance": 1e-5, "fused": fused}
+    whole = sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0, 3.0], **start)
+    first = sw.integrate(sw.Pendulum(), method, at=[1.0, 2.0], **start)
+    rest = sw.integrate(sw.Pendulum(), method, at=[3.0], **filed(first.resume))
+    assert rest.paces is not None
+    assert whole.paces is not None
+    np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
+    np.testing.assert_array_equal(rest.v[-1], whole.v[-1])
+    np.testing.assert_array_equal(rest.paces.accepted, whole.paces.accepted)
+    with pytest.raises(ArgumentError, match="at: expected times that ascend from the last time of the run that goes on, 2, on"):
+        sw.integrate(sw.Pendulum(), method, at=[1.5], **filed(first.resume))
+
+
+@pytest.mark.parametrize("control", [sw.EnergyControl(relative=0.1), sw.Projection("scaling")])
+def test_a_control_goes_on_from_a_file_of_arrays(control: Any) -> None:
+    scene = sw.scenes.figure_eight()
+    whole = scene.run("rk4", steps=40, control=control)
+    first = scene.run("rk4", steps=20, control=control)
+    rest = sw.integrate(scene.system, "rk4", steps=20, **filed(first.resume, pickles=True))
+    np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
 
 
 def test_a_bad_step_beyond_the_run() -> None:

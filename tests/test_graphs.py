@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import own_systems
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS
@@ -58,6 +59,29 @@ def test_a_step_under_control(name: str, control: str) -> None:
     for method in methods(system):
         tape = _core.Tape()
         assert_one_graph(tape, tape.trace(model(system, method), "step"), Tracer(system, tape).step(method))
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if "bod" in name and "restricted" not in name])
+def test_an_attempt_and_a_step_of_pefrl_under_control(name: str, control: str) -> None:
+    """A push needs the step of the attempt, a projection does not; by PEFRL the push comes after the step."""
+    system, v, y = made(name)
+    with np.errstate(all="ignore"):
+        system = system.controlled(CONTROLS[control], v, y, 1e-3)
+    for method in ABLE[:1] if int(np.prod(system.v_shape)) > MANY else ABLE:
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
+    pefrl = sw.method("pefrl")
+    tape, system = _core.Tape(), system.stepped_by(pefrl)
+    assert_one_graph(tape, tape.trace(model(system, pefrl), "step"), Tracer(system, tape).step(pefrl))
+
+
+@pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
+def test_an_attempt_under_a_control_of_an_invariant(control: Any) -> None:
+    system = own_systems.pendulum().sized().under(control, ())
+    for method in ABLE:
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

@@ -190,14 +190,21 @@ def test_a_parameter_that_changes_makes_no_invariant() -> None:
         sw.integrate(own.pendulum(omega=lambda t: 1.0 + 0.1 * np.sin(t)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="energy")
 
 
-def test_adaptive_steps_refuse_a_system_under_control() -> None:
-    """They used to step bodies as if there were no control, though the run said that there was one."""
+def test_adaptive_steps_of_a_system_under_control() -> None:
+    """A system that a run has put under control keeps it: they used to step bodies as if there were none."""
     y = np.array([[0.0, 1.0], [1.0, 0.0], [2.0, 2.0]])
     bodies = sw.integrate(sw.NBody(), "rk4", v=0.0, y=y, dt=0.01, steps=1, control=sw.EnergyControl(0.1)).system
+    pairs: list[tuple[sw.System, sw.System, Any, Any]] = [(bodies, sw.NBody(), y, bodies.keeper)]
     for control in (sw.Control("energy", 1.0), sw.Projection("energy")):
         mine = sw.integrate(own.pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=control).system
-        with pytest.raises(UnsupportedError, match=r"tolerance: goes with systems that nothing controls, got pendulum"):
-            sw.integrate(mine, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
-        sw.integrate(mine.uncontrolled, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
-    with pytest.raises(UnsupportedError, match=r"tolerance: .* EnergyControl"):
-        sw.integrate(bodies, "dop853", v=0.0, y=y, tolerance=1e-6, at=[0.1])
+        pairs.append((mine, own.pendulum(), 1.0, mine.keeper))
+    for held, free, start, control in pairs:
+        ask: dict[str, Any] = {"v": 0.0, "y": start, "tolerance": 1e-3, "at": [0.5]}
+        run, anew, alone = (
+            sw.integrate(held, "dop853", **ask),
+            sw.integrate(free, "dop853", **ask, control=control),
+            sw.integrate(free, "dop853", **ask),
+        )
+        np.testing.assert_array_equal(run.y, anew.y)
+        assert run.system.keeper is not None
+        assert not np.array_equal(run.y, alone.y)

@@ -65,6 +65,20 @@ def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
     assert (counting.v, counting.y) == (method.evaluations, method.evaluations + (method.name == "pefrl"))
 
 
+@pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
+def test_a_stage_of_weight_zero_is_not_evaluated(method: sw.Method) -> None:
+    """Of Fehlberg's six stages one counts only in the estimate, so a step of fixed length makes five, an attempt all six."""
+    extra = method.name == "fehlberg"
+    assert method.attempt_evaluations == (0 if method.error_order is None else method.evaluations + extra)
+    if extra:
+        assert (method.evaluations, 0.5 in method.nodes) == (5, False)
+    if method.error_order is not None:
+        run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+        assert run.paces is not None
+        made = int(run.paces.accepted + run.paces.rejected) + 2  # and twice for the output time
+        assert run.paces.evaluations == method.attempt_evaluations * made
+
+
 def test_methods_are_in_the_documents_order() -> None:
     sections = [int(m.section.strip("§")) if m.section.startswith("§") else 99 for m in sw.methods()]
     assert sections == sorted(sections)

@@ -148,13 +148,14 @@ def test_every_attempt(name: str) -> None:
         rejected=row(1.0, 0.0, 2.0),
         extra_steps=row(0.0, 2.0, 4.0),
         error=row(0.0, 2.0, 0.5),
+        work=row(0.0, 0.3, -0.2),
     )
     paces = [pace, pace._replace(target=row(9.0, T, 9.0), relative=row(9.0, 1.0, 9.0)), pace._replace(extra=row(0.01, 0.0, 0.02))]
     axes = len(system.v_shape), len(system.y_shape)
     for method in ABLE:
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
-        s, steps = system.scaled(1.0, system.batch), method.steps
+        s, steps = adaptive.Attempted(system.scaled(1.0, system.batch)), method.steps
         with np.errstate(all="ignore"):
             outcomes = [adaptive.attempt(steps, s, method.error_order, axes, each, 9.0, v, y) for each in paces]  # type: ignore[arg-type]
         for each, (after, v1, y1) in zip(paces, outcomes, strict=True):

@@ -369,7 +369,32 @@ def test_verlet_samples_are_a_cosine_of_its_own_frequency(figures):
     samples = next(s for s in figures.samples if s.method.name == "verlet")
     psi = math.acos(1 - 0.5**2 / 2)
     assert samples.ratio == pytest.approx(psi / 0.5)
-    assert samples.y == pytest.approx(np.cos(psi * np.arange(len(samples.y))), abs=1e-12)
+    # The document's start is y₋₁ = y₀ = 1, so the cosine is half a step late and as much larger. The other start gives cos kΨ.
+    late = np.cos(psi * (np.arange(len(samples.y)) + 0.5)) / math.cos(psi / 2)
+    assert samples.start == "first_order"
+    assert samples.y == pytest.approx(late, abs=1e-12)
+    assert np.abs(late - np.cos(psi * np.arange(len(late)))).max() > 0.2
+    assert "y₋₁ = y₀" in figures.plot(method="verlet").texts[1].get_text()
+    assert "y₋₁ = y₀" not in figures.plot(method="rk4").texts[1].get_text()
+
+
+def test_the_harmonic_cases_of_section_4(figures, tmp_path):
+    """12, 4 and 2.4 samples a period, of one amplitude: what is drawn of them are the numbers, and their cosine."""
+    assert [(case.degrees, case.samples_per_period) for case in figures.harmonic] == [(30, 12.0), (90, 4.0), (150, 2.4)]
+    for case in figures.harmonic:
+        # Two periods, some ten to thirty steps of three roundings each.
+        assert case.y == pytest.approx(np.cos(np.radians(case.degrees * np.arange(len(case.y)))), abs=1e-13)
+        assert len(case.y) == 1 + math.ceil(2 * 360 / case.degrees)
+    figure = figures.plot_harmonic(tmp_path / "harmonic.png")
+    check_page(figure, tmp_path / "harmonic.png")
+    for axes, case in zip(figure.axes, figures.harmonic, strict=True):
+        dots = next(line for line in axes.lines if line.get_marker() == "o")
+        assert np.array_equal(dots.get_ydata(), case.y)
+        assert dots.get_xdata() == pytest.approx(np.arange(len(case.y)) * case.degrees / 360)
+        assert f"{case.samples_per_period:g} samples per period" in axes.get_title(loc="left")
+    assert sw.charts.figures(["rk4"]).harmonic == ()
+    with pytest.raises(ArgumentError, match="harmonic cases of §4"):
+        sw.charts.figures(["rk4"]).plot_harmonic()
 
 
 def test_the_figures_show_what_the_document_says(figures):
@@ -396,6 +421,9 @@ def test_the_csv_of_the_figures_reads_back(figures, tmp_path):
         own = [row for row in rows if row["method"] == samples.method.name]
         for name, values in (("t", samples.t), ("v", samples.v), ("y", samples.y), ("exact", np.cos(samples.t))):
             assert [float(row[name]) for row in own] == values.tolist()
+    for case in figures.harmonic:
+        own = [row for row in rows if row["method"] == case.name]
+        assert [float(row["y"]) for row in own] == case.y.tolist()
 
 
 def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
@@ -403,10 +431,12 @@ def test_a_picture_for_each_method_and_one_of_all(figures, tmp_path):
     names = [path.name for path in paths]
     assert names[0] == "overview.png"
     assert {"05-standard_euler.png", "07-false_euler.png", "11-semi_false_heun.png"} <= set(names)
-    assert len(names) == 1 + len(METHODS)
+    assert names[1 + len(METHODS) :] == ["04-harmonic.png", "figures.csv", "figures.json"]
+    assert len(read(paths[-2])) == len(figures.rows())
+    assert len(json.loads(paths[-1].read_text(encoding="utf-8"))["rows"]) == len(figures.rows())
     assert sorted(names) == sorted(path.name for path in (tmp_path / "to" / "be").iterdir())
     check_page(figures.plot(), paths[0])
-    for path, samples in zip(paths[1:], figures.samples, strict=True):
+    for path, samples in zip(paths[1 : 1 + len(METHODS)], figures.samples, strict=True):
         figure = figures.plot(method=samples.method.name)
         check_page(figure, path)
         texts = [text.get_text() for text in figure.texts]

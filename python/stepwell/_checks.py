@@ -176,6 +176,8 @@ def flag(argument: str, value: Any) -> bool:
     """Return ``value`` if it is True or False."""
     if value is False or value is True:
         return value
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "b":
+        value = value.item()  # as read from a file of arrays
     if not isinstance(value, (bool, np.bool_)):
         raise DTypeError(f"{argument}: expected True or False, got {short(value)} ({type(value).__name__})")
     return bool(value)

@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ._checks import Array
-from .errors import AccuracyWarning
+from . import _encounters
+from ._checks import Array, Shape
+from .control import EnergyControl
+from .errors import AccuracyWarning, ControlWarning
 from .result import Run
 from .systems import NBody
 
@@ -24,6 +26,9 @@ FEW_BODIES, FEW_EVALUATIONS = 8, 100
 #: Other energies take NumPy: a run must make so many rate evaluations, and of so many pairs in all, not to notice it. States of
 #: more numbers than the last would take memory that was not counted.
 EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
+
+#: Pairs are looked at in so many saved states at most.
+STATES = 32
 
 State = tuple[Array, Array]
 
@@ -44,19 +49,115 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
         start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
     """
     told = [run.system.doubt(run.y)]
-    if (
-        isinstance(run.system, NBody)
-        and run.system.keeps_energy
-        and run.force is None
-        and (ends := _ends(run, run.system, start)) is not None
-    ):
-        told.append(_of_energy(run.method.name, ends))
+    if isinstance(run.system, NBody) and run.force is None:
+        ends = _ends(run, run.system, start) if run.system.keeps_energy else None
+        energy = None if ends is None else _of_energy(run.method.name, ends)
+        met = None if run.encounter is None else _of_encounters(run, run.system, start, None if energy is None else energy[1])
+        told.append("; ".join(text for text in (None if energy is None else energy[0], met) if text is not None) or None)
     for text in told:
         if text is not None:
             warnings.warn(text, AccuracyWarning, stacklevel=3)
+    if (text := _of_a_control(run, start)) is not None:
+        warnings.warn(text, ControlWarning, stacklevel=3)
 
 
-def _of_energy(method: str, ends: Ends) -> str | None:
+def _of_a_control(run: Run, start: State | None) -> str | None:
+    """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
+
+    It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
+    """
+    control, bodies = run.system.control, run.system
+    if not (isinstance(control, EnergyControl) and control.form == "printed" and isinstance(bodies, NBody)):
+        return None
+    if run.paces is not None or start is None or run.overshoots is None or not _is_heard(ControlWarning):
+        return None
+    with np.errstate(all="ignore"):
+        gain = run.dt * np.asarray(control.gain)
+        began = gain * bodies.kinetic(np.broadcast_to(start[0], run.y.shape[1:]))
+        if (began >= 1.0).any():
+            return None
+        saved = (gain * bodies.kinetic(np.moveaxis(run.v, 0, 2)) >= 1.0).any(axis=0)
+    over = saved | (run.status != 0)
+    if not over.any():
+        return None
+    index = tuple(np.argwhere(over)[0].tolist())
+    found = run.overshoots(index, _encounters.MAX_RERUN)
+    if found is None:
+        return None
+    step, strength = found
+    return (
+        f"gain: h·C·K = {strength:.3g} at step {step} (t = {run.t0 + step * run.dt:g}) of {in_words(index)}, expected below 1: "
+        f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
+    )
+
+
+def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple[int, ...] | None) -> str | None:
+    """Two bodies that met within a step, if there is reason to look for them and it takes a moment.
+
+    Args:
+        run: which.
+        bodies: its system.
+        start: where it began; None if it went on.
+        doubtful: a member whose energy is doubtful, or None.
+    """
+    if not _is_heard(AccuracyWarning):
+        return None
+    suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
+    left = float(_encounters.MAX_RERUN)
+    for index in suspects:
+        assert run.encounter is not None
+        if left <= 0.0:
+            break
+        if run.status[index]:
+            continue  # it diverged, which was told with the pair
+        if (met := run.encounter(index, left)) is not None:
+            i, j = met.bodies
+            return (
+                f"bodies {i} and {j} of {in_words(index)} met within step {met.step} "
+                f"(t = {run.t0 + met.step * run.dt:g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
+            )
+        left -= run.steps * float(np.prod(bodies.y_shape))
+    return None
+
+
+def _is_heard(kind: type[Warning]) -> bool:
+    """Whether such a warning is not ignored altogether: nothing need be looked for then."""
+    for action, message, category, module, _ in warnings.filters:
+        if message is None and module is None and issubclass(kind, category):
+            return action != "ignore"
+    return True
+
+
+def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
+    """Members of whom two bodies would meet within a step.
+
+    If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
+    """
+    n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
+    h, time = run.dt, run.steps * run.dt
+    # As many states as are little work against the run. Time runs back from the last.
+    few = run.status.ndim == 0 and n <= FEW_BODIES
+    looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
+    between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
+    states = [start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1])]
+    if few:
+        if made < FEW_EVALUATIONS:
+            return []
+        return (
+            [()]
+            if any(_encounters.may_meet(bodies, h, time, *(_lists(block, bodies.y_shape) for block in state)) for state in states)
+            else []
+        )
+    if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or members * n * n > MOST_NUMBERS:
+        return []
+    may = np.zeros(run.status.shape, dtype=bool)
+    for v, y in (states[0], states[-1]):
+        may |= _encounters.may_meet_each(bodies, h, time, np.broadcast_to(v, y.shape), y)
+    return [tuple(index) for index in np.argwhere(may).tolist()]
+
+
+def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
+    """What is to be said, and of which member."""
     first, last, moved = ends
     with np.errstate(all="ignore"):
         wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
@@ -64,10 +165,11 @@ def _of_energy(method: str, ends: Ends) -> str | None:
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
-    return (
+    text = (
         f"{np.count_nonzero(wrong)} of {wrong.size} member(s) have another energy at the end: {in_words(index)} has "
         f"{last[index]:.3g} instead of {first[index]:.3g}, so {method} did not follow its orbit"
     )
+    return text, index
 
 
 def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
@@ -99,6 +201,12 @@ def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
     if abs(last - first) <= DOUBTFUL_CHANGE * max(moved, abs(first), abs(last)):
         return None
     return Ends(np.asarray(first), np.asarray(last), np.asarray(moved))
+
+
+def _lists(block: Array, shape: Shape) -> Any:
+    """A block of one member as lists; one number may have been given for all."""
+    found = block.tolist()
+    return found if isinstance(found, list) else [[found] * shape[1]] * shape[0]
 
 
 def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:

@@ -18,7 +18,10 @@ FORMS = ("limited", "printed")
 
 
 class EnergyControl(Fixed, Value):
-    """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity, in every stage of the method.
+    """Keeps the energy E near a target by a push −C·(E − target)·v on every velocity.
+
+    It pushes in every stage of a method; by PEFRL, in whose stages v and y belong to different times, after every step. With a
+    tolerance ``gain`` is needed: ``relative`` relates to steps of fixed length.
 
     In the document's form (Appendix D) a step multiplies velocities by 1 − h·C·ΔE. This overflows where h·C·K passes 1; K is the
     kinetic energy, which is not bounded at close encounters. The limited form integrates the decay of ΔE by backward Euler
@@ -41,6 +44,11 @@ class EnergyControl(Fixed, Value):
         self.gain = None if gain is None else _checks.not_negative("gain", gain)
         self.relative = None if relative is None else _checks.not_negative("relative", relative)
         self.target = None if target is None else _checks.numbers("target", target)
+        #: Whether it pushes between steps: ``integrate`` sets it for methods in whose stages v and y belong to different times.
+        self.between = False
+
+    #: It acts on rates, and is no projection.
+    pushes: ClassVar[bool] = True
 
     @property
     def batch(self) -> Shape:
@@ -76,12 +84,13 @@ class EnergyControl(Fixed, Value):
 
     def around(self, s: Any, h: float) -> reference.Controlled:
         """The NumPy reference of the control, wrapped around that of a system, both scaled to the step h."""
-        return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target))
+        return reference.Controlled(s, h, self.form, np.asarray(self.gain), np.asarray(self.target), between=self.between)
 
     def given(self) -> dict[str, Any]:
         """Its parameters for the core, in addition to those of the system."""
         numbers = {"control.gain": np.asarray(self.gain), "control.target": np.asarray(self.target)}
-        return {"control": "energy", "control.form": self.form} | numbers
+        words = {"control": "energy", "control.form": self.form} | ({"control.when": "between"} if self.between else {})
+        return words | numbers
 
     def member(self, one: Callable[[Array], Array]) -> EnergyControl:
         """The same for a single member."""
@@ -147,10 +156,13 @@ class ConstraintControl(Fixed, Value):
 
     Attributes:
         constraint: which constraint it keeps, as a system names it in ``System.constraint``.
+        of_a_step: whether its number is relative to a step of fixed length, so that adaptive steps refuse it.
         strength: its number, broadcasts over the batch.
     """
 
     constraint: ClassVar[str]
+    #: Whether its number is relative to a step of fixed length.
+    of_a_step: ClassVar[bool] = False
     strength: Array
 
     @property
@@ -176,6 +188,7 @@ class LengthControl(ConstraintControl):
     """
 
     constraint = "length"
+    of_a_step = True
 
     def __init__(self, c: Any) -> None:
         self.strength = _checks.not_negative("c", c)
@@ -225,6 +238,9 @@ class Projection(Fixed, Value):
         self.invariant = "energy" if self.way in WAYS else self.way
         self.target = None if target is None else _checks.numbers("target", target)
 
+    #: It acts on the state after a step, and not on rates.
+    pushes: ClassVar[bool] = False
+
     @property
     def batch(self) -> Shape:
         """The shape of its target."""
@@ -259,7 +275,9 @@ AnyControl = EnergyControl | Projection | Control | ConstraintControl
 
 
 def a_control(value: Any) -> Any:
-    """Return the argument ``control`` if it is one, or None."""
+    """Return the argument ``control`` if it is one, or None; it may have been read from a file of arrays."""
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind == "O":
+        value = value.item()
     if value is not None and not isinstance(value, (EnergyControl, Projection, Control, ConstraintControl)):
         raise DTypeError(
             f"control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got "

@@ -225,8 +225,12 @@ def _per_step(plan: Plan, work: Array | None) -> Array | None:
     """What a control did, in units of energy, from h times the sum over all evaluations."""
     if work is None:
         return None
-    evaluations = plan.method.evaluations if isinstance(plan.system.control, EnergyControl) else 1
-    return np.asarray(work / (evaluations * plan.dt))
+    return np.asarray(work / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
+
+
+def pushes(control: Any, evaluations: int) -> int:
+    """How many times a step with so many evaluations adds to what a control did."""
+    return evaluations if isinstance(control, EnergyControl) and not control.between else 1
 
 
 def _stacked(states: Iterable[Array], count: int) -> Array:
@@ -507,6 +511,9 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
 
 # ---- adaptive steps
 
+#: How many numbers say where a member stands: those of a ``Pace``.
+PACE_NUMBERS = 20
+
 
 class Pacing(NamedTuple):
     """When the state is asked for, ascending, and the most attempts of a member."""
@@ -544,7 +551,7 @@ def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, a
     from .reference import adaptive  # only such runs need it
 
     if first is None:
-        first = adaptive.first_step(plan.system.scaled(1.0, plan.batch), plan.t0, v, y, plan.block_axes)
+        first = adaptive.first_step(plan.system.alone(1.0, plan.batch), plan.t0, v, y, plan.block_axes)
     wide = np.zeros(plan.batch) if absolute is None else absolute
     first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
     tolerance = relative, wide, 1.0 if absolute is None else 0.0
@@ -578,8 +585,8 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
             return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
         pair: Any = plan.method.steps
         assert plan.method.error_order is not None
-        s = plan.system.scaled(1.0, plan.batch)
-        attempt = partial(adaptive.attempt, pair, s, plan.method.error_order, plan.block_axes)
+        system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+        attempt = partial(adaptive.attempt, pair, system, plan.method.error_order, plan.block_axes)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _memory, engine
+from . import _checks, _core, _encounters, _memory, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
 from .control import AnyControl, a_control
@@ -29,7 +29,10 @@ from .methods import methods as every_method
 from .reference.types import Whole
 from .result import AdaptiveState, Collision, Paces, Run, Status
 from .systems import NBody, Sampled, System
-from .systems.base import a_system
+from .systems.base import TINY, a_system
+
+if TYPE_CHECKING:
+    from .reference.adaptive import Pace
 
 BACKENDS = ("rust", "numpy")
 FORMS = ("direct", "matrix", "power")
@@ -40,9 +43,6 @@ NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
 #: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
 MOST_STEPS = 1_000_000
 
-#: A warning names the bodies that collided if repeating the run of the member takes at most so many steps × numbers, which is a
-#: moment. Otherwise they are found by ``Run.collisions``.
-MAX_RERUN = 10_000_000
 
 #: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
 MAX_ABSOLUTE_SHARE = 0.01
@@ -107,13 +107,14 @@ def integrate(
         start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how to start a method that has several ways; see ``method(…).starts``.
         carry: what a method carries in place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, the state of
-            the run.
+            the step-size controller.
         carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
             meaning.
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
-        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
+        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
+            tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
@@ -137,8 +138,9 @@ def integrate(
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
-            sine; bodies that nothing controls ended with an energy of another size. That is looked at where it is recorded, and
-            where two energies are little work against the run; not in the pieces of a run that carries something.
+            sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
+            which is then named. That is looked for where it is little work against the run, or where there is reason to
+            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)
@@ -150,10 +152,8 @@ def integrate(
             "steps": steps,
             "every": every,
             "start": start,
-            "carried_by": carried_by,
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
-            "control": control,
             "force": force,
         }
         if not isinstance(form, str) or form != "direct":
@@ -161,7 +161,10 @@ def integrate(
         if not isinstance(start_step, int) or start_step != 0:
             fixed["start_step"] = start_step
         _only_fixed(fixed)
-        run, begun = _adapt(system, how, v, y, dt, tolerance, at, max_steps, record, t0, carry, fused, threads, backend, progress)
+        went = None if carry is None else (carry, carried_by)
+        run, begun = _adapt(
+            system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress
+        )
         warn_of_nonsense(run, begun)
         return run
     if max_steps is not None:
@@ -197,7 +200,7 @@ def integrate(
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     choice = how.start_choice(start)
-    if isinstance(carry, AdaptiveState):
+    if carry is not None and how.carry is None and carried_by is not None:
         raise ArgumentError("carry: it is that of a run with a tolerance, which goes on with at= and without dt= and steps=")
     if carry is not None and how.carry is None:
         raise ArgumentError(f"carry: {how.name} carries nothing but v between steps")
@@ -232,11 +235,12 @@ def integrate(
     if control is not None:
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
+    system = system.stepped_by(how)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
         plan = plan._replace(force=_spread(force, system.v_shape, batch))
-    if record or control is not None:
+    if record or system is not plan.system:
         plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
     if _checks.flag("progress", progress):
         with _bar(f"{how.title}, {steps} steps") as told:
@@ -244,8 +248,8 @@ def integrate(
     else:
         out = engine.advance(plan, v, y, before, carried=carry is not None)
     collides = isinstance(system, NBody)
-    if collides and out.diverged and (out.first_bad > start_step).any():
-        v, y = v.copy(), y.copy()  # kept for ``collisions``; the arrays that were given are the user's to change
+    if collides:
+        v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
     run = Run(
         t=_times(plan),
         v=out.v,
@@ -263,6 +267,8 @@ def integrate(
         start=how.starts[choice] if how.starts else None,
         fused=fused,
         collision=partial(_collision, plan, v, y, carry is not None) if collides else None,
+        encounter=partial(_encounters.of_member, plan, v, y, carry is not None, steps) if collides else None,
+        overshoots=partial(_encounters.overshoots, plan, v, y, carry is not None, steps) if collides else None,
         recorded=out.recorded,
         work=out.work,
         force=plan.force,
@@ -330,13 +336,14 @@ def _adapt(
     max_steps: Any,
     record: Any,
     t0: Any,
-    carry: Any,
+    went: tuple[Any, Any] | None,
+    control: Any,
     fused: bool,
     threads: int | None,
     backend: str,
     progress: bool,
 ) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on."""
+    """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
@@ -345,19 +352,18 @@ def _adapt(
             f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
             f"estimated; use dt= and steps="
         )
-    if system.keeper is not None:
-        raise UnsupportedError(f"tolerance: goes with systems that nothing controls, got {system!r}; use its .uncontrolled")
-    if carry is not None and not isinstance(carry, AdaptiveState):
-        raise DTypeError(f"carry: with a tolerance expected that of run.resume, got {type(carry).__name__}")
-    if at is None or (tolerance is None) == (carry is None):
-        if at is not None and carry is not None:
+    control = a_control(control)
+    not_of_a_step(system.keeper if control is None else control)
+    if at is None or (tolerance is None) == (went is None):
+        if at is not None and went is not None:
             raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
         raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
     t0 = _checks.number("t0", t0, unit="units of time")
     times = _checks.numbers("at", at, unit="units of time")
     if times.ndim != 1 or len(times) == 0:
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
-    since = t0 if carry is None else carry.last
+    carry = None if went is None else _paces_of(how, *went)
+    since = t0 if carry is None else float(carry.target.max(initial=t0))
     if times[0] < since or (np.diff(times) <= 0).any():
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
@@ -376,12 +382,12 @@ def _adapt(
     else:
         if dt is not None:
             raise ArgumentError("dt: the run that goes on has its next step already")
-        if carry.method != how.name:
-            raise ArgumentError(f"carry: expected that of a run by {how.name}, got one by {carry.method}")
-        batches |= {"carry": carry.pace.shape[1:]}
+        batches |= {"carry": carry.t.shape}
+    if control is not None:
+        batches |= {"control": control.batch}
     batch = _checks.batch_shape(batches)
-    if carry is not None and carry.pace.shape[1:] != batch:
-        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.pace.shape[1:]}")
+    if carry is not None and carry.t.shape != batch:
+        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.t.shape}")
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     numbers = prod(system.v_shape) + prod(system.y_shape)
@@ -394,8 +400,11 @@ def _adapt(
     )
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
+        if control is not None:
+            system = system.controlled(control, v, y, TINY)
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
-        pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else engine.pace_of(carry.pace)
+        pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
+        pace = pace._replace(work=np.zeros(batch))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
     run = Run(
@@ -412,15 +421,34 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.evaluations * (accepted + rejected + extra_steps)),
-        stand=AdaptiveState(out.last_v, out.last_y, np.array(out.pace), float(times[-1]), how.name),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.attempt_evaluations * (accepted + rejected + extra_steps)),
+        stand=AdaptiveState(
+            out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
+        ),
         fused=fused,
+        work=None if system.control is None else out.pace.work / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
     _warn_of_stops(run)
     _warn_of_lost(run, out.pace)
     return run, None if carry is not None else (v, y)
+
+
+def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
+    """Where the members stand of a run with a tolerance that goes on."""
+    if carried_by is None:
+        raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
+    by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
+    if by != method.name:
+        raise ArgumentError(f"carry: expected that of a run by {method.name}, got one by {by}")
+    numbers = _checks.numbers("carry", carry, finite=False)
+    if numbers.shape[:1] != (engine.PACE_NUMBERS,):
+        raise ShapeError(
+            f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
+            f"axis, got shape {numbers.shape}"
+        )
+    return engine.pace_of(numbers)
 
 
 def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
@@ -490,16 +518,39 @@ def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tupl
     return Collision(index, step, bodies, distance)
 
 
+def _kept(array: Array) -> Array:
+    """A copy that is as small as what it was spread from."""
+    own = array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)].copy()
+    return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
+
+
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot do the system."""
     if not method.needs_acceleration:
         return
     if not system.second_order:
         raise UnsupportedError(f"{method.name} needs a second-order system, ÿ = a(t, y); {system!r} is not one")
-    if system.velocity_term is not None:
+    if (term := system.uncontrolled.velocity_term) is not None:
         raise UnsupportedError(
-            f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {system.velocity_term}; "
-            f"use false_euler{'' if system.velocity_term == 'forces that do' else f', or leave {system.velocity_term} out'}"
+            f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {term}; "
+            f"use false_euler{'' if term == 'forces that do' else f', or leave {term} out'}"
+        )
+    if system.keeper is not None and method.carry is not None:
+        raise UnsupportedError(
+            f"control: {method.name} goes on with {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
+            f"which changes v between steps; use pefrl or false_euler"
+        )
+
+
+def not_of_a_step(control: Any) -> None:
+    """Raise if a control cannot go with steps whose length changes."""
+    if getattr(control, "relative", None) is not None and control.gain is None:
+        raise UnsupportedError(
+            f"tolerance: {control!r} relates its gain to steps of fixed length; give gain in place of relative"
+        )
+    if getattr(control, "of_a_step", False):
+        raise UnsupportedError(
+            f"tolerance: {control!r} is relative to steps of fixed length; use a projection, which goes with any steps"
         )
 
 
@@ -555,7 +606,7 @@ def _warn(run: Run, before: Whole | None) -> None:
     step = int(run.first_bad_step[bad].min())
     first = tuple(np.argwhere(bad & (run.first_bad_step == step))[0].tolist())
     met = ""
-    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= MAX_RERUN:
+    if run.collision is not None and (step - run.start_step) * run.v[-1].size // bad.size <= _encounters.MAX_RERUN:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"

@@ -39,8 +39,10 @@ class Method(Fixed):
     false_friends: tuple[str, ...]
     #: Order of convergence.
     order: int
-    #: Function evaluations per step (of both rates: rate evaluations).
+    #: Function evaluations per step of fixed length (of both rates: rate evaluations).
     evaluations: int
+    #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
+    attempt_evaluations: int
     #: The family of methods to which it belongs.
     family: str
     #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.

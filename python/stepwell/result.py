@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _checks
 from ._checks import Array
+from ._encounters import Encounter
 from ._value import Value, by_value
 from .errors import UnsupportedError
 from .methods import Method
@@ -68,12 +69,12 @@ class Paces(NamedTuple):
 
 @by_value
 class AdaptiveState(NamedTuple):
-    """The state from which ``integrate`` continues a run with a tolerance; its ``carry``.
+    """The state from which ``integrate`` continues a run with a tolerance; the ``carry`` of its ``resume`` is ``pace``.
 
     Attributes:
         v: velocities of each member at its own time, shape (*block, *batch).
         y: coordinates, likewise.
-        pace: the state of the step-size controller, shape (numbers, *batch).
+        pace: the state of the step-size controller, shape (numbers, *batch), with the last output time in it.
         last: the last output time.
         method: name of the method to which the pace belongs.
     """
@@ -128,6 +129,8 @@ class Run(Value):
         steps: int,
         start: str | None,
         collision: Callable[[tuple[int, ...], int], Collision] | None = None,
+        encounter: Callable[..., Encounter | None] | None = None,
+        overshoots: Callable[..., tuple[int, float] | None] | None = None,
         recorded: dict[str, Array] | None = None,
         work: Array | None = None,
         paces: Paces | None = None,
@@ -150,6 +153,10 @@ class Run(Value):
         self.start = start
         #: Finds the two nearest bodies when the member of that index diverged at that step; see ``collisions``.
         self.collision = collision
+        #: Finds the first step in which two bodies of the member of that index met; see ``encounters``.
+        self.encounter = encounter
+        #: Finds the first step before which h·C·K of the member of that index was 1 or more, under a control in the printed form.
+        self.overshoots = overshoots
         self.recorded = recorded or {}
         self.work = work
         self.paces = paces
@@ -159,8 +166,8 @@ class Run(Value):
         self.force = force
 
     def _held(self) -> dict[str, Any]:
-        """All attributes but the function that finds collisions, which follows from the others."""
-        return {name: each for name, each in vars(self).items() if name != "collision"}
+        """All attributes but the functions that go through the steps again, which follow from the others."""
+        return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter", "overshoots")}
 
     def quantity(self, name: str) -> Array:
         """A quantity that can be recorded, computed now for every saved state, shape (saved, *shape of it, *batch).
@@ -208,16 +215,37 @@ class Run(Value):
         return tuple(self.collision(tuple(index), int(self.first_bad_step[tuple(index)])) for index in diverged)
 
     @property
+    def encounters(self) -> tuple[Encounter, ...]:
+        """For bodies that attract each other: the first step in which two of them met, for each such member.
+
+        In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more
+        than twice the distance at which they begin or end. So it did not follow the motion, whatever the energy says.
+        Encounters that turn the bodies themselves by less than 0.01 rad are left out. They are found by repeating the run with
+        all of its states, which takes some times as long as it took before.
+
+        Raises:
+            UnsupportedError: if the system has no bodies, or the run has a tolerance, which chooses steps that follow encounters.
+        """
+        if self.encounter is None:
+            why = f"{self.system!r} has no bodies that meet" if self.paces is None else "expected a run with fixed steps"
+            raise UnsupportedError(f"encounters: {why}")
+        found = (self.encounter(index) for index in np.ndindex(self.status.shape))
+        return tuple(each for each in found if each is not None)
+
+    @property
     def resume(self) -> dict[str, Any]:
         """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
 
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
-        last one. A carry of Verlet or leapfrog is for the same method only. ``dt`` is that of this run; another
+        last one. A carry is for the same method only. ``np.savez`` writes all of it to a file; a control is an object, for which
+        ``np.load`` needs ``allow_pickle=True``. ``dt`` is that of this run; another
         is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
         """
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:
-            return {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, "carry": self.stand, **told}
+            kept = {} if self.system.keeper is None else {"control": self.system.keeper}
+            going_on = {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, **told, **kept}
+            return going_on | {"carry": self.stand.pace, "carried_by": self.stand.method}
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         state |= {"dt_before": self.dt, **told}
         if self.start is not None:

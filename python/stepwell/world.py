@@ -114,6 +114,7 @@ class World:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
             stepped = system.controlled(control, v, y, dt)
             fits_together(stepped, how)
+            stepped = stepped.stepped_by(how)
         stepped.check_time(abs(t0) + first * dt)
         plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=_checks.flag("fused", fused), force=force)
         # Views: the core knows rows, not axes.

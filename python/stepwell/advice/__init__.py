@@ -117,7 +117,7 @@ def advise(
                 rejected.append(Rejected(method.name, "refused", why, candidate.by))
 
     times = _times(scene, candidates)
-    prices = times if cost == "time" else {each.name: float(each.method.evaluations) for each in candidates}
+    prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
     search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + adaptive.work)
     found, missed = search.run(candidates)
 
@@ -151,7 +151,7 @@ def advise(
 def _refusal(scene: Scene, candidate: Candidate) -> str | None:
     """Why the method cannot step the scene with its control, or None; found by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
-        return "adaptive steps do not go with a control"
+        return "adaptive steps are tried for scenes without a control only"
     dt = TIMED_STEP * scene.dt
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -210,7 +210,7 @@ def _row(
 ) -> Row:
     method, trial, grid = candidate.method, found.trial, trials.grid
     ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, found.k)
-    per_frame = method.evaluations * trial.steps / grid.spans
+    per_frame = candidate.evaluations * trial.steps / grid.spans
     by_modes, limit = None, predict.Limit(None, "none", None, None)
     observed = math.inf
     if candidate.by == "step":
@@ -231,7 +231,7 @@ def _row(
         frequency_error=by_modes.frequency if by_modes else None,
         damping_error=by_modes.damping if by_modes else None,
         evaluations_per_frame=per_frame if grid.framed else None,
-        evaluations_per_time=method.evaluations / trial.dt,
+        evaluations_per_time=candidate.evaluations / trial.dt,
         ns_per_step=ns,
         seconds_per_frame=mean if grid.framed else None,
         seconds_per_time=1e-9 * ns / trial.dt,
@@ -244,7 +244,7 @@ def _row(
         robust=robust,
         tolerance=candidate.tolerance(found.k) if isinstance(candidate, Adaptive) else None,
         rejected_steps=trial.rejected,
-        worst_evaluations=method.evaluations * spent.most(candidate, found.k) if grid.framed else None,
+        worst_evaluations=candidate.evaluations * spent.most(candidate, found.k) if grid.framed else None,
     )
 
 

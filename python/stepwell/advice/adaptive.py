@@ -76,7 +76,7 @@ class AdaptiveTrials:
         if key not in self._confirmed:
             trial = self.look(method, tolerance)
             if trial.error <= self.allowed:
-                times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.evaluations))
+                times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.attempt_evaluations))
                 marks = self.marks[:: math.ceil(len(self.marks) / times)]
                 error, _ = self._errors(method, tolerance, marks)
                 ends = np.concatenate([[0.0], marks, self.marks[-1:]])
@@ -96,7 +96,7 @@ class AdaptiveTrials:
         if key not in self._runs:
             errors, run = self._errors(method, tolerance, self.asked)
             assert run.paces is not None
-            steps = int(run.paces.evaluations) // method.evaluations
+            steps = int(run.paces.evaluations) // method.attempt_evaluations
             stopped = bool(run.status)
             error = math.inf if stopped else float(errors.max())
             self._runs[key] = Trial(self.grid.end / steps, steps, error, stopped, int(run.paces.rejected))
@@ -104,7 +104,7 @@ class AdaptiveTrials:
 
     def _integrated(self, method: Method, tolerance: float, at: Array) -> Run:
         self.made += 1
-        scene, most = self.scene, max(1, int(self.most / method.evaluations))
+        scene, most = self.scene, max(1, int(self.most / method.attempt_evaluations))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
             warnings.simplefilter("ignore", AccuracyWarning)
@@ -137,7 +137,7 @@ class AdaptiveTrials:
                 warnings.simplefilter("ignore", AccuracyWarning)
                 run = integrate(self.scene.system, method, at=self.asked[leg.end : end], max_steps=10**9, **leg.on)
             assert run.paces is not None
-            leg = Leg(end, run.resume, int(run.paces.evaluations) // method.evaluations)
+            leg = Leg(end, run.resume, int(run.paces.evaluations) // method.attempt_evaluations)
             yield leg
             if run.status:
                 break

@@ -34,6 +34,7 @@ class Candidate(Protocol):
         by: ``"step"`` or ``"tolerance"``.
         name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``.
         first: the least k.
+        evaluations: function evaluations of a step, or of an attempt at one.
         share: of the error that is allowed, what the run may have.
         seen: the runs that were made, by k.
     """
@@ -42,6 +43,7 @@ class Candidate(Protocol):
     by: str
     name: str
     first: int
+    evaluations: int
     share: float
     seen: dict[int, Trial]
 
@@ -66,6 +68,7 @@ class Fixed:
     def __init__(self, method: Method, trials: Trials, grid: Grid, share: float) -> None:
         self.method, self.name, self.share = method, method.name, share
         self.trials, self.grid, self.first = trials, grid, grid.first
+        self.evaluations = method.evaluations
         self.seen: dict[int, Trial] = {}
 
     def look(self, k: int) -> Trial:
@@ -95,7 +98,7 @@ class Adaptive:
     def __init__(self, method: Method, trials: AdaptiveTrials) -> None:
         assert method.error_order is not None
         self.method, self.name = method, f"{method.name}, tolerance"
-        self.trials, self.power = trials, method.error_order
+        self.trials, self.power, self.evaluations = trials, method.error_order, method.attempt_evaluations
         self.seen: dict[int, Trial] = {}
         # A single step may be wrong by the tolerance; more than what is allowed is luck.
         self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))

@@ -131,7 +131,7 @@ class Search:
     def affordable(self, candidate: Candidate, k: int, known: int) -> bool:
         """Whether the run is short enough to be made, by one that was."""
         made = candidate.look(known)
-        return candidate.possible(k) and made.steps * candidate.method.evaluations * (k / known) <= self.most
+        return candidate.possible(k) and made.steps * candidate.evaluations * (k / known) <= self.most
 
     def run(
         self, candidates: Sequence[Candidate], ceilings: Mapping[str, float] = MappingProxyType({})
@@ -188,7 +188,7 @@ class Search:
             least = max(2.0, (wanted or self.at_least(candidate, k, trial)) / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
-            made, ceiling = trial.steps * candidate.method.evaluations, ceilings.get(candidate.name, math.inf)
+            made, ceiling = trial.steps * candidate.evaluations, ceilings.get(candidate.name, math.inf)
             most = self.most if cost * least <= best else min(self.most, LATER_RUN_SHARE * self.longest)
             if not candidate.possible(2 * k) or made * least > most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
@@ -232,7 +232,7 @@ class Search:
 
         It is 0 where runs are short, too: errors that fall regularly at the doublings may still have minima between them.
         """
-        if k < 4 * candidate.first or candidate.look(k).steps * candidate.method.evaluations < LONG_RUN_SHARE * self.longest:
+        if k < 4 * candidate.first or candidate.look(k).steps * candidate.evaluations < LONG_RUN_SHARE * self.longest:
             return 0
         first, second, third = (candidate.look(n).error for n in (k // 4, k // 2, k))
         allowed = self.allowed(candidate)
@@ -290,12 +290,12 @@ class Search:
         """
         if candidate.by == "tolerance":
             return IRREGULAR_POINTS[0]
-        made = candidate.look(k).steps * candidate.method.evaluations
+        made = candidate.look(k).steps * candidate.evaluations
         return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / made)))
 
     def very_long(self, candidate: Candidate, k: int) -> bool:
         """Whether a run takes so long that only few more like it can be made."""
-        return candidate.look(k).steps * candidate.method.evaluations > HALVED_RUN_SHARE * self.longest
+        return candidate.look(k).steps * candidate.evaluations > HALVED_RUN_SHARE * self.longest
 
     def halved(self, candidate: Candidate, k: int, best: float) -> int | None:
         """A k in the last doubling that is good enough and nearly the least."""

@@ -224,7 +224,7 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
             threads=1,
         )
         assert run.paces is not None
-        return int(run.paces.evaluations.max()) // method.evaluations
+        return int(run.paces.evaluations.max()) // method.attempt_evaluations
 
     def timed(method: Method, runs: int) -> tuple[float, int]:
         begin = time.perf_counter()

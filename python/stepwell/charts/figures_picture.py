@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..stability.criterion import signed
-from .figures import Figures, Samples
+from .figures import HARMONIC_PERIODS, Figures, HarmonicCase, Samples
 from .style import FONT, GREY, named, new_figure
 
 if TYPE_CHECKING:
@@ -68,10 +68,36 @@ def one(chart: Figures, samples: Samples) -> Figure:
         axes.set(xlabel="time in periods of the exact solution", ylabel="y")
         method = samples.method
         figure.text(0.012, 0.925, f"{method.title} ({method.section}): y(t)", size=18, weight="bold")
-        figure.text(0.012, 0.865, _start(chart), size=12.5, color=GREY)
+        figure.text(0.012, 0.865, _start(chart, samples), size=12.5, color=GREY)
         limit = f"Stable for Φ < {samples.limit:.6g}." if samples.limit else "Never stable."
         figure.text(0.012, 0.805, f"{_said(samples)}. {limit}", size=12.5)
         figure.text(0.012, 0.03, "\n".join(MARKS), size=12, color=GREY, linespacing=1.35)
+    return figure
+
+
+def harmonic(cases: tuple[HarmonicCase, ...]) -> Figure:
+    """The harmonic cases of §4, one below the other."""
+    figure = new_figure(11.0, 8.6)
+    from matplotlib import rc_context
+
+    with rc_context(FONT):
+        places = {"left": 0.065, "right": 0.985, "bottom": 0.145, "top": 0.845, "hspace": 0.55}
+        panels = figure.subplots(len(cases), 1, sharex=True, gridspec_kw=places)
+        for axes, case in zip(panels, cases, strict=True):
+            turns = np.arange(len(case.y)) * (case.degrees / 360.0)
+            x = np.linspace(0.0, turns[-1], 1 + 120 * HARMONIC_PERIODS)
+            axes.axhline(0.0, color="#cccccc", linewidth=0.8)
+            axes.plot(x, np.cos(2.0 * math.pi * x), color="#8c8c8c", linewidth=2.6, zorder=2)
+            axes.plot(turns, case.y, color="black", linewidth=1.1, marker="o", markersize=4.2, zorder=3)
+            axes.set(xlim=(-0.02, HARMONIC_PERIODS + 0.15), ylim=(-1.15, 1.15), yticks=(-1, 0, 1), ylabel="g")
+            axes.set_title(f"Ψ = {case.degrees}°: {case.samples_per_period:g} samples per period", loc="left", size=13.5)
+            axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
+            axes.tick_params(labelbottom=True)
+        panels[-1].set_xlabel("time in periods of the samples")
+        figure.text(0.012, 0.945, "The harmonic cases of §4", size=18, weight="bold")
+        text = "Samples of Verlet with Φ = 2·sin(Ψ/2), started in second order: cos kΨ, of the same amplitude for ever."
+        figure.text(0.012, 0.905, text, size=12.5, color=GREY)
+        figure.text(0.012, 0.02, "Grey: g(t) = cos Ω₀t. Black: samples, joined by straight lines.", size=12, color=GREY)
     return figure
 
 
@@ -100,5 +126,7 @@ def _said(samples: Samples, digits: int = 3) -> str:
     return f"r₁² − 1 = {change}, {ratio}".replace("-", "−") + f": {samples.kind}"
 
 
-def _start(chart: Figures) -> str:
-    return f"v₀ = 0, y₀ = 1; Φ = ω₀·dt = {chart.phi:g} rad, {2.0 * math.pi / chart.phi:.4g} steps per period"
+def _start(chart: Figures, samples: Samples | None = None) -> str:
+    """Of all, or of one figure."""
+    verlet = "" if samples is None or samples.start is None else ", y₋₁ = y₀ as in the document"
+    return f"v₀ = 0, y₀ = 1{verlet}; Φ = ω₀·dt = {chart.phi:g} rad, {2.0 * math.pi / chart.phi:.4g} steps per period"

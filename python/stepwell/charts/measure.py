@@ -120,7 +120,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
     return Point(
         steps=tried,
         dt=scene.horizon / tried,
-        cost=method.evaluations * tried / scene.horizon,
+        cost=method.attempt_evaluations * tried / scene.horizon,
         state_error=math.inf if stopped else state_error,
         energy_error=math.inf if stopped else energy_error,
         unstable=stopped,
@@ -298,7 +298,7 @@ def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = N
                 fused=fused,
             )
             assert run.paces is not None
-            tried += int(run.paces.evaluations.max()) // method.evaluations
+            tried += int(run.paces.evaluations.max()) // method.attempt_evaluations
         return time.perf_counter() - begin, tried
 
     with warnings.catch_warnings():

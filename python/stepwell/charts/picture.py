@@ -30,6 +30,7 @@ ERRORS = {
     "phase_error": "phase error at the end of the run, periods",
     "energy_error": "largest energy error of the run, relative",
 }
+COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
 #: Under the curves, the points than which none is both as cheap and as right.
@@ -60,39 +61,47 @@ def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
 
 
 def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> None:
-    """Below, what has a digit right: error against cost. Above, one row for each method, what has none."""
+    """Below, what has a digit right: error against cost. Above, one row for each method, what has none.
+
+    A right energy does not make a motion right, so the energy error has the state error beside it, and not the measured time.
+    """
+    beside = error == "energy_error"
+    other_error, other_cost = ("state_error", "evaluations") if beside else (error, time)
     strip = 0.026 * (len(chart.curves) + 1)
     grid = figure.add_gridspec(
         2,
         2,
         height_ratios=(strip, 1.0 - strip),
-        width_ratios=(1.1, 1.0),
+        width_ratios=(1.0, 1.0) if beside else (1.1, 1.0),
         left=0.092,
         right=PANELS,
         bottom=0.165,
         top=0.88,
         hspace=0.0,
-        wspace=0.07,
+        wspace=0.24 if beside else 0.07,
     )
     counted = figure.add_subplot(grid[1, 0])
-    measured = figure.add_subplot(grid[1, 1], sharey=counted)
+    measured = figure.add_subplot(grid[1, 1], sharey=None if beside else counted)
     above_counted = figure.add_subplot(grid[0, 0], sharex=counted)
     above_measured = figure.add_subplot(grid[0, 1], sharex=measured)
 
     draw_errors(counted, chart, error, "evaluations")
-    draw_errors(measured, chart, error, time)
+    draw_errors(measured, chart, other_error, other_cost)
     if error == "state_error":
         _spreads(measured, chart, time)
     _wrong(above_counted, chart, "evaluations")
-    _wrong(above_measured, chart, time)
+    _wrong(above_measured, chart, other_cost)
     _slopes(counted)
 
     for axes in (counted, measured, above_counted, above_measured):
         axes.minorticks_off()
-    counted.set_xlabel("function evaluations per unit of simulated time")
+    counted.set_xlabel(COUNTED)
     counted.set_ylabel(ERRORS[error])
-    measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
-    measured.tick_params(labelleft=False)
+    if beside:
+        measured.set(xlabel=COUNTED, ylabel=ERRORS[other_error])
+    else:
+        measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
+        measured.tick_params(labelleft=False)
     for row, curve in enumerate(chart.curves):
         style = look_of(chart, curve) | {
             "linestyle": "",

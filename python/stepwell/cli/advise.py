@@ -16,7 +16,11 @@ from . import show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scene", metavar="SCENE", help="a scene (see stepwell scenes), or a Python file that makes one")
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), with arguments as in energy_control:pair=printed, or a Python file that makes one",
+    )
     parser.add_argument(
         "--frame",
         default="1/60",

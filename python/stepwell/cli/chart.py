@@ -22,7 +22,10 @@ from . import show
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument(
-        "scenes", nargs="+", metavar="SCENE", help="a scene (see stepwell scenes), or a Python file that makes one"
+        "scenes",
+        nargs="+",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), with arguments as in kepler:e=0.5, or a Python file that makes one",
     )
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")

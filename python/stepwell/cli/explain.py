@@ -41,7 +41,7 @@ def command(args: argparse.Namespace) -> None:
         system,
         args.method,
         members=args.members,
-        control=None if args.attempt else control,
+        control=control,
         fused=args.fused,
         attempt=args.attempt,
         form=args.form,

@@ -1,4 +1,4 @@
-"""Draw the document's figures (§5 to §11): the samples of each method on the undamped oscillator, beside the cosine."""
+"""Draw the document's figures: the samples of each method on the undamped oscillator (§5 to §11), the harmonic cases of §4."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ def command(args: argparse.Namespace) -> None:
     chart = figures(methods, phi=args.phi, periods=args.periods)
     written = show.Written()
     files = [str(path) for path in written.write(args.output, chart.save) or ()]
+    pictures = files[1 : 1 + len(chart.samples)]
     if args.json:
         show.print_json({"phi": chart.phi, "files": files, "summary": chart.summary()})
         written.close()
@@ -49,8 +50,8 @@ def command(args: argparse.Namespace) -> None:
                 f"{s['largest_y']:.4g}",
                 file,
             )
-            for s, file in zip(chart.summary(), files[1:] or ["–"] * len(chart.samples), strict=True)
+            for s, file in zip(chart.summary(), pictures or ["–"] * len(chart.samples), strict=True)
         ],
-        [f"all in one: {file}" for file in files[:1]],
+        [f"all in one: {file}" for file in files[:1]] + [f"beside: {file}" for file in files[1 + len(chart.samples) :]],
     )
     written.close()

@@ -28,7 +28,11 @@ NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scene", metavar="SCENE", help="a scene (see stepwell scenes), or a Python file that makes one")
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a scene (see stepwell scenes), with arguments as in energy_control:pair=printed, or a Python file that makes one",
+    )
     parser.add_argument("--method", required=True, metavar="NAME", help="a method; see stepwell methods")
     parser.add_argument("--dt", type=float, metavar="TIME", help="the step (default: the scene's)")
     parser.add_argument("--steps", type=int, metavar="N", help="how many steps (default: up to the scene's horizon)")

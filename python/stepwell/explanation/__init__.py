@@ -14,7 +14,7 @@ from typing import Any
 from .. import _checks, _core, engine
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, UnsupportedError
-from ..integrate import fits_together
+from ..integrate import fits_together, not_of_a_step
 from ..methods import Method
 from ..methods import method as find_method
 from ..methods import methods as every_method
@@ -85,8 +85,8 @@ def explain(
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
     if attempt and system.rubbing is not None:
         raise UnsupportedError(f"attempt: adaptive steps do not go with friction that sticks, which {system!r} has")
-    if attempt and (control is not None or system.keeper is not None):
-        raise ArgumentError("control: goes with fixed steps only, and attempt=True was given")
+    if attempt:
+        not_of_a_step(system.keeper if control is None else control)
     own = prod(system.batch)
     form = _checks.known("form", form, ("direct", "matrix"))
     if form != "direct" and (fused or attempt or control is not None):
@@ -107,6 +107,7 @@ def explain(
         _checks.fits("members: the numbers of a control", 8, batch, "explain fewer")
         system = system.under(control, batch)
         fits_together(system, how)
+        system = system.stepped_by(how)
     plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice)
     explained = _explained(plan, attempt)
     if explained.parts is not None or attempt:

@@ -110,6 +110,7 @@ def export(
     if control is not None:
         system = _under(system, control, blocks, batch, dt)
         fits_together(system, how)
+        system = system.stepped_by(how)
     example = _example(system, blocks, batch, index)
     plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused)
     traced = Traced(plan, index)

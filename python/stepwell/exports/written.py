@@ -6,7 +6,7 @@ import re
 from math import prod
 from typing import NamedTuple
 
-from ..control import EnergyControl
+from ..engine import pushes
 from ..explanation.formula import Formula
 from ..explanation.listing import Leaf, Line, Writer
 from .language import Assignment, Function, Language, Place
@@ -53,7 +53,7 @@ class Written:
         self.slot = plan.method.carry or "v"
         self.n_v, self.n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
         control = plan.system.control
-        self.evaluations = 0 if control is None else plan.method.evaluations if isinstance(control, EnergyControl) else 1
+        self.evaluations = 0 if control is None else pushes(control, plan.method.evaluations)
         names = language.fields
         operations = traced.operations
         used = {given for name, _, given in operations.all if name == "parameter"}

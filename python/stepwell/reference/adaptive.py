@@ -82,6 +82,7 @@ class Pace(NamedTuple):
         rejected: rejected attempts.
         extra_steps: steps for saved states: the extra ones, and those that were held and are made once more.
         error: the square of the last error over the tolerance.
+        work: the energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
     """
 
     t: Any
@@ -103,6 +104,7 @@ class Pace(NamedTuple):
     rejected: Any
     extra_steps: Any
     error: Any
+    work: Any
 
     def outlook(self, budget: Any) -> Outlook:
         """What comes next."""
@@ -126,6 +128,37 @@ class Stretched:
     def dy(self, t: Array, v: Array, y: Array) -> Array:
         """h·ẏ."""
         return self.h * self.s.dy(t, v, y)  # type: ignore[arg-type, operator]
+
+    def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
+        """h·v̇, h times the kinetic energy, and h times the whole energy."""
+        dv, kinetic, whole = self.s.energies(v, y)  # type: ignore[attr-defined]
+        return self.h * dv, self.h * kinetic, self.h * whole
+
+
+class Attempted:
+    """How an attempt uses a system: its rates for a step, pushed by a control, and the projection of the state after it.
+
+    ``s`` is the system scaled to a step of 1. A control, which has ``pushes``, needs the step; a projection does not.
+    """
+
+    def __init__(self, s: Any, control: Any = None) -> None:
+        self.s, self.push = s, control if control is not None and control.pushes else None
+        self.projected = s if control is None or control.pushes else control.around(s, 1.0)
+
+    def rates(self, step: Any) -> Any:
+        """The rates for a step, which may be another for each member."""
+        stretched = self.s.stretched(step) if hasattr(self.s, "stretched") else Stretched(self.s, step)
+        return stretched if self.push is None else self.push.around(stretched, step)
+
+    def project(self, v: Array, y: Array) -> tuple[Array, Array, Any]:
+        """The state after the step, and the energy that this added; None without a projection."""
+        if not hasattr(self.projected, "project"):
+            return v, y, None
+        if not hasattr(self.projected, "work"):
+            return *self.projected.project(v, y), None
+        self.projected.work = 0.0
+        v, y = self.projected.project(v, y)
+        return v, y, self.projected.work
 
 
 class Outcome(NamedTuple):
@@ -159,7 +192,7 @@ def start(
     with np.errstate(all="ignore"):
         longest_v, longest_y = (length2(block, axes) for block, axes in zip((v, y), block_axes, strict=True))
     counts = relative, absolute, lasts * one, longest_v, longest_y, t, interval * one, until * one, one, MAX_FACTOR * one
-    return Pace(t, first, t, zero, zero, *counts, zero, zero, zero, zero)
+    return Pace(t, first, t, zero, zero, *counts, zero, zero, zero, zero, zero)
 
 
 def first_step(s: Scaled, t0: float, v: Array, y: Array, block_axes: tuple[int, int]) -> Array:
@@ -212,15 +245,16 @@ def run(
 
 
 def attempt(
-    pair: Pair, s: Scaled, order: int, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
+    pair: Pair, system: Attempted, order: int, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
 ) -> tuple[Pace, Array, Array]:
-    """One attempt at a step: the state advances if the error is tolerated, and if there is a step to try.
+    """One attempt at a step: the state advances, projected, if the error is tolerated, and if there is a step to try.
 
     An extra step leaves the pace as it is. ``order`` is the one in which the error is estimated.
     """
     outlook = pace.outlook(budget)
     step = outlook.step
-    increments = pair.stages(Stretched(s, step), pace.t, step, v, y)
+    s = system.rates(step)
+    increments = pair.stages(s, pace.t, step, v, y)
     v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
     old, new = ([length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)] for blocks in ((v, y), (v1, y1)))
     weights = tolerated(pace, step, old, new)
@@ -228,8 +262,12 @@ def attempt(
     if coarse := getattr(pair, "COARSE", None):
         corrected = (r2 * r2) / (r2 + 0.01 * over(tableau.combined(coarse, increments), weights, block_axes))
         r2 = where(less(0.0, r2), corrected, r2)
-    pace, goes_on = decided(pace, order > LOW, r2, new, outlook)
-    return pace, where(goes_on, v1, v), where(goes_on, y1, y)
+    following, goes_on = decided(pace, order > LOW, r2, new, outlook)
+    v1, y1, work = system.project(v1, y1)
+    done = work if system.push is None else s.work / step
+    if done is not None:
+        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + done, pace.work))
+    return following, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
 def decided(pace: Pace, high: bool, r2: Any, new: Sequence[Any], outlook: Outlook) -> tuple[Pace, Any]:

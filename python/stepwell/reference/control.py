@@ -1,4 +1,4 @@
-"""What keeps the energy near its target (§12, Appendix D): a push −g·v in every stage, or a projection after the step.
+"""What keeps the energy near its target (§12, Appendix D): a push −g·v in stages or between steps, or a projection after a step.
 
 Both wrap a system that has ``energies``, and are a system themselves. Energies are multiplied by h.
 """
@@ -30,7 +30,7 @@ class Conserving(Scaled, Protocol):
 class Kept:
     """A system, and what was changed of its energy."""
 
-    def __init__(self, s: Conserving, h: float, target: Array) -> None:
+    def __init__(self, s: Conserving, h: Any, target: Array) -> None:
         self.s = s
         self.h = h
         self.target = h * target
@@ -60,32 +60,43 @@ class Kept:
 class Controlled(Kept):
     """As printed g = h·C·ΔE; limited, 1 − g is the root of 1 − 2hC·ΔE/(1 + 2hC·K), held in ½ … 2."""
 
-    def __init__(self, s: Conserving, h: float, form: str, gain: Array, target: Array) -> None:
+    def __init__(self, s: Conserving, h: Any, form: str, gain: Array, target: Array, *, between: bool = False) -> None:
         super().__init__(s, h, target)
         self.form = form
         self.gain = gain
+        self.between = between  # whether it pushes after each step, and not in its stages
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇ and the push."""
+        if self.between:
+            return self.s.dv(t, v, y)
         dv, kinetic, energy = self.s.energies(v, y)
-        g = self.push(kinetic, energy)
-        self.work = self.work - (g * (2.0 - g)) * kinetic  # what the push alone would change: ((1 − g)² − 1)·K
-        return np.asarray(dv - g * v)
+        return np.asarray(dv - self.push(kinetic, energy) * v)
+
+    def project(self, v: Array, y: Array) -> Blocks:
+        """The state after a step, pushed if that is done there."""
+        if not self.between:
+            return v, y
+        _, kinetic, energy = self.s.energies(v, y)
+        return np.asarray(v - self.push(kinetic, energy) * v), y
 
     def push(self, kinetic: Array, energy: Array) -> Array:
-        """g, the share of the velocity that is taken away."""
+        """g, the share of the velocity that is taken away; what it changes of the energy alone is ((1 − g)² − 1)·K."""
         off = energy - self.target
         if self.form == "printed":
-            return np.asarray(self.gain * off)
-        twice = 2.0 * self.gain
-        square = 1.0 - (twice * off) / (1.0 + twice * kinetic)
-        return np.asarray(1.0 - np.sqrt(bits.held(square, MIN_SQUARE, MAX_SQUARE)))
+            g = np.asarray(self.gain * off)
+        else:
+            twice = 2.0 * self.gain
+            square = 1.0 - (twice * off) / (1.0 + twice * kinetic)
+            g = np.asarray(1.0 - np.sqrt(bits.held(square, MIN_SQUARE, MAX_SQUARE)))
+        self.work = self.work - (g * (2.0 - g)) * kinetic
+        return g
 
 
 class Projected(Kept):
     """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient."""
 
-    def __init__(self, s: Conserving, h: float, way: str, target: Array) -> None:
+    def __init__(self, s: Conserving, h: Any, way: str, target: Array) -> None:
         super().__init__(s, h, target)
         self.way = way
 

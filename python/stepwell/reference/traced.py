@@ -80,8 +80,8 @@ class Tracer:
         """The system under its control, scaled to the step h."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        s = self.system.reference(h, **given)
-        s = s if self.system.control is None else self._controlled(s, h)
+        s, control = self.system.reference(h, **given), self._control()
+        s = s if control is None else control.around(s, h)
         rubbing, force = self.system.rubbing, self.force
         if rubbing is not None:
             rubbing = self.symbols(rubbing, rubbing.shape)
@@ -89,11 +89,14 @@ class Tracer:
             force = self.symbols(force, force.shape[len(self.system.v_shape) :])
         return surrounded(s, h, force, rubbing)
 
-    def _controlled(self, s: Any, h: Any) -> Any:
+    def _control(self) -> Any:
+        """The control with symbols for its numbers, which come behind those of the system; None without one."""
         control: Any = self.system.control
+        if control is None:
+            return None
         numbers = {name: value for name, value in control.given().items() if isinstance(value, np.ndarray)}
         symbols = {name.removeprefix("control."): self.symbols(value, value.shape) for name, value in numbers.items()}
-        return changed(control, **symbols).around(s, h)
+        return changed(control, **symbols)
 
     def step(self, method: Any) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
@@ -111,12 +114,15 @@ class Tracer:
 
     def attempt(self, method: Any) -> list[Any]:
         """The state and the pace after an attempt at an adaptive step."""
-        s, (v, y, more) = self.scaled(1.0), self.state()
+        batch = self.system.batch
+        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
+        system = adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+        v, y, more = self.state()
         pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
         axes = len(self.system.v_shape), len(self.system.y_shape)
         steps: Any = method.steps
         assert method.error_order is not None
-        following, v, y = adaptive.attempt(steps, s, method.error_order, axes, pace, self.tape.budget(), v, y)
+        following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following)
 
     def record(self, names: Sequence[str]) -> list[Any]:

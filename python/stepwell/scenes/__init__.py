@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 import re
 import sys
@@ -33,10 +34,11 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def scene(name: str | Scene) -> Scene:
-    """The scene of that name with default arguments, or the scene of a file of your own.
+    """The scene of that name, or the scene of a file of your own.
 
     Args:
-        name: a name of ``scenes``; or a Python file that defines a ``Scene``, ``my_scene.py``. If it defines several, the name of
+        name: a name of ``scenes``, for its default arguments; with others behind it, ``energy_control:pair=printed,eps=0``; or a
+            Python file that defines a ``Scene``, ``my_scene.py``. If it defines several, the name of
             the variable follows: ``my_scene.py:fast``. The file is run.
 
     Raises:
@@ -50,7 +52,26 @@ def scene(name: str | Scene) -> Scene:
         raise DTypeError(f"scene: expected a Scene or its name, got {type(name).__name__}")
     if (found := FILE.fullmatch(name)) is not None:
         return _from_file(*found.groups())
-    return _makers()[_checks.known("scene", name, _makers())]()
+    name, _, arguments = name.partition(":")
+    make = _makers()[_checks.known("scene", name, _makers())]
+    return make(**_arguments(name, make, arguments)) if arguments else make()
+
+
+def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:
+    """What ``pair=printed,eps=0`` says: numbers where they are, else words."""
+    found: dict[str, Any] = {}
+    for each in written.split(","):
+        key, equals, value = (part.strip() for part in each.partition("="))
+        if not equals:
+            raise ArgumentError(f"scene: expected arguments as {name}:NAME=VALUE,NAME=VALUE, got {each!r}")
+        key = _checks.known(f"scene {name}", key, inspect.signature(make).parameters)
+        for kind in (int, float, str):
+            try:
+                found[key] = kind(value)
+                break
+            except ValueError:
+                continue
+    return found
 
 
 #: A user's file, and a variable of it.

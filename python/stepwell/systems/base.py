@@ -19,6 +19,7 @@ from .inputs import Sampled
 
 if TYPE_CHECKING:
     from ..control import AnyControl, ConstraintControl, EnergyControl, Projection
+    from ..methods import Method
     from .inputs import Input
 
 #: A description as the core takes it: names with words, whole numbers, rows of numbers for each member (or one for all), and
@@ -226,6 +227,13 @@ class System(Fixed, Value, ABC):
 
     def _held_by(self, control: EnergyControl | Projection) -> Self:
         return changed(self, _free=self.uncontrolled, control=control, velocity_term="energy control")
+
+    def stepped_by(self, method: Method) -> Self:
+        """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
+        between = method.needs_acceleration
+        if getattr(self.control, "between", between) == between or self.control is None:
+            return self
+        return changed(self, control=changed(self.control, between=between))
 
     # What the transition-matrix form and the analysis ask of a linear system.
 

@@ -48,6 +48,11 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// Adaptive steps under a control whose push depends on the step, of a system too long for one tape.
+    #[error(
+        "control: with a tolerance a step that is too long for one list of operations goes with a projection or the printed form only"
+    )]
+    ControlTooLong,
     /// Arrays that do not fit together.
     #[error("{what}: expected {expected}, got {got}")]
     Shape {

@@ -107,6 +107,7 @@ impl Record {
             ("false_friends", Fact::Texts(self.false_friends)),
             ("order", Fact::Whole(Some(self.order as usize))),
             ("evaluations", Fact::Whole(Some(program.evaluations()))),
+            ("attempt_evaluations", Fact::Whole(Some(self.attempt().map_or(0, |attempt| attempt.evaluations())))),
             ("family", Fact::Text(self.family)),
             ("limit", Fact::Number(self.limit)),
             ("nodes", Fact::Numbers(program.nodes(self.needs == Needs::Rates))),

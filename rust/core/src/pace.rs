@@ -5,7 +5,7 @@
 use crate::{
     number::Number,
     program::Program,
-    system::{Block, System},
+    system::{Block, Energies, System},
 };
 
 /// A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
@@ -69,6 +69,8 @@ pub struct Pace<N> {
     pub extra_steps: N,
     /// The square of the last error over the tolerance.
     pub error: N,
+    /// The energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
+    pub work: N,
 }
 
 /// The next attempt: the length of the step, whether it is an extra one, and whether there is a step of the run itself to try.
@@ -102,12 +104,12 @@ impl Pace<f64> {
 
 impl<N: Number> Pace<N> {
     /// How many numbers it has.
-    pub const NUMBERS: usize = 19;
+    pub const NUMBERS: usize = 20;
 
     /// From its numbers.
-    pub fn of(numbers: [N; 19]) -> Self {
+    pub fn of(numbers: [N; 20]) -> Self {
         let [t, h, target, extra, held, relative, absolute, lasts, rest @ ..] = numbers;
-        let [v, y, begin, interval, until, before, most, accepted, rejected, extra_steps, error] = rest;
+        let [v, y, begin, interval, until, before, most, accepted, rejected, extra_steps, error, work] = rest;
         let longest = [v, y];
         Pace {
             t,
@@ -128,13 +130,14 @@ impl<N: Number> Pace<N> {
             rejected,
             extra_steps,
             error,
+            work,
         }
     }
 
     /// Its numbers.
-    pub fn numbers(&self) -> [N; 19] {
+    pub fn numbers(&self) -> [N; 20] {
         let Pace { t, h, target, extra, held, relative, absolute, lasts, longest: [v, y], .. } = *self;
-        let Pace { begin, interval, until, before, most, accepted, rejected, extra_steps, error, .. } = *self;
+        let Pace { begin, interval, until, before, most, accepted, rejected, extra_steps, error, work, .. } = *self;
         [
             t,
             h,
@@ -155,6 +158,7 @@ impl<N: Number> Pace<N> {
             rejected,
             extra_steps,
             error,
+            work,
         ]
     }
 
@@ -170,12 +174,14 @@ impl<N: Number> Pace<N> {
 }
 
 /// A system scaled to a step of 1, stretched to another.
-struct Stretched<'a, N: Number> {
-    s: &'a dyn System<N>,
-    h: N,
+pub struct Stretched<N: Number> {
+    /// The system.
+    pub s: Box<dyn System<N>>,
+    /// The step.
+    pub h: N,
 }
 
-impl<N: Number> System<N> for Stretched<'_, N> {
+impl<N: Number> System<N> for Stretched<N> {
     fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
         self.s.dv(t, v, y).map(|dv| self.h * dv)
     }
@@ -183,13 +189,26 @@ impl<N: Number> System<N> for Stretched<'_, N> {
     fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
         self.s.dy(t, v, y).map(|dy| self.h * dy)
     }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        let Energies { dv, kinetic, whole } = self.s.energies(v, y)?;
+        Some(Energies { dv: dv.map(|dv| self.h * dv), kinetic: self.h * kinetic, whole: self.h * whole })
+    }
 }
 
-/// One attempt at a step: the state goes on if its error is tolerated. `order` is that of the estimate. An extra step leaves
+/// How an attempt uses a system.
+pub struct Attempted<'a, N: Number> {
+    /// The rates for a step, under a control if there is one.
+    pub rates: &'a dyn Fn(N) -> Box<dyn System<N>>,
+    /// The system scaled to 1, under a projection if there is one.
+    pub projected: &'a dyn System<N>,
+}
+
+/// One attempt at a step: the state goes on, projected, if its error is tolerated. `order` is that of the estimate. An extra step leaves
 /// the pace as it is, and its state has to be put back.
 pub fn attempt<N: Number>(
     program: &Program,
-    s: &dyn System<N>,
+    system: &Attempted<N>,
     order: u32,
     pace: Pace<N>,
     budget: N,
@@ -197,11 +216,20 @@ pub fn attempt<N: Number>(
     y: &Block<N>,
 ) -> (Pace<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
-    let made = program.run(&Stretched { s, h: outlook.step }, pace.t, outlook.step, v, y);
+    let s = (system.rates)(outlook.step);
+    let mut made = program.run(s.as_ref(), pace.t, outlook.step, v, y);
     let lengths: Vec<N> = made.iter().map(length2).collect();
     let (next, took) = judge(&pace, order, [length2(v), length2(y)], &lengths, outlook);
+    made.truncate(2);
+    let (Some(new_y), Some(new_v)) = (made.pop(), made.pop()) else { return (next, v.clone(), y.clone()) };
+    let (new_v, new_y) = system.projected.project(new_v, new_y);
+    let pushed = s.tally().map(|tally| tally / outlook.step);
+    let next = match pushed.or(system.projected.tally()) {
+        Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
+        None => next,
+    };
     let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
-    (next, goes_on(&made[0], v), goes_on(&made[1], y))
+    (next, goes_on(&new_v, v), goes_on(&new_y, y))
 }
 
 /// What comes after an attempt, and whether the state goes on. Of both blocks: squares of the lengths of the old state and of what was made,

@@ -90,6 +90,19 @@ impl Entry {
         }
     }
 
+    /// The same of the blocks that are now at other places.
+    fn moved(self, to: impl Fn(Block) -> Block) -> Entry {
+        match self {
+            Entry::V | Entry::Y => self,
+            Entry::Dv(t, a, b) => Entry::Dv(t, to(a), to(b)),
+            Entry::Dy(t, a, b) => Entry::Dy(t, to(a), to(b)),
+            Entry::Velocity(a) => Entry::Velocity(to(a)),
+            Entry::Add(a, b) => Entry::Add(to(a), to(b)),
+            Entry::Sub(a, b) => Entry::Sub(to(a), to(b)),
+            Entry::Scale(c, a) => Entry::Scale(c, to(a)),
+        }
+    }
+
     /// Its key for equality. Numbers are compared by their bits.
     fn key(self) -> (u8, u64, u32, u32) {
         match self {
@@ -183,7 +196,29 @@ impl Program {
         let (v, y) = (write(Entry::V), write(Entry::Y));
         let results = method(Rates(()), Time(0.0), Length(1.0), v, y);
         let recording = RECORDING.replace(outer);
-        Program { entries: recording.entries, results }
+        Program { entries: recording.entries, results }.without_unused()
+    }
+
+    /// The same without entries that no result is made of, such as a stage that counts only in an estimate of the error. The state stays,
+    /// at its place.
+    fn without_unused(self) -> Program {
+        let mut used = vec![false; self.entries.len()];
+        used[..2].fill(true);
+        self.results.iter().for_each(|result| used[result.index()] = true);
+        for (i, entry) in self.entries.iter().enumerate().rev() {
+            if used[i] {
+                entry.operands().iter().for_each(|operand| used[operand.index()] = true);
+            }
+        }
+        let mut place = Vec::with_capacity(used.len());
+        let mut entries = Vec::with_capacity(used.len());
+        for (entry, used) in self.entries.into_iter().zip(used) {
+            place.push(Block(entries.len() as u32));
+            if used {
+                entries.push(entry.moved(|block| place[block.index()]));
+            }
+        }
+        Program { entries, results: self.results.into_iter().map(|result| place[result.index()]).collect() }
     }
 
     /// Number of evaluations of the rate of v.

@@ -122,7 +122,9 @@ impl Kind {
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
         controls::check(self, given, shape)?;
-        let around = [(controls::friction::is_given(given), "friction"), (controls::is_given(given), "energy control")];
+        // What a method carries in place of v would have to change with v.
+        let apart = controls::is_after_the_step(given) && method.carry.is_none();
+        let around = [(controls::friction::is_given(given), "friction"), (controls::is_given(given) && !apart, "energy control")];
         let term = (self.velocity_term)(given).or(around.into_iter().find_map(|(given, term)| given.then_some(term)));
         match term {
             Some(term) if method.needs == Needs::Acceleration => {

@@ -12,7 +12,7 @@ use crate::{
     large::{Facts, MAX_TAPE_OPERATIONS, group::Courses, tapes::Rated},
     method::Record,
     number::{Number, Symbol, record},
-    pace::{Pace, attempt},
+    pace::{Attempted, Pace, Stretched, attempt},
     program::Program,
     run::stage::Stage,
     spec::{Given, Parameters},
@@ -202,10 +202,21 @@ fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>
 
 fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let s = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
+    let scaled = |h: Symbol| (kind.symbols)(&parameters(given, h));
+    let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
+        if given.equations.is_some() {
+            return scaled(step); // the push of their control depends on the step
+        }
+        let stretched = Box::new(Stretched { s: scaled(Symbol::of(1.0)), h: step });
+        if controls::pushes(given) { controls::wrap(&parameters(given, step), stretched, Symbol::of(0.0)) } else { stretched }
+    };
+    let plain = scaled(Symbol::of(1.0));
+    let one = parameters(given, Symbol::of(1.0));
+    let projected = if controls::pushes(given) { plain } else { controls::wrap(&one, plain, Symbol::of(0.0)) };
+    let system = Attempted { rates: &rates, projected: projected.as_ref() };
     let numbers: [Symbol; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
     let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = attempt(program, s.as_ref(), order, Pace::of(numbers), budget, &v, &y);
+    let (pace, v, y) = attempt(program, &system, order, Pace::of(numbers), budget, &v, &y);
     let mut next = ids([&v, &y]);
     next.extend(pace.numbers().map(|symbol| symbol.0));
     next
@@ -294,9 +305,11 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
         }
         How::Method { name, .. } | How::Attempts { name } => {
             let rates = (kind(given)?.operations)(given);
+            let method = method(name)?;
+            let attempt = if matches!(how, How::Attempts { .. }) { method.attempt() } else { None };
             // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
             let controls = if controls::is_given(given) { 2 } else { 1 };
-            (controls * rates, controls * rates * method(name)?.program().evaluations())
+            (controls * rates, controls * rates * attempt.unwrap_or_else(|| method.program()).evaluations())
         }
     })
 }

@@ -1,5 +1,6 @@
 """A user's own equations: their function, run with the numbers of a state."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,12 @@ class Equations:
         self.equations = given.pop("equations()")
         self.gain, self.target = given.pop("control.gain", None), given.pop("control.target", None)
         self.given = given
+
+    def stretched(self, h: Any) -> "Equations":
+        """The same, scaled to another step, which may be one for each member: what a limited control pushes depends on it."""
+        other = copy.copy(self)
+        other.h = np.asarray(h)
+        return other
 
     def rates(self, t: float, v: Array, y: Array) -> tuple[Array, Array]:
         """v̇ and ẏ."""

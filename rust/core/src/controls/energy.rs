@@ -16,6 +16,8 @@ use crate::{
 pub struct Controlled<N: Number> {
     system: Box<dyn System<N>>,
     limited: bool,
+    /// Whether the push comes after each step instead of in its stages.
+    between: bool,
     gain: N,
     /// h times the energy to keep.
     target: N,
@@ -39,15 +41,24 @@ impl<N: Number> Controlled<N> {
     pub fn new(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Self {
         let limited = p.given.word("control.form") == "limited";
         let (gain, target) = (p.number("control.gain"), p.h * p.number("control.target"));
-        Controlled { system, limited, gain, target, work: Cell::new(tally) }
+        Controlled { system, limited, between: super::is_between(p.given), gain, target, work: Cell::new(tally) }
+    }
+
+    /// The push for a state, noted in the tally.
+    fn push(&self, energies: &Energies<N>) -> N {
+        let (g, taken) = push(self.limited, self.gain, energies.whole - self.target, energies.kinetic);
+        self.work.set(self.work.get() - taken);
+        g
     }
 }
 
 impl<N: Number> System<N> for Controlled<N> {
     fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        if self.between {
+            return self.system.dv(t, v, y);
+        }
         let Some(energies) = self.system.energies(v, y) else { return self.system.dv(t, v, y) };
-        let (g, taken) = push(self.limited, self.gain, energies.whole - self.target, energies.kinetic);
-        self.work.set(self.work.get() - taken);
+        let g = self.push(&energies);
         energies.dv.zip_map(v, |dv, v| dv - g * v)
     }
 
@@ -69,6 +80,15 @@ impl<N: Number> System<N> for Controlled<N> {
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         self.system.record(quantity, v, y)
+    }
+
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        if !self.between {
+            return (v, y);
+        }
+        let Some(energies) = self.system.energies(&v, &y) else { return (v, y) };
+        let g = self.push(&energies);
+        (v.map(|v| v - g * v), y)
     }
 
     fn tally(&self) -> Option<N> {

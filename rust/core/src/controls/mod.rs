@@ -1,12 +1,14 @@
 //! Controls and projections, which keep the energy near its target (§12, Appendix D).
 //!
-//! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage, so it works with every method.
+//! A *control* is a push −g·v on the velocities. It is added to the increment h·v̇ in every stage, so it works with every method in whose
+//! stages v and y belong to one time; with others it comes between steps.
 //! A *projection* returns the state to the target energy after the step. Both wrap any system that has
 //! an energy, and are a system themselves. Energies are scaled to the step, as everything is.
 //!
 //! Beside them [`force`] adds a force from outside, and [`friction`] Coulomb's friction.
 //!
-//! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`; or it is
+//! Given: the word `control` is `energy`, with the word `control.form`, the `control.gain` and the `control.target`, and the word
+//! `control.when`, `between`, if it comes between steps; or it is
 //! `projection`, with the word `control.way` and the `control.target`.
 
 pub mod energy;
@@ -26,6 +28,21 @@ pub fn is_given(given: &Given) -> bool {
     !given.word("control").is_empty()
 }
 
+/// Whether it pushes velocities in the stages of a step, and is no projection.
+pub fn pushes(given: &Given) -> bool {
+    given.word("control") == "energy" && !is_between(given)
+}
+
+/// Whether its push comes between steps: for methods in whose stages v and y belong to different times.
+fn is_between(given: &Given) -> bool {
+    given.word("control.when") == "between"
+}
+
+/// Whether it acts on the state after a step alone, and not in its stages.
+pub fn is_after_the_step(given: &Given) -> bool {
+    given.word("control") == "projection" || is_between(given)
+}
+
 /// An error if what is given around the system is wrong.
 pub fn check(kind: &Kind, given: &Given, shape: Shape) -> Result<(), Error> {
     force::check(given, shape)?;
@@ -40,6 +57,9 @@ pub fn check(kind: &Kind, given: &Given, shape: Shape) -> Result<(), Error> {
     let has_gradient = given.equations.as_ref().is_some_and(|equations| equations.has_gradient());
     if !has_energy && !has_gradient {
         return Err(given.unknown("control"));
+    }
+    if !matches!(given.word("control.when"), "" | "between") {
+        return Err(given.unknown("control.when"));
     }
     match (name, given.word(name)) {
         ("control.form", "limited" | "printed") => given.expect("control.gain", 1)?,

@@ -9,6 +9,7 @@ use super::{
     group::{Blocks, Courses},
 };
 use crate::{
+    controls,
     error::Error,
     isa::Level,
     pace::{Pace, judge, length2},
@@ -27,6 +28,8 @@ pub struct LargeAdaptive {
     /// The order of the estimate.
     order: u32,
     budget: f64,
+    /// Whether a control pushes in the stages; its tally is then times the step.
+    pushes: bool,
     pace: Pace<f64>,
 }
 
@@ -43,7 +46,8 @@ impl LargeAdaptive {
         let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
         let blocks = Blocks::new(courses, rates, traced.shape);
         let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);
-        Ok(LargeAdaptive { blocks, executor, order, budget, pace: Pace::of([0.0; Pace::<f64>::NUMBERS]) })
+        let pushes = controls::pushes(&traced.scene().given);
+        Ok(LargeAdaptive { blocks, executor, order, budget, pushes, pace: Pace::of([0.0; Pace::<f64>::NUMBERS]) })
     }
 }
 
@@ -88,6 +92,8 @@ impl AdaptiveBatch for LargeAdaptive {
             if !outlook.runs && !outlook.is_extra {
                 break;
             }
+            rates.set_step(outlook.step);
+            rates.tally_mut().fill(0.0);
             self.executor.run(&courses.step, rates.as_mut(), *sizes, self.pace.t, outlook.step, arena);
             // Results come in pairs: of velocities, of coordinates.
             let length = |i: usize, row: usize| length2(&arena[row * *stride..][..sizes[i % 2]]);
@@ -97,6 +103,11 @@ impl AdaptiveBatch for LargeAdaptive {
             if took {
                 for ((home, made), numbers) in [V, Y].into_iter().zip(&courses.step.results).zip(*sizes) {
                     arena.copy_within(made * *stride..made * *stride + numbers, home * *stride);
+                }
+                let (v, y) = arena.split_at_mut(*stride);
+                rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
+                if let (Some(done), false) = (rates.tally().first(), outlook.is_extra) {
+                    self.pace.work += if self.pushes { *done / outlook.step } else { *done };
                 }
             }
         }

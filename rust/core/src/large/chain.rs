@@ -49,7 +49,7 @@ impl Task for Pull<'_> {
 
 impl Rates for Chain {
     fn facts(&self) -> Facts {
-        Facts { second_order: true, reads_v: false }
+        Facts { second_order: true, reads_v: false, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {

@@ -13,17 +13,22 @@ pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
         return rates;
     }
     let control = match asked.given.word("control") {
-        "energy" => Control::Push { limited: asked.given.word("control.form") == "limited" },
+        "energy" => Control::Push {
+            limited: asked.given.word("control.form") == "limited",
+            between: controls::is_after_the_step(asked.given),
+        },
         _ => Control::Projection { nacozy: asked.given.word("control.way") == "nacozy" },
     };
     let (v, y) = (vec![0.0; asked.shape.v], vec![0.0; asked.shape.y]);
-    Box::new(ControlledRates { rates, control, h: asked.h, gain: 0.0, target: 0.0, work: [0.0], dv: v.clone(), along: (v, y) })
+    let step = asked.attempts.then_some(asked.h);
+    let (dv, along) = (v.clone(), (v, y));
+    Box::new(ControlledRates { rates, control, h: asked.h, step, gain: 0.0, target: 0.0, work: [0.0], dv, along })
 }
 
 /// How the energy is kept.
 #[derive(Clone, Copy)]
 enum Control {
-    Push { limited: bool },
+    Push { limited: bool, between: bool },
     Projection { nacozy: bool },
 }
 
@@ -31,6 +36,8 @@ struct ControlledRates {
     rates: Box<dyn Rates>,
     control: Control,
     h: f64,
+    /// In attempts at adaptive steps, the step of the attempt; rates are scaled to 1.
+    step: Option<f64>,
     gain: f64,
     /// h times the energy to keep.
     target: f64,
@@ -42,8 +49,13 @@ struct ControlledRates {
 
 impl Rates for ControlledRates {
     fn facts(&self) -> Facts {
-        let pushes = matches!(self.control, Control::Push { .. });
-        Facts { reads_v: pushes || self.rates.facts().reads_v, ..self.rates.facts() }
+        let pushes = matches!(self.control, Control::Push { between: false, .. });
+        let facts = self.rates.facts();
+        Facts { reads_v: pushes || facts.reads_v, stretched: pushes && self.step.is_some(), ..facts }
+    }
+
+    fn set_step(&mut self, step: f64) {
+        self.step = Some(step);
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
@@ -57,9 +69,14 @@ impl Rates for ControlledRates {
     }
 
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
-        let Control::Push { limited } = self.control else { return self.rates.dv(t, v, y, out) };
+        let Control::Push { limited, between: false } = self.control else { return self.rates.dv(t, v, y, out) };
         let Some([kinetic, whole]) = self.rates.energies(v, y, out) else { return self.rates.dv(t, v, y, out) };
-        let (g, taken) = energy::push(limited, self.gain, whole - self.target, kinetic);
+        let (mut kinetic, mut whole, mut target) = (kinetic, whole, self.target);
+        if let Some(step) = self.step {
+            (kinetic, whole, target) = (step * kinetic, step * whole, step * target);
+            out.iter_mut().for_each(|out| *out *= step);
+        }
+        let (g, taken) = energy::push(limited, self.gain, whole - target, kinetic);
         self.work[0] -= taken;
         for (out, v) in out.iter_mut().zip(v) {
             *out -= g * v;
@@ -75,11 +92,19 @@ impl Rates for ControlledRates {
     }
 
     fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
-        let Control::Projection { nacozy } = self.control else { return };
+        if let Control::Push { between: false, .. } = self.control {
+            return;
+        }
         self.rates.cache_forces(y);
         let Some([kinetic, whole]) = self.rates.energies(v, y, &mut self.dv) else { return };
         let off = whole - self.target;
-        if !nacozy {
+        if let Control::Push { limited, .. } = self.control {
+            let (g, taken) = energy::push(limited, self.gain, off, kinetic);
+            self.work[0] -= taken;
+            v.iter_mut().for_each(|v| *v -= g * *v);
+            return;
+        }
+        if let Control::Projection { nacozy: false } = self.control {
             let (factor, gained) = projection::scaling(off, kinetic);
             self.work[0] += gained;
             v.iter_mut().for_each(|v| *v *= factor);

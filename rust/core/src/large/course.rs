@@ -169,7 +169,8 @@ impl Plan {
                 }
                 _ => push(node),
             };
-            let is_rate = matches!(entry, Entry::Dv(..) | Entry::Dy(..)) && numbers > 0;
+            let is_rate = matches!(entry, Entry::Dy(..)) || matches!(entry, Entry::Dv(..)) && !facts.stretched;
+            let is_rate = is_rate && numbers > 0;
             let at = if goal == Goal::Attempt && is_rate { push(Node::Stretched(at)) } else { at };
             made.push((at, of_v));
         }

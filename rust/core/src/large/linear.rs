@@ -70,7 +70,7 @@ impl Linear {
 
 impl Rates for Linear {
     fn facts(&self) -> Facts {
-        Facts { second_order: false, reads_v: true }
+        Facts { second_order: false, reads_v: true, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {

@@ -39,6 +39,8 @@ pub struct Facts {
     pub second_order: bool,
     /// v̇ depends on v.
     pub reads_v: bool,
+    /// The rate of v comes times the step of an attempt, which was told by [`Rates::set_step`].
+    pub stretched: bool,
 }
 
 /// The rates of some members, times the step for which they were made.
@@ -53,6 +55,9 @@ pub trait Rates: Send + Sync {
 
     /// What is known of the rates.
     fn facts(&self) -> Facts;
+
+    /// The step of the attempt that comes, for rates that depend on it.
+    fn set_step(&mut self, _step: f64) {}
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
@@ -121,6 +126,8 @@ pub struct Asked<'a> {
     pub machine: Machine,
     /// The step to which rates are scaled.
     pub h: f64,
+    /// Whether they are asked for by attempts at adaptive steps.
+    pub attempts: bool,
 }
 
 /// Rates of one member by a kernel that is written by hand.

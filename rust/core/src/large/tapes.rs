@@ -120,7 +120,7 @@ impl Rated {
         };
         Ok(Rated {
             shape,
-            facts: Facts { second_order, reads_v },
+            facts: Facts { second_order, reads_v, stretched: false },
             tally: controls::is_given(given),
             dv: if shape.v > 0 { stage(&dv) } else { None },
             dy: if second_order { None } else { stage(&dy) },

@@ -111,7 +111,8 @@ impl Model<'_> {
     }
 
     fn asked(&self, traced: &Traced, machine: Machine, h: f64) -> Asked<'_> {
-        Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h }
+        let attempts = matches!(self.scene.how, How::Attempts { .. });
+        Asked { given: &self.scene.given, shape: traced.shape, record: &self.scene.record, machine, h, attempts }
     }
 
     /// A group that steps it, in a run of so many members and of so many steps of members in all.
@@ -143,8 +144,15 @@ impl Model<'_> {
         budget: f64,
     ) -> Result<Box<dyn AdaptiveBatch>, Error> {
         let (spec, level) = (&self.spec, machine.level);
+        let given = &self.scene.given;
         let rates: Box<dyn Rates> = match self.way(traced, machine, members, 0.0) {
             Way::Tape | Way::Matrix => return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?)),
+            // Tapes of rates are scaled to a step of 1, and what a control pushes depends on the step.
+            _ if given.equations.as_ref().is_some_and(|equations| equations.reads_step()) => return Err(Error::ControlTooLong),
+            Way::Rates(_) if controls::pushes(given) => match system::kind(&given.system).and_then(|kind| kind.long) {
+                Some(long) => large::single(long, &self.asked(traced, machine, NO_CLOCK.h)),
+                None => return Err(Error::ControlTooLong),
+            },
             // Rates are asked for at one time, so a large member goes alone.
             way => match (way, self.way(traced, machine, 1, 0.0)) {
                 (Way::Long(long), _) | (_, Way::Long(long)) => large::single(long, &self.asked(traced, machine, NO_CLOCK.h)),

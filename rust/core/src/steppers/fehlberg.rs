@@ -32,8 +32,8 @@ pub const RECORD: Record = Record {
     estimate: Some(Estimate { order: 5, error, coarse: None }),
     section: "§12",
     reference: "E. Fehlberg, Low-order classical Runge-Kutta formulas with stepsize control, NASA TR R-315 (1969)",
-    about: "Six evaluations; advances with the fourth-order result and estimates its error by the fifth-order one \
-            (tolerance=). It slowly adds energy to an undamped oscillator at every small step, r₁² = 1 + 0.0053·Φ⁶, and \
+    about: "Advances with the fourth-order result, by five evaluations; with tolerance= a sixth estimates its error by the \
+            fifth-order one. It slowly adds energy to an undamped oscillator at every small step, r₁² = 1 + 0.0053·Φ⁶, and \
             damps it only for Φ between 2.374 and 3.202. Use Merson there. Local extrapolation is fehlberg_5.",
     step,
 };

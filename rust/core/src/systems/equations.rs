@@ -125,6 +125,12 @@ impl Equations {
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
     }
 
+    /// Whether a rate depends on the step, as the limited form of a control does.
+    pub fn reads_step(&self) -> bool {
+        let needed = self.needed(&self.dv.iter().chain(self.dy.iter().flatten()).copied().collect::<Vec<_>>());
+        self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::Step))
+    }
+
     /// Which operations these values depend on.
     fn needed(&self, roots: &[Id]) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];

@@ -151,7 +151,7 @@ impl Bodies {
 
 impl Rates for Bodies {
     fn facts(&self) -> Facts {
-        Facts { second_order: true, reads_v: false }
+        Facts { second_order: true, reads_v: false, stretched: false }
     }
 
     fn prepare(&mut self, spec: &Spec, first: usize, _count: usize) {
