@@ -76,7 +76,10 @@ def test_every_method_on_every_system(name: str) -> None:
         if fits(system, method):
             tape = Tape()
             symbols = Tracer(system, tape).step(method)
-            expected = method.steps.step(system.scaled(H, system.batch), T, H, v, y)
+            s = system.scaled(H, system.batch)
+            expected = method.steps.step(s, T, H, v, y)
+            if hasattr(s, "project"):
+                expected = s.project(*expected)
             assert_computes(numbers(system, tape, symbols, v, y), *expected)
 
 

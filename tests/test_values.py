@@ -65,7 +65,28 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Oscillator(a=sw.Sampled([1.0, 2.0], 0.1)),
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
+    "Pendulum3D": [
+        sw.Pendulum3D,
+        lambda: sw.Pendulum3D(2.0),
+        lambda: sw.Pendulum3D(gravity=[1.0, 2.0]),
+        lambda: (
+            sw.integrate(sw.Pendulum3D(), "rk4", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=1, control=sw.LengthControl(0.1)).system
+        ),
+        lambda: (
+            sw.integrate(
+                sw.Pendulum3D(), "rk4", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=1, control=sw.Projection("length")
+            ).system
+        ),
+    ],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
+    "Rods": [
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [(1, 0)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, dim=2),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], [1.0, 2.0], gravity=0.0),
+    ],
     "Chain": [
         lambda: sw.Chain(3),
         lambda: sw.Chain(4),

@@ -166,7 +166,12 @@ def _of_run(name: str) -> Callable[..., Any]:
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Oscillator": (sw.Oscillator, {"omega": 1.0, "damping": 0.1, "x": 0.0, "a": 0.0, "form": "physical"}),
     "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
+    "Pendulum3D": (sw.Pendulum3D, {"length": 1.0, "gravity": 1.0}),
     "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
+    "Rods": (
+        sw.Rods,
+        {"masses": [1.0, 1.0], "rods": [((0.0, 0.0), 0), (0, 1)], "lengths": [1.0, 1.0], "gravity": 1.0, "dim": 2},
+    ),
     "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
     "LinearSystem": (
         sw.LinearSystem,
@@ -201,6 +206,11 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "integrate bodies": (
         sw.integrate,
         BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
+    ),
+    "integrate rods": (
+        sw.integrate,
+        {"system": sw.Rods([1.0, 1.0], [(0, 1)], 1.0), "method": "rk4", "v": 0.0, "y": [[0.0, 0.0], [1.0, 0.0]], "dt": 0.1}
+        | {"steps": 10, "record": ["length_error"], "control": sw.LengthControl(0.5)},
     ),
     "integrate Verlet": (
         sw.integrate,

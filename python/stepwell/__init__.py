@@ -16,7 +16,19 @@ from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, Stepwell
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
+from .systems import (
+    Chain,
+    LinearSystem,
+    NBody,
+    Oscillator,
+    Pendulum,
+    Pendulum3D,
+    RestrictedThreeBody,
+    Rods,
+    Sampled,
+    Sinusoid,
+    System,
+)
 from .world import World
 
 if TYPE_CHECKING:
@@ -47,8 +59,10 @@ __all__ = [
     "NormControl",
     "Oscillator",
     "Pendulum",
+    "Pendulum3D",
     "Projection",
     "RestrictedThreeBody",
+    "Rods",
     "Run",
     "Sampled",
     "Scene",

@@ -7,7 +7,9 @@ from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
 from .pendulum import Pendulum
+from .pendulum_3d import Pendulum3D
 from .restricted_three_body import RestrictedThreeBody
+from .rods import Rods
 
 __all__ = [
     "Chain",
@@ -15,7 +17,9 @@ __all__ = [
     "NBody",
     "Oscillator",
     "Pendulum",
+    "Pendulum3D",
     "RestrictedThreeBody",
+    "Rods",
     "Sampled",
     "Sinusoid",
     "System",
