@@ -241,7 +241,8 @@ def _ends(given: Any, points: int) -> tuple[tuple[End, End], ...]:
 
 def _end(argument: str, end: Any, points: int) -> End:
     """The number of a point, or an anchor."""
-    if isinstance(end, Iterable) and not isinstance(end, (str, bytes)) and np.shape(end) != ():
+    is_text_or_number = isinstance(end, (str, bytes)) or getattr(end, "shape", None) == ()
+    if isinstance(end, Iterable) and not is_text_or_number:
         anchor = _checks.numbers(argument, end)
         if anchor.ndim != 1 or len(anchor) not in (2, 3):
             raise ShapeError(f"{argument}: expected an anchor of 2 or 3 coordinates, got shape {anchor.shape}")
