@@ -237,6 +237,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
+    "scenes.conical_pendulum": (sw.scenes.conical_pendulum, {"angle": 60.0}),
+    "scenes.double_pendulum": (sw.scenes.double_pendulum, {"angles": [120.0, 150.0]}),
+    "scenes.triple_pendulum": (sw.scenes.triple_pendulum, {"angles": [90.0, 120.0, 150.0]}),
     "scenes.energy_control": (sw.scenes.energy_control, {"pair": "matching", "eps": 0.01, "form": "limited"}),
     "scenes.forced_oscillator": (
         sw.scenes.forced_oscillator,
