@@ -310,6 +310,16 @@ def test_what_the_reference_does_not_know_is_nan():
         assert np.isnan(error).tolist() == [False, False, False, True]
 
 
+def test_the_last_step_to_the_end_of_what_is_known_is_known():
+    """10 000 steps of a ten-thousandth of 24.15 end an ulp later than 24.15."""
+    scene = dataclasses.replace(sw.scenes.clover(), horizon=24.15, until=24.15)
+    run = scene.run("rk4", 24.15 / 10_000)
+    assert run.t[-1] > 24.15
+    assert np.isfinite(scene.state_error(run)).all()
+    later = scene.run("rk4", 24.15 / 10_000, steps=10_001)
+    assert np.isnan(scene.state_error(later)).all()
+
+
 @pytest.mark.parametrize(
     ("amplitude", "period"), [(10.0, 6.2951685236990721787), (90.0, 7.4162987092054876737), (170.0, 15.326967999136584745)]
 )

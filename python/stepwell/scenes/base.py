@@ -21,6 +21,9 @@ from ..result import Run
 from ..systems import System
 from ..systems.base import a_system
 
+#: The last step of a run that ends at ``until`` may be later by this share: h is a rounded quotient, and k·h a rounded product.
+ROUNDING_OF_TIME = 2.0**-51
+
 #: How many times of the horizon give the exact solution's scale.
 SCALE_SAMPLES = 1001
 
@@ -238,7 +241,7 @@ class Scene(Value):
             if not np.isfinite(block).all():
                 wrong = t[~np.isfinite(block).reshape(len(t), -1).all(axis=1)][0]
                 raise NotFiniteError(f"exact: expected finite numbers, got {name} = {block[t == wrong][0]} at t = {wrong:g}")
-        return (v, y), t <= self.until
+        return (v, y), t <= self.until * (1.0 + ROUNDING_OF_TIME)
 
     def _energy(self, v: Array, y: Array) -> Array:
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
