@@ -256,7 +256,7 @@ def test_the_answer_is_that_of_most_gains() -> None:
 
 
 def test_rods_from_rest_are_measured_against_a_tight_run() -> None:
-    """A start at rest has no kinetic energy: the largest of the true motion is the scale. Without one, there is no state error."""
+    """At rest there is no kinetic energy: the largest of the true motion is the scale. Without one there is no state error."""
     chart = sw.charts.control("double_pendulum", ["rk4"], horizon=3.0, evaluations=600, relative=[0.5])
     assert chart.exact
     assert chart.line("rk4", "length").state_error < 1e-3

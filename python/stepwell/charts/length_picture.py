@@ -36,7 +36,7 @@ def draw(chart: ControlSweep) -> Figure:
     from matplotlib import rc_context
 
     with rc_context(FONT):
-        places = {"left": 0.075, "right": 0.985, "bottom": 0.16, "top": 0.795, "wspace": 0.07, "hspace": 0.2}
+        places = {"left": 0.075, "right": 0.985, "bottom": 0.16, "top": 0.765, "wspace": 0.07, "hspace": 0.2}
         panels = figure.subplots(2, count, squeeze=False, sharex=True, sharey="row", gridspec_kw=places)
         for i, evaluations in enumerate(chart.evaluations):
             _column(panels[:, i], chart, evaluations)
