@@ -25,8 +25,11 @@ RESETTING: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.6, "marker
 #: Height of the row of a method in the strip of diverged runs, and the first above the frame, as shares of the frame's height.
 ROW, FIRST = 0.038, 0.03
 
-#: Letters of a line of the title.
-LINE = 112
+#: Letters of a line of the title, its height, where what is below it begins, and the height of the name of a column.
+LINE, LINE_HEIGHT, HEAD, COLUMN_TITLE = 112, 0.036, 0.93, 0.035
+
+#: Columns of the legend, the height of a row of it, and the lower end of the panels without any.
+LEGEND_COLUMNS, LEGEND_ROW, BOTTOM = 6, 0.027, 0.138
 
 
 def draw(chart: ControlSweep) -> Figure:
@@ -36,25 +39,31 @@ def draw(chart: ControlSweep) -> Figure:
     from matplotlib import rc_context
 
     with rc_context(FONT):
-        places = {"left": 0.075, "right": 0.985, "bottom": 0.16, "top": 0.765, "wspace": 0.07, "hspace": 0.2}
+        head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
+        strip = FIRST + ROW * len(_firsts(chart))
+        gap = strip + 0.02
+        # Two frames, each with its strip above, below the title and the name of the column.
+        share = strip / (2.0 + gap)
+        bottom = BOTTOM + LEGEND_ROW * -(-(len(_firsts(chart)) + 2) // LEGEND_COLUMNS)
+        top = (HEAD - LINE_HEIGHT * len(head) - COLUMN_TITLE + share * bottom) / (1.0 + share)
+        places = {"left": 0.075, "right": 0.985, "bottom": bottom, "top": top, "wspace": 0.07, "hspace": gap}
         panels = figure.subplots(2, count, squeeze=False, sharex=True, sharey="row", gridspec_kw=places)
         for i, evaluations in enumerate(chart.evaluations):
-            _column(panels[:, i], chart, evaluations)
+            _column(panels[:, i], chart, evaluations, strip)
         what = "state_error" if chart.exact else "energy_error"
         panels[0, 0].set_ylabel("error of the last state, relative" if chart.exact else "largest |E − E₀|, relative")
         panels[1, 0].set_ylabel("largest error of a length")
         _limits(panels[0, 0], chart, what)
         _limits(panels[1, 0], chart, "length_error")
-        head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
         for i, line in enumerate(head):
-            figure.text(0.012, 0.953 - 0.036 * i, line, size=18, weight="bold")
+            figure.text(0.012, 0.953 - LINE_HEIGHT * i, line, size=18, weight="bold")
         about = f"{chart.title}, {chart.horizon:.5g} units of time; each column is another step, the finer to the right"
-        figure.text(0.012, 0.953 - 0.034 * len(head), about, size=13.5, color=GREY)
+        figure.text(0.012, 0.956 - LINE_HEIGHT * len(head), about, size=13.5, color=GREY)
         _legend(figure, chart)
     return figure
 
 
-def _column(panels: Any, chart: ControlSweep, evaluations: int) -> None:
+def _column(panels: Any, chart: ControlSweep, evaluations: int, strip: float) -> None:
     """One number of evaluations: the state's error above, that of the lengths below."""
     above, below = panels
     methods = list(dict.fromkeys(line.method.name for line in chart.lines))
@@ -69,7 +78,7 @@ def _column(panels: Any, chart: ControlSweep, evaluations: int) -> None:
             reset = kinds.get("length")
             if reset is not None and what != "length_error" and np.isfinite(getattr(reset, what)[0]):
                 axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(look(reset.method) | RESETTING))
-    above.set_title(f"{evaluations} function evaluations", size=13.5, loc="left", pad=8 + 11 * len(methods))
+    above.text(0.0, 1.0 + strip, f"{evaluations} function evaluations", size=13.5, transform=above.transAxes)
     below.set_xlabel("gain c of the control")
 
 
@@ -103,7 +112,7 @@ def _legend(figure: Figure, chart: ControlSweep) -> None:
     labels = [line.method.title for line in _firsts(chart)]
     handles += [Line2D([], [], color=GREY, **CONTROL), Line2D([], [], color=GREY, **RESETTING)]
     labels += ["under control", "lengths reset after every step"]
-    figure.legend(handles, labels, frameon=False, loc="lower left", bbox_to_anchor=(0.005, 0.042), ncols=7)
+    figure.legend(handles, labels, frameon=False, loc="lower left", bbox_to_anchor=(0.005, 0.042), ncols=LEGEND_COLUMNS)
     note = (
         "Where a solid line is below the dashed one of its colour, control is better. Marks above a frame: the run diverged. "
         "Reset lengths are exact to rounding, and not drawn."

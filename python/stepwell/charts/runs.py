@@ -47,7 +47,7 @@ class RunPicture(Drawn, Value):
 
     @property
     def kind(self) -> str:
-        """What is drawn: ``"orbits"`` of bodies or the points of rods, ``"swing"`` of one coordinate, or ``"rows"`` of several."""
+        """What is drawn: ``"orbits"`` of bodies or points of rods, ``"swing"`` of one coordinate, or ``"rows"`` of several."""
         if isinstance(self.run.system, (NBody, Rods)):
             return "orbits"
         return "rows" if self.scene.system.y_shape else "swing"
