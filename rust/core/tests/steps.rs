@@ -124,6 +124,17 @@ fn systems() -> Vec<Given> {
     all.push(given("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
     all.push(given("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
     all.push(given("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
+    for (words, strength) in [(&[][..], 0), (&[("keeps", "control")], 1), (&[("keeps", "projection")], 0)] {
+        let numbers = [("length", 1), ("gravity", 1), ("strength", strength)];
+        all.push(given("pendulum_3d", words, &[], if strength == 1 { &numbers } else { &numbers[..2] }, &[]));
+        // Three points: the first on an anchor, a chain of two from it, and a loop between the last two and the first.
+        let ends = [[3, 0], [0, 1], [2, 1], [0, 2]];
+        let names: Vec<[String; 2]> = (0..4).map(|k| [0, 1].map(|end| format!("rods[{k}][{end}]"))).collect();
+        let mut wholes = vec![("dim", 3), ("rods", 4)];
+        wholes.extend(names.iter().flatten().map(String::as_str).zip(ends.into_iter().flatten()));
+        let numbers = [("masses", 3), ("lengths", 4), ("anchors", 3), ("gravity", 1), ("strength", strength)];
+        all.push(given("rods", words, &wholes, if strength == 1 { &numbers } else { &numbers[..4] }, &[]));
+    }
     for n in [1, 4] {
         all.push(given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
     }
