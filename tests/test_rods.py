@@ -451,6 +451,22 @@ def test_a_world_and_pieces_are_the_run(control: Any) -> None:
     assert not np.array_equal(fused[0].y[-1], whole.y[-1])
 
 
+@pytest.mark.parametrize("control", [CONTROL, RESETTING], ids=repr)
+def test_an_exported_step_and_its_explanation_have_the_control(control: Any) -> None:
+    """Without a state, which neither needs; the numbers of a step in plain Python are those of the run."""
+    scope: dict[str, Any] = {}
+    exec(sw.export(TWO, "rk4", "python", dt=0.01, control=control, name="swing").source, scope)
+    swing = scope["Swing"]()
+    state = swing.start([0.0] * 4, hanging(1.0, 2.0).reshape(-1).tolist())
+    for _ in range(20):
+        swing.step(state)
+    run = sw.integrate(TWO, "rk4", v=0.0, y=hanging(1.0, 2.0), dt=0.01, steps=20, control=control)
+    assert (state.v, state.y) == (run.v[-1].reshape(-1).tolist(), run.y[-1].reshape(-1).tolist())
+    plain, kept = (sw.explain(TWO, "rk4", control=each) for each in (None, control))
+    assert sum(kept.computed.values()) > sum(plain.computed.values())
+    assert ("2·c" in str(kept)) == (control is CONTROL)
+
+
 def test_a_long_chain_has_no_term_too_many() -> None:
     """Neighbours only are coupled: a rod more costs as much each time, and a step too long for one tape is done in parts."""
     counts = []
