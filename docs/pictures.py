@@ -171,3 +171,4 @@ if __name__ == "__main__":
     periods: dict[str, Any] = {"horizon": 100 * eight.period, "evaluations": 100_000}
     write("control-figure-eight.png", sw.charts.control(eight, **periods, title="Figure-eight, 100 periods").plot())
     write("control-appendix-d.png", sw.charts.control("energy_control", title="Appendix D").plot())
+    write("control-rods.png", sw.charts.control("conical_pendulum").plot())

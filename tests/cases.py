@@ -95,6 +95,9 @@ SYSTEMS: dict[str, Make] = {
     "pendulum, sinusoids a of one frequency": lambda r, b: sw.Pendulum(
         _omega(r, b), 0.2, a=sw.Sinusoid(r.normal(size=b), 2.0, 0.3)
     ),
+    "pendulum in space": lambda r, b: sw.Pendulum3D(r.uniform(0.5, 2.0, b), r.uniform(0.5, 2.0, b)),
+    "pendulum in space, length control": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.LengthControl(0.5), (b,)),
+    "pendulum in space, length projection": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.Projection("length"), (b,)),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
     "top, free": lambda r, b: sw.RigidBody(_moments(r, b)),
@@ -131,6 +134,16 @@ SYSTEMS: dict[str, Make] = {
     "linear, no velocities": lambda r, b: sw.LinearSystem(_gentle(r, 3), np.ones((3, 1)), x=_held(r, b), velocities=0),
     "linear, velocities only": lambda r, b: sw.LinearSystem(_gentle(r, 4, b), velocities=4),
     "linear, masses": _masses,
+    "rods, two hanging": lambda r, b: sw.Rods(
+        [1.0, 2.0], [((0.0, 0.0), 0), (0, 1)], r.uniform(0.5, 2.0, b)[None] * [[1.0], [0.7]]
+    ),
+    "rods, three hanging in space, length control": lambda r, b: sw.Rods(
+        r.uniform(0.5, 2.0, (3, b)), [((0.0, 0.0, 0.5), 0), (0, 1), (2, 1)], 1.0
+    ).under(sw.LengthControl(0.4), (b,)),
+    "rods, two between anchors, length projection": lambda r, b: sw.Rods(
+        [1.0, 1.5], [(0, (-1.0, 0.0)), (0, 1), (1, (1.5, 0.5))], [1.0, 1.2, 0.8], gravity=r.uniform(0.5, 2.0, b)
+    ).under(sw.Projection("length"), (b,)),
+    "rods, a triangle": lambda r, b: sw.Rods(r.uniform(0.5, 2.0, (3, b)), [(0, 1), (1, 2), (2, 0)], 1.0, dim=3),
     "own: Duffing": lambda r, b: own.duffing(beta=r.uniform(0.1, 1.0, b), omega=_omega(r, b)).sized(),
     "own: Lorenz": lambda r, b: own.lorenz(rho=r.uniform(0.5, 1.5, b)).sized(),
     "own: pendulum": lambda r, b: own.pendulum(omega=_omega(r, b)).sized(),
@@ -151,6 +164,13 @@ SYSTEMS: dict[str, Make] = {
 ADAPTIVE = [name for name, make in SYSTEMS.items() if make(np.random.default_rng(0), 1).rubbing is None]
 
 
+def _apart(system: sw.System) -> Any:
+    """Places for the points of rods, about as far from each other and from the origin as the rods are long."""
+    i, *_ = np.ogrid[: system.y_shape[0], 0:1] if len(system.y_shape) > 1 else np.ogrid[0:1, 0:1]
+    places = np.concatenate([np.cos(2.0 * i), np.sin(2.0 * i), 0.3 * i], axis=1)[:, : system.y_shape[-1]]
+    return places.reshape(*system.y_shape, 1)
+
+
 @dataclass(frozen=True)
 class Case:
     """One method, one system, one form, one way to start."""
@@ -165,6 +185,8 @@ class Case:
         rng = np.random.default_rng([seed, b])
         system = SYSTEMS[self.system](rng, b)
         v, y = (rng.normal(size=(*shape, b)) for shape in (system.v_shape, system.y_shape))
+        if system.constraint == "length":
+            v, y = 0.02 * v, 0.15 * y + _apart(system)  # v along a rod would shorten it until it has no direction
         return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
 
     def run(self, b: int, seed: int = 0, **options: Any) -> sw.Run:

@@ -46,7 +46,7 @@ def same(a: sw.Run, b: sw.Run) -> None:
 )
 def test_equals_the_reference(name: str, method: str) -> None:
     rng = np.random.default_rng(5)
-    system = SYSTEMS[name](rng, MEMBERS)
+    system = SYSTEMS[name](rng, MEMBERS).uncontrolled
     ask: dict[str, Any] = {"tolerance": 10.0 ** rng.uniform(-9, -2, MEMBERS), "at": [0.0, 0.11, 0.5, 0.53], "max_steps": 300}
     ask |= start(system, rng)
     if name.startswith("thirty-five"):

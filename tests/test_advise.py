@@ -36,6 +36,7 @@ SLOW = {
     "aircraft": (1e-2, 1e-4),
     "arenstorf": (1e-2, 1e-5),
     "chain": (1e-3,),
+    "double_pendulum": (1e-2,),
     "dzhanibekov": (1e-1, 1e-3),
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
@@ -48,6 +49,7 @@ SLOW = {
     # No adaptive steps to compare with, and errors that jump from step to step: test_friction.py has the advice for one.
     "sliding_block": (),
     "sticking_block": (),
+    "triple_pendulum": (1e-2,),
 }
 CASES = {scene.name: TOLERANCES if scene.name in QUICK else SLOW.get(scene.name, TOLERANCES) for scene in sw.scenes.scenes()}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import math
 import sys
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell import cli
 from stepwell.charts import ControlSweep
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
 
@@ -185,3 +187,139 @@ def test_false_euler_keeps_what_scaling_breaks() -> None:
     # Kicks go along r and drifts along v, so r × v is kept to rounding, 20 000 times 1e-16 of 0.44.
     assert moments[0] < 1e-11
     assert moments[1] > 1e-3
+
+
+# ---- rods: control of the lengths, or resetting
+
+
+C = (0.05, 0.5, 3.0)
+
+
+@pytest.fixture(scope="module")
+def cone() -> ControlSweep:
+    return sw.charts.control("conical_pendulum", ["false_euler", "rk4", "pefrl"], relative=C, evaluations=[2400, 600])
+
+
+@pytest.mark.parametrize("kind", ["none", "control", "length"])
+def test_numbers_of_rods_are_those_of_single_runs(cone: ControlSweep, kind: str) -> None:
+    scene = sw.scenes.conical_pendulum()
+    assert cone.evaluations == (600, 2400)
+    for method, evaluations in (("false_euler", 600), ("rk4", 2400)):
+        line = cone.line(method, kind, evaluations)
+        assert line.steps == 600
+        assert line.dt == scene.horizon / 600
+        for i, gain in enumerate(line.relative):
+            control: Any = {"none": None, "length": sw.Projection("length")}.get(kind)
+            if kind == "control":
+                control = sw.LengthControl(gain)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                run = scene.run(method, line.dt, every=1, control=control, record="length_error")
+            if run.status:
+                assert line.first_bad_step[i] == run.first_bad_step
+                assert line.state_error[i] == line.length_error[i] == math.inf
+                continue
+            assert line.state_error[i] == pytest.approx(scene.state_error(run)[-1], rel=1e-12, abs=1e-15)
+            assert line.length_error[i] == run.recorded["length_error"].max()
+            kinetic = 0.5 * (scene.v**2).sum()
+            assert line.energy_error[i] == pytest.approx(np.abs(run.energy - run.energy[0]).max() / kinetic, rel=1e-9)
+
+
+def test_the_document_s_question_is_answered(cone: ControlSweep) -> None:
+    """§12 supposes that control is better than resetting. For False Euler it is, at every gain below its limit; not for RK4."""
+    assert cone.better == {"false_euler": (True, True), "rk4": (False, False)}
+    assert cone.answer == (
+        "Rods under control, or reset after every step: control is better for False Euler; resetting is better for Runge-Kutta 4"
+    )
+    for evaluations in cone.evaluations:
+        held, reset = (cone.line("false_euler", kind, evaluations) for kind in ("control", "length"))
+        assert (held.state_error[:2] < reset.state_error).all()
+        assert held.diverged.tolist() == [False, False, True]
+        assert reset.length_error < 1e-15
+    assert set(cone.refused) == {("pefrl", kind) for kind in ("none", "control", "length")}
+    with pytest.raises(ArgumentError, match=r"evaluations: expected one of \[600, 2400\], got 7"):
+        cone.line("rk4", "control", 7)
+
+
+def test_the_answer_is_that_of_most_gains() -> None:
+    """Exchanged results give the exchanged answer, and a mixture says that it depends."""
+    chart = sw.charts.control("conical_pendulum", ["false_euler"], relative=[0.3, 0.5], evaluations=[600, 1200])
+    lines = list(chart.lines)
+    where = {(line.kind, line.steps): i for i, line in enumerate(lines)}
+    i, j = where["control", 600], where["length", 600]
+    swapped = dataclasses.replace(lines[j], state_error=lines[j].state_error * 1e-9)
+    lines[j] = swapped
+    mixed = dataclasses.replace(chart, lines=tuple(lines))
+    assert mixed.better == {"false_euler": (False, True)}
+    assert mixed.answer.endswith("for False Euler it depends on the step")
+    assert i != j
+
+
+def test_rods_from_rest_are_measured_against_a_tight_run() -> None:
+    """At rest there is no kinetic energy: the largest of the true motion is the scale. Without one there is no state error."""
+    chart = sw.charts.control("double_pendulum", ["rk4"], horizon=3.0, evaluations=600, relative=[0.5])
+    assert chart.exact
+    assert chart.line("rk4", "length").state_error < 1e-3
+    assert chart.line("rk4", "length").energy_error < 1e-3
+    pendulum: dict[str, Any] = {"v": [0.0, 0.5, 0.0], "y": [1.0, 0.0, 0.0], "horizon": 5.0, "evaluations": 500, "relative": [0.5]}
+    unknown = sw.charts.control(sw.Pendulum3D(), ["rk4"], **pendulum)
+    assert np.isnan(unknown.line("rk4", "control").state_error).all()
+    assert (unknown.better, unknown.answer) == ({}, "")
+    assert unknown.plot().axes[0].get_ylabel() == "largest |E − E₀|, relative"
+
+
+def test_files_and_the_picture_of_rods(cone: ControlSweep, tmp_path: Path) -> None:
+    cone.to_csv(tmp_path / "c.csv")
+    with (tmp_path / "c.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    # Two methods with two steps: three gains, and two single runs.
+    assert len(rows) == 2 * 2 * (3 + 2)
+    read = [float(row["length_error"]) for row in rows if (row["method"], row["kind"]) == ("rk4", "control")]
+    assert read == [*cone.line("rk4", "control", 600).length_error, *cone.line("rk4", "control", 2400).length_error]
+    cone.to_json(tmp_path / "c.json")
+    whole = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
+    assert whole["answer"] == cone.answer
+    assert whole["better"] == {"false_euler": [True, True], "rk4": [False, False]}
+    assert whole["evaluations"] == [600, 2400]
+    figure = cone.plot(tmp_path / "c.png")
+    assert (tmp_path / "c.png").stat().st_size > 10_000
+    assert cone.answer in " ".join(text.get_text() for text in figure.texts)
+    above, below = figure.axes[0], figure.axes[2]
+    assert (above.get_ylabel(), below.get_ylabel()) == ("error of the last state, relative", "largest error of a length")
+    # Resetting is a level line above, and is not drawn below; what diverged is above the frame.
+    level = [line for line in above.lines if np.ptp(np.asarray(line.get_ydata(), dtype=float)) == 0 and line.get_clip_on()]
+    assert [float(np.asarray(line.get_ydata())[0]) for line in level] == [
+        cone.line(name, "length", 600).state_error[0] for name in ("false_euler", "rk4")
+    ]
+    lost = [line for line in above.lines if not line.get_clip_on()]
+    assert [np.asarray(line.get_xdata()).tolist() for line in lost] == [[3.0], [3.0]]
+
+
+def test_the_command_line_makes_the_chart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["control", "conical_pendulum", "-o", str(tmp_path), "--methods", "false_euler,rk4", "--gains", "0.1,0.5"]
+    assert cli.main([*words, "--evaluations", "600", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["answer"].endswith("control is better for False Euler; resetting is better for Runge-Kutta 4")
+    assert all(Path(file).stat().st_size > 100 for file in told["files"])
+    assert [row["kind"] for row in told["summary"]] == ["none", "control", "length"] * 2
+    assert cli.main([*words, "--evaluations", "300"]) == 0
+    out = capsys.readouterr().out
+    assert "control is better for False Euler" in out
+    assert cli.main(["control", "conical_pendulum", "--gains", "0.1;2", "-o", str(tmp_path)]) == 2
+    assert "--gains: expected numbers with commas between them" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"forms": ["limited"]}, "forms: there is no 'limited'"),
+        ({"ways": ["scaling"]}, "ways: there is no 'scaling'"),
+        ({"evaluations": []}, "evaluations: expected one number or several, got none"),
+        ({"evaluations": [100, 0]}, "evaluations: expected 1 or more"),
+        ({"evaluations": "many"}, "evaluations: expected a whole number"),
+        ({"scene": sw.Pendulum3D()}, "v: expected it beside a Pendulum3D system"),
+    ],
+)
+def test_wrong_arguments_with_rods_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        sw.charts.control(**({"scene": "conical_pendulum"} | arguments))

@@ -352,6 +352,7 @@ def test_every_listing_under_control_is_a_step(control: str, fused: bool) -> Non
 @pytest.mark.parametrize("name", [name for name in ADAPTIVE if not name.startswith("thirty-five")])
 def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
     system, v, y = made(name)
+    system = system.uncontrolled
     first = dict.fromkeys(adaptive.Pace._fields, np.zeros(MEMBERS))
     row = lambda *values: np.array(values)  # noqa: E731
     pace = adaptive.Pace(

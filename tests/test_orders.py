@@ -65,6 +65,14 @@ def five_bodies() -> tuple[sw.System, Any, Any]:
     )
 
 
+def two_rods(control: sw.Projection | None = None) -> tuple[sw.System, Any, Any]:
+    """A double pendulum, its velocities along circles."""
+    rods = sw.Rods([1.0, 0.5], [((0.0, 0.0), 0), (0, 1)], 1.0)
+    y = np.array([[0.6, -0.8], [1.4, -0.2]])
+    v = np.array([[0.4, 0.3], [0.1, 0.7]])
+    return rods if control is None else rods.under(control, ()), v, y
+
+
 #: System, start, and end time: no whole or half period, at which an error might vanish.
 PROBLEMS: dict[str, tuple[sw.System, Any, Any, float]] = {
     "oscillator": (sw.Oscillator(1.3), 0.4, 1.0, 2.3),
@@ -94,6 +102,8 @@ PROBLEMS: dict[str, tuple[sw.System, Any, Any, float]] = {
     ),
     "clover": (sw.scenes.clover().system, 0.9 * sw.scenes.clover().v, sw.scenes.clover().y, 1.7),
     "five bodies": (*five_bodies(), 1.1),
+    "two rods": (*two_rods(), 1.3),
+    "two rods, lengths reset": (*two_rods(sw.Projection("length")), 1.6),
 }
 
 

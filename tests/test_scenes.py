@@ -14,6 +14,7 @@ from stepwell.scenes import builtin
 from stepwell.scenes.builtin.kepler import eccentric_anomaly
 from stepwell.scenes.builtin.plummer import _drawn
 from stepwell.scenes.taylor import Orbit, TurningOrbit
+from stepwell.scenes.truth import with_truth
 
 SCENES = sw.scenes.scenes()
 
@@ -35,6 +36,8 @@ VARIED = (
     sw.scenes.sticking_block(0.01),
     sw.scenes.sticking_block(0.4),
     sw.scenes.sticking_block(2.0),
+    sw.scenes.conical_pendulum(10.0),
+    sw.scenes.conical_pendulum(85.0),
 )
 
 #: Those whose solution is known, and of them those that a fixed step does well.
@@ -318,6 +321,16 @@ def test_what_the_reference_does_not_know_is_nan():
         assert np.isnan(error).tolist() == [False, False, False, True]
 
 
+def test_the_last_step_to_the_end_of_what_is_known_is_known():
+    """10 000 steps of a ten-thousandth of 24.15 end an ulp later than 24.15."""
+    scene = dataclasses.replace(sw.scenes.clover(), horizon=24.15, until=24.15)
+    run = scene.run("rk4", 24.15 / 10_000)
+    assert run.t[-1] > 24.15
+    assert np.isfinite(scene.state_error(run)).all()
+    later = scene.run("rk4", 24.15 / 10_000, steps=10_001)
+    assert np.isnan(scene.state_error(later)).all()
+
+
 @pytest.mark.parametrize(
     ("amplitude", "period"), [(10.0, 6.2951685236990721787), (90.0, 7.4162987092054876737), (170.0, 15.326967999136584745)]
 )
@@ -332,6 +345,33 @@ def test_the_pendulum_has_the_periods_of_the_facts(amplitude, period):
     np.testing.assert_allclose(quarters[1], scene.y * np.array([1.0, 0.0, -1.0, 0.0, 1.0]), rtol=0, atol=1e-14)
     fastest = 2.0 * math.sin(math.radians(0.5 * amplitude))
     np.testing.assert_allclose(quarters[0], fastest * np.array([0.0, -1.0, 0.0, 1.0, 0.0]), rtol=0, atol=1e-14)
+
+
+def test_the_cone_is_that_of_the_facts():
+    """FACTS §5: 4.442883 at 60°; it stays level, and its energy and its spin about the vertical are those of the start."""
+    scene = sw.scenes.conical_pendulum()
+    assert scene.period == pytest.approx(4.442883, abs=1e-6)
+    v, y = (block.T for block in scene.exact(np.linspace(0.0, scene.horizon, 101)))
+    np.testing.assert_allclose((y * y).sum(axis=0), 1.0, rtol=1e-15)
+    np.testing.assert_allclose(y[0] * v[1] - y[1] * v[0], scene.y[0] * scene.v[1], rtol=1e-14)
+    np.testing.assert_allclose(scene.system.energy(v, y), scene.system.energy(scene.v, scene.y), rtol=1e-13)
+
+
+def test_the_rods_of_a_double_pendulum_are_known_as_far_as_equations_in_angles_agree():
+    """Independent equations for the same motion; the smallest differences have grown to less than a millionth by t = 15."""
+    scene = with_truth(sw.scenes.double_pendulum())
+    assert scene.until > 20.0
+
+    @sw.system
+    def in_angles(t, v, y):
+        sine, cosine = np.sin(y[0] - y[1]), np.cos(y[0] - y[1])
+        first, second = -(v[1] ** 2) * sine - 2.0 * np.sin(y[0]), v[0] ** 2 * sine - np.sin(y[1])
+        return np.array([first - cosine * second, 2.0 * second - cosine * first]) / (2.0 - cosine**2)
+
+    run = sw.integrate(in_angles(), "dop853", v=0.0, y=np.radians([120.0, 150.0]), tolerance=1e-13, at=[5.0, 15.0])
+    places = np.cumsum(np.stack([np.sin(run.y), -np.cos(run.y)], axis=-1), axis=1)
+    np.testing.assert_allclose(scene.exact(np.array([5.0, 15.0]))[1], places, rtol=0, atol=1e-6)
+    assert with_truth(sw.scenes.triple_pendulum()).until > 10.0
 
 
 def test_a_small_swing_is_an_oscillation():

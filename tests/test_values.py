@@ -79,6 +79,19 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.integrate(sw.Aircraft("quaternion"), "rk4", **QUATERNION, control=sw.Projection("norm")).system,
     ],
     "Pendulum": [sw.Pendulum, lambda: sw.Pendulum(2.0), lambda: sw.Pendulum(a=0.5)],
+    "Pendulum3D": [
+        sw.Pendulum3D,
+        lambda: sw.Pendulum3D(2.0),
+        lambda: sw.Pendulum3D(gravity=[1.0, 2.0]),
+        lambda: (
+            sw.integrate(sw.Pendulum3D(), "rk4", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=1, control=sw.LengthControl(0.1)).system
+        ),
+        lambda: (
+            sw.integrate(
+                sw.Pendulum3D(), "rk4", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=1, control=sw.Projection("length")
+            ).system
+        ),
+    ],
     "RestrictedThreeBody": [sw.RestrictedThreeBody, lambda: sw.RestrictedThreeBody(0.1)],
     "RigidBody": [
         lambda: sw.RigidBody([1.0, 2.0, 3.0]),
@@ -89,6 +102,14 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.RigidBody([1.0, 2.0, 3.0], weight=1.0, centre=[0.0, 0.0, 1.0]),
         lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(1.0), ()),
         lambda: sw.RigidBody([1.0, 2.0, 3.0]).under(sw.Projection("norm"), ()),
+    ],
+    "Rods": [
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [(1, 0)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, dim=2),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], 1.0),
+        lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], [1.0, 2.0], gravity=0.0),
     ],
     "Chain": [
         lambda: sw.Chain(3),

@@ -176,11 +176,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Aircraft.rotation": (sw.Aircraft().rotation, {"y": np.ones((3, 2)), "axis": 0}),
     "Aircraft.commanded": (sw.Aircraft(roll=3.0).commanded, {"name": "roll", "t": [0.0, 1.0]}),
     "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
+    "Pendulum3D": (sw.Pendulum3D, {"length": 1.0, "gravity": 1.0}),
     "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
     "RigidBody": (
         sw.RigidBody,
         {"inertia": [1.0, 2.0, 3.0], "torque": [0.1, None, 0.2], "space_torque": [0.0, 0.1, 0.2], "damping": 0.1}
         | {"weight": 1.0, "centre": [0.0, 0.0, 1.0]},
+    ),
+    "Rods": (
+        sw.Rods,
+        {"masses": [1.0, 1.0], "rods": [((0.0, 0.0), 0), (0, 1)], "lengths": [1.0, 1.0], "gravity": 1.0, "dim": 2},
     ),
     "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
     "LinearSystem": (
@@ -217,6 +222,11 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         sw.integrate,
         BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
     ),
+    "integrate rods": (
+        sw.integrate,
+        {"system": sw.Rods([1.0, 1.0], [(0, 1)], 1.0), "method": "rk4", "v": 0.0, "y": [[0.0, 0.0], [1.0, 0.0]], "dt": 0.1}
+        | {"steps": 10, "record": ["length_error"], "control": sw.LengthControl(0.5)},
+    ),
     "integrate Verlet": (
         sw.integrate,
         FREE
@@ -244,6 +254,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None, "force": None}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
+    "scenes.conical_pendulum": (sw.scenes.conical_pendulum, {"angle": 60.0}),
+    "scenes.double_pendulum": (sw.scenes.double_pendulum, {"angles": [120.0, 150.0]}),
+    "scenes.triple_pendulum": (sw.scenes.triple_pendulum, {"angles": [90.0, 120.0, 150.0]}),
     "quaternion.from_axis_angle": (sw.quaternion.from_axis_angle, {"axis": [0.0, 1.0, 1.0], "angle": 0.5}),
     "quaternion.matrix": (sw.quaternion.matrix, {"q": [1.0, 0.0, 0.0, 0.5]}),
     "quaternion.product": (sw.quaternion.product, {"p": [1.0, 0.0, 0.0, 0.5], "q": np.ones((4, 2))}),

@@ -1,7 +1,8 @@
 """Charts: data objects with ``.plot()``, ``.to_csv()``, ``.to_json()`` and ``.summary()``."""
 
 from . import peers
-from .control import ControlSweep, Held, control
+from .control import ControlSweep, control
+from .control_runs import Held
 from .data import Curve, Point, Timing, WorkPrecision
 from .figures import Figures, Samples, figures
 from .maps import Observation, StabilityMap, stability_map

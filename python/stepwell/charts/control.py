@@ -1,10 +1,9 @@
-"""Control charts: what a control of the energy does to the energy and to the state, over its gain (§12, Appendix D)."""
+"""Control charts: what a control does to what it keeps and to the state, over its gain, and what a projection does (§12)."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,15 +13,15 @@ from .. import _checks
 from .. import control as controls
 from .._checks import Array
 from .._value import Value
-from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, DTypeError, ShapeError, UnsupportedError
-from ..integrate import integrate
+from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..methods import Method, choice
 from ..methods import method as find_method
-from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody
+from ..systems import NBody, System
+from .control_runs import LENGTH_KINDS, Exact, Held, Runs
 from .files import write_csv, write_json
+from .known import chartable
 from .style import Drawn
 
 if TYPE_CHECKING:
@@ -31,88 +30,93 @@ if TYPE_CHECKING:
 #: Default methods: one that adds energy, one that keeps it, and two more accurate ones.
 METHODS = ("standard_euler", "false_euler", "standard_heun", "rk4")
 
-#: Default gains h·C·K at the start: six decades.
+#: Default gains: h·C·K at the start of bodies, six decades; c of rods, from 0.01 to 4, past the limits of most methods.
 RELATIVE = tuple(float(gain) for gain in 10.0 ** np.linspace(-4.0, 2.0, 25))
+LENGTH_GAINS = tuple(float(gain) for gain in np.geomspace(0.01, 4.0, 27))
+
+#: Function evaluations of each run of rods, for each of the scene's steps.
+LENGTH_EVALUATIONS = (4, 16, 64)
 
 #: Ways of projection, the limit of a control with an infinite gain.
 WAYS: tuple[str, ...] = controls.WAYS
 
-#: States of a run, evenly spaced, that are saved to measure energy and coordinates.
-SAVED_STATES = 1000
-
-#: Number of times at which the exact solution is evaluated for its scale.
-SCALE_SAMPLES = 1001
-
-Whole = np.ndarray[Any, np.dtype[np.int64]]
-Exact = Callable[[Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True, eq=False)
-class Held(Value):
-    """One method under one kind of control, over the gains. Runs that diverged have infinite errors.
-
-    Attributes:
-        method: the method.
-        kind: ``"none"``, a form of ``EnergyControl`` or a way of ``Projection``.
-        dt: the step, in units of time.
-        steps: how many steps were made.
-        relative: h·C·K at the start, shape (gains,); one NaN if the kind has no gain.
-        energy_error: the largest |E − E₀| of the saved states, divided by the kinetic energy at the start, shape (gains,).
-        state_error: how far the last state is from the exact one, of the same shape; NaN if no exact one is known.
-        largest: the largest coordinate of the saved states, of the same shape.
-        first_bad_step: the first step that was not finite, or −1, of the same shape.
-    """
-
-    method: Method
-    kind: str
-    dt: float
-    steps: int
-    relative: Array
-    energy_error: Array
-    state_error: Array
-    largest: Array
-    first_bad_step: Whole
-
-    @property
-    def diverged(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """The gains at which a run diverged."""
-        return self.first_bad_step >= 0
-
 
 @dataclass(frozen=True, eq=False)
 class ControlSweep(Drawn, Value):
-    """Errors of energy and state against the gain of a control.
+    """Errors of what a control keeps, and of the state, against its gain.
 
     Attributes:
         title: title of the picture.
-        system: the system.
+        system: the system: bodies, whose energy is kept, or rods, whose lengths are.
         horizon: the time of each run.
-        evaluations: function (rate) evaluations of each run.
-        lines: one for each method and kind that can be combined.
+        evaluations: function (rate) evaluations of a run, one or several numbers; each is another step.
+        lines: one for each method and kind that can be combined, and each number of evaluations.
         refused: why others cannot, by method and kind.
         exact: whether the exact state at the end is known.
     """
 
     title: str
-    system: NBody
+    system: System
     horizon: float
-    evaluations: int
+    evaluations: tuple[int, ...]
     lines: tuple[Held, ...]
     refused: dict[tuple[str, str], str]
     exact: bool
 
-    def line(self, method: Method | str, kind: str) -> Held:
-        """The line of that method and kind.
+    @property
+    def keeps_lengths(self) -> bool:
+        """Whether it is a chart of rods, and not of an energy."""
+        return self.system.constraint == "length"
+
+    def line(self, method: Method | str, kind: str, evaluations: int | None = None) -> Held:
+        """The line of that method and kind, with so many evaluations; the first number of them if None.
 
         Raises:
             UnknownNameError: if there is none.
+            ArgumentError: if there are no runs of so many evaluations.
         """
         name = find_method(method).name
-        of_method = {line.kind: line for line in self.lines if line.method.name == name}
-        return of_method[_checks.known("kind", kind, of_method)]
+        count = self.evaluations[0] if evaluations is None else evaluations
+        if count not in self.evaluations:
+            raise ArgumentError(f"evaluations: expected one of {list(self.evaluations)}, got {_checks.short(count)}")
+        at = self.evaluations.index(count)
+        of_method: dict[str, list[Held]] = {}
+        for line in self.lines:
+            if line.method.name == name:
+                of_method.setdefault(line.kind, []).append(line)
+        return of_method[_checks.known("kind", kind, of_method)][at]
+
+    @property
+    def better(self) -> dict[str, tuple[bool, ...]]:
+        """Of rods: for each method and each number of evaluations, whether control is better than resetting at most gains.
+
+        Better is the smaller error of the last state; gains at which the run diverged are left out.
+        """
+        found: dict[str, tuple[bool, ...]] = {}
+        for name in dict.fromkeys(line.method.name for line in self.lines if line.kind == LENGTH_KINDS[1] and self.exact):
+            pairs = [[self.line(name, kind, count) for kind in LENGTH_KINDS] for count in self.evaluations]
+            found[name] = tuple(
+                bool(np.median([*held.state_error[~held.diverged], np.inf][:-1] or [np.inf]) < reset.state_error[0])
+                for held, reset in pairs
+            )
+        return found
+
+    @property
+    def answer(self) -> str:
+        """Of rods, in a sentence: for which methods control is better than resetting, as the document supposes (§12)."""
+        titles: dict[str, list[str]] = {"control": [], "resetting": [], "depends": []}
+        for name, found in self.better.items():
+            titles["control" if all(found) else "depends" if any(found) else "resetting"].append(find_method(name).title)
+        parts = [f"{each} is better for {_listed(names)}" for each, names in titles.items() if names and each != "depends"]
+        parts += [f"for {_listed(titles['depends'])} it depends on the step"] * bool(titles["depends"])
+        return f"Rods under control, or reset after every step: {'; '.join(parts)}" if parts else ""
 
     def draw(self) -> Figure:
         """The picture, on a new figure."""
+        if self.keeps_lengths:
+            from . import length_picture
+
+            return length_picture.draw(self)
         from .control_picture import draw
 
         return draw(self)
@@ -123,7 +127,7 @@ class ControlSweep(Drawn, Value):
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def summary(self) -> list[dict[str, Any]]:
-        """A row for each method and kind: the gains with the least errors, and from which gain on some diverged."""
+        """A row for each method, kind and step: the gains with the least errors, and from which gain on some diverged."""
         rows = []
         for line in self.lines:
             least = [_least(line.relative, errors) for errors in (line.energy_error, line.state_error)]
@@ -132,6 +136,7 @@ class ControlSweep(Drawn, Value):
                 {
                     "method": line.method.name,
                     "kind": line.kind,
+                    "dt": line.dt,
                     "least_energy_error": least[0][1],
                     "at_relative": least[0][0],
                     "least_state_error": least[1][1],
@@ -148,12 +153,17 @@ class ControlSweep(Drawn, Value):
 
     def to_json(self, path: str | Path) -> None:
         """Write system, horizon, summary, rows and refusals; what is not finite is null."""
-        head = {"title": self.title, "system": repr(self.system), "horizon": self.horizon, "evaluations": self.evaluations}
+        head: dict[str, Any] = {"title": self.title, "system": repr(self.system), "horizon": self.horizon}
+        head["evaluations"] = list(self.evaluations)
+        if self.keeps_lengths:
+            head |= {"answer": self.answer, "better": {name: list(each) for name, each in self.better.items()}}
         refused = [{"method": method, "kind": kind, "reason": why} for (method, kind), why in self.refused.items()]
         write_json(head | {"summary": self.summary(), "rows": self.rows(), "refused": refused}, path)
 
     def _columns(self) -> dict[str, list[Any]]:
-        names = ("relative", "energy_error", "state_error", "largest", "first_bad_step")
+        names = ["relative", "energy_error", "state_error", "largest", "first_bad_step"]
+        if self.keeps_lengths:
+            names.insert(3, "length_error")
         columns: dict[str, list[Any]] = {name: [] for name in ("method", "kind", "dt", "steps", *names)}
         for line in self.lines:
             for name in ("kind", "dt", "steps"):
@@ -165,38 +175,40 @@ class ControlSweep(Drawn, Value):
 
 
 def control(
-    scene: Scene | NBody | str,
+    scene: Scene | System | str,
     methods: Iterable[Method | str] = METHODS,
     *,
     v: Any = None,
     y: Any = None,
     horizon: float | None = None,
-    evaluations: int | None = None,
+    evaluations: int | Iterable[int] | None = None,
     exact: Exact | tuple[Any, Any] | None = None,
-    relative: Any = RELATIVE,
-    forms: Iterable[str] = controls.FORMS,
-    ways: Iterable[str] = WAYS,
+    relative: Any = None,
+    forms: Iterable[str] | None = None,
+    ways: Iterable[str] | None = None,
     title: str | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> ControlSweep:
-    """Run bodies by several methods without control, under control with many gains, and projected; measure energy and state.
+    """Run bodies or rods by several methods without control, under control with many gains, and projected; measure the errors.
 
-    All methods make the same number of function evaluations, so a method with k evaluations a step makes a k-th of the steps,
-    each k times as long. All gains of a method and a form are one batch.
+    What is kept is the energy of bodies or the lengths of rods. All methods make the same number of function evaluations, so a
+    method with k evaluations a step makes a k-th of the steps, each k times as long. All gains of a method and a form are one
+    batch.
 
     Args:
-        scene: a scene of bodies or its name, or an ``NBody`` system for which ``v``, ``y``, ``horizon`` and ``evaluations``
-            are given.
+        scene: a scene of bodies or of rods or its name, or a system ``NBody``, ``Rods`` or ``Pendulum3D`` for which ``v``,
+            ``y``, ``horizon`` and ``evaluations`` are given.
         methods: names, or what ``stepwell.method`` returns.
-        v: velocities at the start, shape (bodies, dim); those of the scene if None.
+        v: velocities at the start, of the shape of the block; those of the scene if None.
         y: coordinates at the start, likewise.
         horizon: the time of each run, in units of time; the scene's if None.
-        evaluations: function (rate) evaluations of each run; if None, one for each of the scene's steps.
-        exact: the exact solution as a function of times of shape (n,), which returns blocks v and y of shape (n, bodies, dim),
-            or the two blocks at the end; the scene's if None.
-        relative: gains h·C·K at the start, shape (gains,), without a unit.
-        forms: forms of ``EnergyControl``.
-        ways: ways of ``Projection``.
+        evaluations: function (rate) evaluations of each run, one number or several; if None, one for each of the scene's steps,
+            and for rods 4, 16 and 64.
+        exact: the exact solution as a function of times of shape (n,), which returns blocks v and y of shape (n, *block), or the
+            two blocks at the end; the scene's if None. For a scene of rods without one it is a run to a tight tolerance.
+        relative: gains, shape (gains,), without a unit: h·C·K at the start for bodies, c for rods.
+        forms: forms of the control: those of ``EnergyControl``, or ``"control"`` for ``LengthControl``; all if None.
+        ways: ways of ``Projection``: ``"scaling"`` and ``"nacozy"``, or ``"length"``; all if None.
         title: title of the picture; if None, the scene's title or the system.
         progress: is called with the fraction that is done.
 
@@ -209,37 +221,41 @@ def control(
     if isinstance(scene, str):
         scene = find_scene(scene)
     if isinstance(scene, Scene):
+        if horizon is not None:
+            scene = replace(scene, horizon=_checks.number("horizon", horizon, positive=True, unit="units of time"))
+        rods = scene.system.constraint == "length"
+        if rods and exact is None:
+            scene = chartable(scene)[0]
         given: Any = scene.system
         v, y = (b if a is None else a for a, b in ((v, scene.v), (y, scene.y)))
-        horizon = scene.horizon if horizon is None else _checks.number("horizon", horizon, positive=True, unit="units of time")
-        evaluations = scene.steps_for(scene.dt) if evaluations is None else evaluations
-        if exact is None and horizon is not None and horizon <= scene.until:
+        horizon = scene.horizon
+        if evaluations is None:
+            evaluations = [factor * scene.steps_for(scene.dt) for factor in (LENGTH_EVALUATIONS if rods else (1,))]
+        if exact is None and horizon <= scene.until:
             exact = scene.exact
         title = scene.title if title is None else title
     else:
         given = scene
-    if not isinstance(given, NBody):
-        raise DTypeError(f"scene: expected a scene of bodies, its name, or an NBody system, got {type(given).__name__}")
+    if not isinstance(given, NBody) and not (isinstance(given, System) and given.constraint == "length"):
+        raise DTypeError(f"scene: expected a scene of bodies or rods, its name, or such a system, got {type(given).__name__}")
     for name, argument in {"v": v, "y": y, "horizon": horizon, "evaluations": evaluations}.items():
         if argument is None:
-            raise ArgumentError(f"{name}: expected it beside an NBody system, got None")
+            raise ArgumentError(
+                f"{name}: expected it beside {'an' if isinstance(given, NBody) else 'a'} {given.kind_name} system, got None"
+            )
     chosen = choice(METHODS if methods is None else methods)
-    kinds = [_checks.known("forms", form, controls.FORMS) for form in _checks.several("forms", forms, "forms")]
-    kinds = ["none", *kinds, *(_checks.known("ways", way, controls.WAYS) for way in _checks.several("ways", ways, "ways"))]
+    kinds = _kinds(given, forms, ways)
     progress = _checks.callback("progress", progress)
 
     system = given.sized(v, y)
     v, y = (_checks.block(name, a, system.v_shape, system.axes) for name, a in (("v", v), ("y", y)))
     if system.batch or v.shape != system.v_shape or y.shape != system.y_shape:
         raise ShapeError(f"scene: expected one start of shape {system.v_shape}, got a batch; the gains are the batch here")
-    setup = _Setup(
-        system,
-        np.asarray(v),
-        np.asarray(y),
-        _checks.number("horizon", horizon, positive=True, unit="units of time"),
-        _checks.count("evaluations", evaluations, 1),
-        exact,
-    )
+    horizon = _checks.number("horizon", horizon, positive=True, unit="units of time")
+    counts = _counts(evaluations)
+    setup = Runs(system, np.asarray(v), np.asarray(y), horizon, exact)
+    if relative is None:
+        relative = LENGTH_GAINS if system.constraint == "length" else RELATIVE
     gains = np.atleast_1d(_checks.numbers("relative", relative, positive=True))
     if gains.ndim != 1 or not gains.size:
         raise ShapeError(f"relative: expected gains of shape (gains,), got {gains.shape}")
@@ -248,82 +264,38 @@ def control(
     for i, method in enumerate(chosen):
         for kind in kinds:
             try:
-                lines.append(setup.line(method, kind, np.sort(gains)))
+                lines += [setup.line(method, kind, np.sort(gains), count) for count in counts]
             except UnsupportedError as why:
                 refused[method.name, kind] = str(why)
         if progress is not None:
             progress((i + 1) / len(chosen))
     name = repr(system) if title is None else title
-    return ControlSweep(name, system, setup.horizon, setup.evaluations, tuple(lines), refused, exact is not None)
+    return ControlSweep(name, system, horizon, counts, tuple(lines), refused, exact is not None)
 
 
-class _Setup:
-    """What is run, from where, and what is exact."""
-
-    def __init__(
-        self, system: NBody, v: Array, y: Array, horizon: float, evaluations: int, exact: Exact | tuple[Any, Any] | None
-    ) -> None:
-        self.system = system
-        self.v = v
-        self.y = y
-        self.horizon = horizon
-        self.evaluations = evaluations
-        self.end: tuple[Array, Array] | None = None
-        self.energy = float(system.energy(v, y))
-        self.kinetic = self.energy - float(system.energy(np.zeros_like(v), y))
-        if not self.kinetic > 0.0:
-            raise ArgumentError("v: a start at rest has no kinetic energy, which is the scale of gains and of energies here")
-        if exact is None:
-            return
-        if callable(exact):
-            blocks = exact(np.linspace(0.0, horizon, SCALE_SAMPLES))
-            if not (isinstance(blocks, tuple) and [np.shape(block) for block in blocks] == [(SCALE_SAMPLES, *v.shape)] * 2):
-                raise ShapeError(f"exact: expected a function of n times that returns v and y of shape (n, {str(v.shape)[1:]}")
-            self.end = blocks[0][-1], blocks[1][-1]
-        else:
-            given = _checks.several("exact", exact, "blocks, v and y at the end")
-            if len(given) != 2:
-                raise ShapeError(f"exact: expected a pair of blocks, v and y at the end, got {len(given)} of them")
-            pair = [_checks.block("exact", block, system.v_shape, system.axes) for block in given]
-            self.end = pair[0], pair[1]
-            blocks = np.stack([v, pair[0]]), np.stack([y, pair[1]])
-        self.scales = [float(_length(block, (1, 2)).max()) for block in blocks]
-
-    def line(self, method: Method, kind: str, gains: Array) -> Held:
-        """Run a method under one kind of control, all gains at once."""
-        steps = max(1, round(self.evaluations / method.evaluations))
-        dt = self.horizon / steps
-        relative = np.array([np.nan])
-        held: controls.EnergyControl | controls.Projection | None = None
-        if kind in controls.FORMS:
-            relative, held = gains, controls.EnergyControl(form=kind, relative=gains)
-        elif kind != "none":
-            held = controls.Projection(kind)
-        shape = (*self.system.v_shape, len(relative))
-        v, y = (np.broadcast_to(block[..., np.newaxis], shape) for block in (self.v, self.y))
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            # That much gain is too much is what the chart shows.
-            warnings.simplefilter("ignore", DivergenceWarning)
-            warnings.simplefilter("ignore", AccuracyWarning)
-            warnings.simplefilter("ignore", ControlWarning)
-            run = integrate(self.system, method, v=v, y=y, dt=dt, steps=steps, every=max(1, steps // SAVED_STATES), control=held)
-            energy = np.abs(run.energy - self.energy).max(axis=0) / self.kinetic
-            largest = np.abs(run.y).max(axis=(0, 1, 2))
-            state = self._state_error(run)
-        fell = run.first_bad_step >= 0
-        energy, largest, state = (np.where(fell, np.inf, a) for a in (energy, largest, state))
-        return Held(method, kind, dt, steps, relative, energy, state, largest, run.first_bad_step)
-
-    def _state_error(self, run: Run) -> Array:
-        """The larger of the errors of the two blocks at the end, divided by the block's scale."""
-        if self.end is None:
-            return np.full(run.status.shape, np.nan)
-        ends = zip((run.v[-1], run.y[-1]), self.end, self.scales, strict=True)
-        return np.maximum(*(_length(block - true[..., np.newaxis], (0, 1)) / scale for block, true, scale in ends))
+def _kinds(system: System, forms: Any, ways: Any) -> list[str]:
+    """What is run: nothing that keeps anything, each form of the control, each way of projection."""
+    known = ((LENGTH_KINDS[0],), (LENGTH_KINDS[1],)) if system.constraint == "length" else (controls.FORMS, WAYS)
+    kinds = ["none"]
+    for argument, given, names in zip(("forms", "ways"), (forms, ways), known, strict=True):
+        kinds += [
+            _checks.known(argument, each, names)
+            for each in _checks.several(argument, names if given is None else given, argument)
+        ]
+    return kinds
 
 
-def _length(block: Array, axes: tuple[int, int]) -> Array:
-    return np.asarray(np.sqrt((block * block).sum(axis=axes)))
+def _counts(evaluations: Any) -> tuple[int, ...]:
+    """The numbers of evaluations, each once, ascending."""
+    several = evaluations if isinstance(evaluations, (list, tuple)) or np.ndim(evaluations) == 1 else [evaluations]
+    counts = sorted({_checks.count("evaluations", each, 1) for each in several})
+    if not counts:
+        raise ShapeError("evaluations: expected one number or several, got none")
+    return tuple(counts)
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _least(relative: Array, errors: Array) -> tuple[float, float]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .control import ControlSweep, Held
+from .control import ControlSweep
+from .control_runs import Held
 from .style import FONT, GREY, look, new_figure
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def draw(chart: ControlSweep) -> Figure:
         _panel(right, chart, "state_error" if chart.exact else "largest")
         right.set_ylabel("error of the last state, relative" if chart.exact else "largest coordinate")
         figure.text(0.012, 0.945, f"{chart.title}: energy and state under control", size=20, weight="bold")
-        what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {chart.evaluations} function evaluations per run"
+        evaluations = ", ".join(map(str, chart.evaluations))
+        what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
         figure.text(0.012, 0.905, textwrap.shorten(what, 150), size=13.5, color=GREY)
         _legend(figure, chart, methods)
         note = (

@@ -15,7 +15,9 @@ from .. import __version__
 from ..errors import StepwellError
 
 #: The commands, in the order of the help.
-COMMANDS = ("scenes", "methods", "run", "chart", "criteria", "stability", "advise", "explain", "export", "figures", "paper")
+COMMANDS = (
+    *("scenes", "methods", "run", "chart", "control", "criteria", "stability", "advise", "explain", "export", "figures", "paper"),
+)
 
 #: Exit codes: what was asked for cannot be done; Ctrl-C, by the custom of shells.
 FAILED, INTERRUPTED = 2, 130

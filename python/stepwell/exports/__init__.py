@@ -146,7 +146,7 @@ def _under(system: System, control: AnyControl, blocks: list[Array | None], batc
     if v is not None and y is not None:
         v, y = (_wide(each, shape, batch) for each, shape in ((v, system.v_shape), (y, system.y_shape)))
         return system.controlled(control, v, y, dt)
-    if not isinstance(control, ConstraintControl) and not system._keeps(control) and control.target is None:
+    if not system.keeps(control) and not isinstance(control, ConstraintControl) and control.target is None:
         raise ArgumentError("control: expected one with a target, or v and y, of which it keeps the energy")
     if isinstance(control, EnergyControl) and control.gain is None:
         raise ArgumentError("control: expected one with a gain, or v and y, to which relative= relates it")

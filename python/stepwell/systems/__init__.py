@@ -13,8 +13,10 @@ from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
 from .pendulum import Pendulum
+from .pendulum_3d import Pendulum3D
 from .restricted_three_body import RestrictedThreeBody
 from .rigid_body import RigidBody
+from .rods import Rods
 
 if TYPE_CHECKING:
     from .aircraft import Aircraft
@@ -26,8 +28,10 @@ __all__ = [
     "NBody",
     "Oscillator",
     "Pendulum",
+    "Pendulum3D",
     "RestrictedThreeBody",
     "RigidBody",
+    "Rods",
     "Sampled",
     "Sinusoid",
     "System",

@@ -186,17 +186,17 @@ class Aircraft(OwnSystem):
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> Aircraft:
         """The same aircraft under a control; the target is that of the state, and 1 for the length of a quaternion."""
-        if self._keeps(control):
+        if self.keeps(control):
             return self._kept_by(control)
         return cast("Aircraft", super().controlled(_of_length_one(control), v, y, dt))
 
     def under(self, control: Any, batch: Shape) -> Aircraft:
         """The same, for unknown states of that batch shape."""
-        if self._keeps(control):
+        if self.keeps(control):
             return self._kept_by(control)
         return cast("Aircraft", super().under(_of_length_one(control), batch))
 
-    def _keeps(self, control: Any) -> bool:
+    def keeps(self, control: Any) -> bool:
         """Whether it is a control of the quaternion's length by the rates; a projection is that of an invariant."""
         return self.form == "quaternion" and isinstance(control, NormControl)
 

@@ -180,7 +180,7 @@ class System(Fixed, Value, ABC):
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        if self._keeps(control):
+        if self.keeps(control):
             return self._kept_by(control)
         self._controllable(control)
         with np.errstate(all="ignore"):
@@ -193,12 +193,12 @@ class System(Fixed, Value, ABC):
         Raises:
             UnsupportedError: if the system has no energy that a control can keep.
         """
-        if self._keeps(control):
+        if self.keeps(control):
             return self._kept_by(control)
         self._controllable(control)
         return self._held_by(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
-    def _keeps(self, control: Any) -> bool:
+    def keeps(self, control: Any) -> bool:
         """Whether it is the control or projection of the system's own constraint."""
         kept = getattr(control, "constraint", None) or getattr(control, "way", None)
         return kept is not None and kept == self.constraint

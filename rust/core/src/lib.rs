@@ -14,6 +14,7 @@
 pub use stepwell_base::{bodies, functions, isa};
 
 pub mod controls;
+pub mod elimination;
 pub mod error;
 pub mod kernel;
 pub mod large;

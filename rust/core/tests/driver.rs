@@ -133,10 +133,7 @@ fn what_does_not_fit_is_refused() {
     let error = |model: Model, members: usize| last(&plan(model, 0.1, 1, members, 1)).unwrap_err().to_string();
     assert!(error(oscillators(&[1.0], "rk5"), 1).starts_with("there is no method \"rk5\"; known: damped_euler, "));
     assert_eq!(error(oscillators(&[1.0, 2.0], "rk4"), 3), "a parameter: expected 3, got 2");
-    assert_eq!(
-        error(model(spec("spring", Of::default()), "rk4"), 1),
-        "there is no system \"spring\"; known: chain, equations, linear, nbody, oscillator, pendulum, restricted_three_body, rigid_body"
-    );
+    assert!(error(model(spec("spring", Of::default()), "rk4"), 1).starts_with("there is no system \"spring\"; known: chain, "));
     let rows = [("omega", vec![Row(&[1.0])]), ("damping", vec![Row(&[0.1])])];
     let model = model(spec("oscillator", Of { words: &[("form", "canonical")], rows: &rows, ..Of::default() }), "verlet");
     assert_eq!(error(model, 1), "verlet needs forces that do not depend on the velocity, but oscillator has damping");

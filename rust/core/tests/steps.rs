@@ -146,6 +146,17 @@ fn systems() -> Vec<Given> {
     all.push(given("rigid_body", &[("keeps", "control")], &[], &[inertia, ("damping", 3), ("strength", 1)], &["torque[1]"]));
     let heavy = [inertia, ("weight", 1), ("centre", 3), ("space_torque[2]", 1)];
     all.push(given("rigid_body", &[("keeps", "projection")], &[("space_torque", 3)], &heavy, &[]));
+    for (words, strength) in [(&[][..], 0), (&[("keeps", "control")], 1), (&[("keeps", "projection")], 0)] {
+        let numbers = [("length", 1), ("gravity", 1), ("strength", strength)];
+        all.push(given("pendulum_3d", words, &[], if strength == 1 { &numbers } else { &numbers[..2] }, &[]));
+        // Three points: the first on an anchor, a chain of two from it, and a loop between the last two and the first.
+        let ends = [[3, 0], [0, 1], [2, 1], [0, 2]];
+        let names: Vec<[String; 2]> = (0..4).map(|k| [0, 1].map(|end| format!("rods[{k}][{end}]"))).collect();
+        let mut wholes = vec![("dim", 3), ("rods", 4)];
+        wholes.extend(names.iter().flatten().map(String::as_str).zip(ends.into_iter().flatten()));
+        let numbers = [("masses", 3), ("lengths", 4), ("anchors", 3), ("gravity", 1), ("strength", strength)];
+        all.push(given("rods", words, &wholes, if strength == 1 { &numbers } else { &numbers[..4] }, &[]));
+    }
     for n in [1, 4] {
         all.push(given("chain", &[], &[], &[("stiffness", n + 1), ("mass", n)], &[]));
     }

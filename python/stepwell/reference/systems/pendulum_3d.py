@@ -1,0 +1,56 @@
+"""One rod from the origin to a point in space: v̇ = −pull·y − g, where the pull follows from the length (§12)."""
+
+from typing import Any
+
+import numpy as np
+
+from ..types import Array, Blocks
+from .rods import dot, largest, spin
+
+
+class Pendulum3D:
+    """The pull is that for which C̈ = 0, with C = ½(y·y − l²); under control C̈ + 2αĊ + α²C = 0, α = c/h.
+
+    Blocks are of shape (3, …).
+    """
+
+    def __init__(self, h: float, length: Array, gravity: Array, keeps: str | None, strength: Array | None) -> None:
+        self.h = h
+        self.length = length
+        self.square = length * length
+        self.fall = h * gravity
+        self.projects = keeps == "projection"
+        self.damping: Any = None
+        self.stiffness: Any = None
+        if strength is not None:
+            self.damping, self.stiffness = 2.0 * strength, 0.5 * ((strength * strength) / h)
+
+    def dv(self, t: float, v: Array, y: Array) -> Array:
+        """h·v̇."""
+        square = dot(y, y)
+        pull = self.h * dot(v, v) - self.fall * y[2]
+        if self.damping is not None:
+            pull = (pull + self.damping * dot(y, v)) + self.stiffness * (square - self.square)
+        pushed = -((pull / square) * y)
+        return np.concatenate([pushed[:2], pushed[2:] - self.fall])
+
+    def dy(self, t: float, v: Array, y: Array) -> Array:
+        """h·ẏ."""
+        return self.h * v
+
+    def velocity(self, d: Array) -> Array:
+        """The v whose increment of y is d."""
+        return d / self.h
+
+    def project(self, v: Array, y: Array) -> Blocks:
+        """The state after a step, with a rod of its length and no velocity along it, if that is asked for."""
+        if not self.projects:
+            return v, y
+        y = y * (self.length / np.sqrt(dot(y, y)))
+        return v - (dot(y, v) / self.square) * y, y
+
+    def record(self, name: str, v: Array, y: Array) -> Array:
+        """A quantity of a state: ``length_error``, |length/l − 1|, or ``angular_momentum``, y × v per mass."""
+        if name == "length_error":
+            return largest([np.sqrt(dot(y, y)) / self.length - 1.0])
+        return np.stack(spin(y, v, [(1, 2), (2, 0), (0, 1)]))

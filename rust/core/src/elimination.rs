@@ -1,0 +1,60 @@
+//! Linear equations of a few unknowns whose matrix is symmetric and positive definite: elimination in a fixed order, LDLᵀ.
+//!
+//! Nothing is exchanged by its size, so that a step has no branch; a matrix of this kind does not need it. A matrix is given by the rows
+//! of its lower triangle. `None` is an entry that is zero whatever the state is, and its terms are left out.
+
+use crate::number::Number;
+
+/// L without its ones, and D.
+pub struct Factors<N: Number> {
+    /// The entries of each row left of the diagonal.
+    below: Vec<Vec<Option<N>>>,
+    pivots: Vec<N>,
+}
+
+impl<N: Number> Factors<N> {
+    /// Of a matrix: of each row the entries left of the diagonal, and the diagonal.
+    pub fn new(mut rows: Vec<Vec<Option<N>>>, mut pivots: Vec<N>) -> Self {
+        let n = pivots.len();
+        let mut below: Vec<Vec<Option<N>>> = (0..n).map(|i| vec![None; i]).collect();
+        for j in 0..n {
+            let touched: Vec<(usize, N)> = (j + 1..n).filter_map(|i| Some((i, rows[i][j]?))).collect();
+            for (at, &(i, entry)) in touched.iter().enumerate() {
+                let factor = entry / pivots[j];
+                below[i][j] = Some(factor);
+                for &(k, other) in &touched[..=at] {
+                    let term = factor * other;
+                    if k == i {
+                        pivots[i] -= term;
+                    } else {
+                        rows[i][k] = Some(rows[i][k].map_or(-term, |entry| entry - term));
+                    }
+                }
+            }
+        }
+        Factors { below, pivots }
+    }
+
+    /// The unknowns, from the right-hand sides.
+    pub fn solve(&self, mut x: Vec<N>) -> Vec<N> {
+        let n = x.len();
+        for i in 0..n {
+            for j in 0..i {
+                if let Some(factor) = self.below[i][j] {
+                    let known = x[j];
+                    x[i] -= factor * known;
+                }
+            }
+        }
+        for j in (0..n).rev() {
+            x[j] = x[j] / self.pivots[j];
+            for i in j + 1..n {
+                if let Some(factor) = self.below[i][j] {
+                    let known = x[i];
+                    x[j] -= factor * known;
+                }
+            }
+        }
+        x
+    }
+}
