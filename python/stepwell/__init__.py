@@ -16,7 +16,7 @@ from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, Stepwell
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
+from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, Springs, System
 from .world import World
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ __all__ = [
     "Sampled",
     "Scene",
     "Sinusoid",
+    "Springs",
     "Status",
     "StepwellError",
     "System",

@@ -8,6 +8,7 @@ from .nbody import NBody
 from .oscillator import Oscillator
 from .pendulum import Pendulum
 from .restricted_three_body import RestrictedThreeBody
+from .springs import Springs
 
 __all__ = [
     "Chain",
@@ -18,5 +19,6 @@ __all__ = [
     "RestrictedThreeBody",
     "Sampled",
     "Sinusoid",
+    "Springs",
     "System",
 ]

@@ -35,6 +35,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         system: system.to_owned(),
         words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        lists: Vec::new(),
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![false; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
         equations: None,

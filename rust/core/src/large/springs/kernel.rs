@@ -1,0 +1,226 @@
+//! The forces of a net: the loops.
+
+#![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
+
+use super::{
+    SIDE,
+    order::{MARGIN, Order},
+};
+use crate::{isa::Task, run::aligned::Aligned};
+
+type Vector = [f64; SIDE];
+
+/// The bit of the sign, which is −0.
+const SIGN: u64 = 1 << 63;
+
+/// For each set of lanes its bits: all of those of a lane that is in it.
+const LANES: [[u64; SIDE]; 1 << SIDE] = {
+    let mut all = [[0; SIDE]; 1 << SIDE];
+    let mut set = 0;
+    while set < all.len() {
+        let mut lane = 0;
+        while lane < SIDE {
+            all[set][lane] = if set >> lane & 1 == 1 { u64::MAX } else { 0 };
+            lane += 1;
+        }
+        set += 1;
+    }
+    all
+};
+
+/// The numbers of a net: a row for each direction of what is a vector.
+pub struct Rows {
+    /// The length of a row of particles.
+    pub particles: usize,
+    /// The length of a row of forces.
+    pub springs: usize,
+    /// Places.
+    pub y: Aligned,
+    /// Velocities, if there is damping.
+    pub v: Aligned,
+    /// Of springs, in the order in which they are computed.
+    pub stiffness: Aligned,
+    /// Rest lengths.
+    pub rest: Aligned,
+    /// Nothing if there is none.
+    pub damping: Aligned,
+    /// Forces on first ends, with a margin before and behind them.
+    pub forces: Aligned,
+    /// h/m
+    pub by_mass: Aligned,
+    /// h/m·drag, or nothing.
+    pub slowing: Aligned,
+    /// h·g, or nothing.
+    pub fall: Vec<f64>,
+}
+
+#[inline(always)]
+fn load(from: &[f64], at: usize) -> Vector {
+    let mut vector = [0.0; SIDE];
+    vector.copy_from_slice(&from[at..at + SIDE]);
+    vector
+}
+
+/// Takes the rows of a block apart.
+#[inline(always)]
+fn apart<const D: usize>(block: &[f64], rows: &mut [f64], length: usize) {
+    let (particles, _) = block.as_chunks::<D>();
+    for c in 0..D {
+        for (number, particle) in rows[c * length..][..length].iter_mut().zip(particles) {
+            *number = particle[c];
+        }
+    }
+}
+
+/// The rate of v from the state, in D directions.
+pub struct Forces<'a, const D: usize, const DAMPED: bool> {
+    pub order: &'a Order,
+    pub rows: &'a mut Rows,
+    pub v: &'a [f64],
+    pub y: &'a [f64],
+    pub out: &'a mut [f64],
+}
+
+/// Both ends of a vector of springs.
+struct Ends<const D: usize> {
+    y: [[Vector; D]; 2],
+    v: [[Vector; D]; 2],
+}
+
+/// The forces of a vector of springs.
+#[inline(always)]
+fn pull<const D: usize, const DAMPED: bool>(ends: &Ends<D>, [stiffness, rest, damping]: [Vector; 3]) -> [Vector; D] {
+    let (mut d, mut square, mut along) = ([[0.0; SIDE]; D], [0.0; SIDE], [0.0; SIDE]);
+    for c in 0..D {
+        for l in 0..SIDE {
+            d[c][l] = ends.y[1][c][l] - ends.y[0][c][l];
+            let product = d[c][l] * d[c][l];
+            square[l] = if c == 0 { product } else { square[l] + product };
+            if DAMPED {
+                let product = (ends.v[1][c][l] - ends.v[0][c][l]) * d[c][l];
+                along[l] = if c == 0 { product } else { along[l] + product };
+            }
+        }
+    }
+    let mut pull = [0.0; SIDE];
+    for l in 0..SIDE {
+        let length = square[l].sqrt();
+        // Bits, not a choice, which would become eight branches.
+        let some = u64::from(0.0 < length).wrapping_neg();
+        let inverse = 1.0 / f64::from_bits(length.to_bits() & some | 1.0f64.to_bits() & !some);
+        let mut push = stiffness[l] * (length - rest[l]);
+        if DAMPED {
+            push += (damping[l] * along[l]) * inverse;
+        }
+        pull[l] = push * inverse;
+    }
+    for c in 0..D {
+        for l in 0..SIDE {
+            d[c][l] *= pull[l];
+        }
+    }
+    d
+}
+
+impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
+    /// The forces of the springs from a place on.
+    #[inline(always)]
+    fn compute(rows: &mut Rows, at: usize, ends: &Ends<D>) {
+        let damping = if DAMPED { load(&rows.damping, at) } else { [0.0; SIDE] };
+        let forces = pull::<D, DAMPED>(ends, [load(&rows.stiffness, at), load(&rows.rest, at), damping]);
+        let length = rows.springs;
+        for c in 0..D {
+            rows.forces[c * length + MARGIN + at..][..SIDE].copy_from_slice(&forces[c]);
+        }
+    }
+
+    /// Ends that `of` finds in a row.
+    #[inline(always)]
+    fn ends(rows: &Rows, of: impl Fn(&[f64], usize) -> Vector) -> Ends<D> {
+        let length = rows.particles;
+        let mut ends = Ends { y: [[[0.0; SIDE]; D]; 2], v: [[[0.0; SIDE]; D]; 2] };
+        for end in 0..2 {
+            for c in 0..D {
+                ends.y[end][c] = of(&rows.y[c * length..][..length], end);
+                if DAMPED {
+                    ends.v[end][c] = of(&rows.v[c * length..][..length], end);
+                }
+            }
+        }
+        ends
+    }
+
+    /// The sums of the forces on a vector of particles.
+    #[inline(always)]
+    fn sums(order: &Order, rows: &Rows, vector: usize) -> [Vector; D] {
+        let from = if vector == 0 { 0 } else { order.until[vector - 1] };
+        let mut sums = [[-0.0; SIDE]; D];
+        for addend in &order.addends[from as usize..order.until[vector] as usize] {
+            let takes = &LANES[addend.takes as usize];
+            for c in 0..D {
+                let forces = load(&rows.forces, c * rows.springs + addend.at as usize);
+                match (addend.takes, addend.is_second) {
+                    (u8::MAX, false) => (0..SIDE).for_each(|l| sums[c][l] += forces[l]),
+                    (u8::MAX, true) => (0..SIDE).for_each(|l| sums[c][l] -= forces[l]),
+                    (_, is_second) => {
+                        let turned = if is_second { SIGN } else { 0 };
+                        for l in 0..SIDE {
+                            let force = (forces[l].to_bits() ^ turned) & takes[l] | SIGN & !takes[l];
+                            sums[c][l] += f64::from_bits(force);
+                        }
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
+impl<const D: usize, const DAMPED: bool> Task for Forces<'_, D, DAMPED> {
+    #[inline(always)]
+    fn run(self) {
+        let Forces { order, rows, v, y, out } = self;
+        let length = rows.particles;
+        apart::<D>(y, &mut rows.y, length);
+        if DAMPED {
+            apart::<D>(v, &mut rows.v, length);
+        }
+        for run in &order.runs {
+            let ends = Self::ends(rows, |row, end| load(row, run.ends[end] as usize));
+            Self::compute(rows, run.at as usize, &ends);
+        }
+        for (vector, numbers) in order.others.iter().enumerate() {
+            let ends = Self::ends(rows, |row, end| numbers[end].map(|i| row[i as usize]));
+            Self::compute(rows, order.first_other + SIDE * vector, &ends);
+        }
+        let (out, _) = out[..y.len()].as_chunks_mut::<D>();
+        let (v, _) = v.as_chunks::<D>();
+        for (vector, out) in out.chunks_mut(SIDE).enumerate() {
+            let at = SIDE * vector;
+            let mut rates = Self::sums(order, rows, vector);
+            let by_mass = load(&rows.by_mass, at);
+            for c in 0..D {
+                for l in 0..SIDE {
+                    rates[c][l] *= by_mass[l];
+                }
+                if let Some(fall) = rows.fall.get(c) {
+                    for l in 0..SIDE {
+                        rates[c][l] += fall;
+                    }
+                }
+            }
+            for (l, out) in out.iter_mut().enumerate() {
+                for c in 0..D {
+                    out[c] = rates[c][l];
+                }
+            }
+            if !rows.slowing.is_empty() {
+                for (l, (out, v)) in out.iter_mut().zip(&v[at..]).enumerate() {
+                    for c in 0..D {
+                        out[c] -= rows.slowing[at + l] * v[c];
+                    }
+                }
+            }
+        }
+    }
+}
