@@ -175,6 +175,12 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "LinearSystem.split": (sw.LinearSystem(PLANE).split, {"state": [1.0, 0.0]}),
     "LinearSystem.state": (sw.LinearSystem(PLANE).state, {"v": [1.0], "y": [0.0]}),
     "NBody": (sw.NBody, {"masses": [1.0, 1.0], "force": "newton", "G": 1.0, "softening": 0.1, "dim": 2}),
+    "Springs": (
+        sw.Springs,
+        {"pairs": [(0, 1), (1, 2)], "stiffness": 1.0, "rest": 1.0, "layout": np.zeros((3, 2)), "damping": 0.1, "masses": 1.0}
+        | {"fixed": [0], "gravity": (0.0, -1.0), "drag": 0.1, "dim": 2},
+    ),
+    "Springs.safe_step": (sw.Springs([(0, 1)], rest=1.0).safe_step, {"method": "rk4"}),
     "Sinusoid": (sw.Sinusoid, {"amplitude": 1.0, "omega": 1.0, "phase": 0.0}),
     "Sampled": (sw.Sampled, {"values": [1.0, 2.0], "interval": 0.1, "start": 0.0}),
     "LengthControl": (sw.LengthControl, {"c": 0.5}),

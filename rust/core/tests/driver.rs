@@ -135,7 +135,7 @@ fn what_does_not_fit_is_refused() {
     assert_eq!(error(oscillators(&[1.0, 2.0], "rk4"), 3), "a parameter: expected 3, got 2");
     assert_eq!(
         error(model(spec("spring", Of::default()), "rk4"), 1),
-        "there is no system \"spring\"; known: chain, equations, linear, nbody, oscillator, pendulum, restricted_three_body"
+        "there is no system \"spring\"; known: chain, equations, linear, nbody, oscillator, pendulum, restricted_three_body, springs"
     );
     let rows = [("omega", vec![Row(&[1.0])]), ("damping", vec![Row(&[0.1])])];
     let model = model(spec("oscillator", Of { words: &[("form", "canonical")], rows: &rows, ..Of::default() }), "verlet");

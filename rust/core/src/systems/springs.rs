@@ -10,7 +10,7 @@
 
 use crate::{
     error::Error,
-    large::{Long, springs},
+    large::{Long, MAX_TAPE_OPERATIONS, springs},
     number::Number,
     spec::{Given, Parameters},
     system::{Block, Energies, Gradient, Kind, Shape, System},
@@ -26,7 +26,7 @@ pub const KIND: Kind = Kind {
     velocity_term,
     quantities,
     operations,
-    long: Some(Long { from: (700, 1400), from_batch: 0, make: springs::make }),
+    long: Some(Long { from: (MAX_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS), from_batch: 60_000, make: springs::make }),
     numbers: make::<f64>,
     symbols: make,
 };

@@ -105,8 +105,7 @@ fn addends(n: usize, pairs: &[u32], is_fixed: &[bool], place: &[usize]) -> (Vec<
     for particles in forces.chunks(SIDE) {
         let mut left: Vec<&[(usize, bool)]> = particles.iter().map(Vec::as_slice).collect();
         // Where a vector would begin that has a particle's next force in its place.
-        let begins =
-            |lane: usize, left: &[(usize, bool)]| left.first().map(|(at, is_second)| (MARGIN + at - lane, *is_second));
+        let begins = |lane: usize, left: &[(usize, bool)]| left.first().map(|(at, is_second)| (MARGIN + at - lane, *is_second));
         loop {
             let next: Vec<Option<(usize, bool)>> = left.iter().enumerate().map(|(lane, left)| begins(lane, left)).collect();
             let shared = |one: &(usize, bool)| next.iter().flatten().filter(|other| *other == one).count();
