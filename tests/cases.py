@@ -81,7 +81,9 @@ SYSTEMS: dict[str, Make] = {
     ),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
-    "springs: a triangle": lambda r, b: sw.Springs([(0, 1), (1, 2), (2, 0)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=1.0, dim=2),
+    "springs: a triangle": lambda r, b: sw.Springs(
+        [(0, 1), (1, 2), (2, 0)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=1.0, dim=2
+    ),
     "springs: hung, damped": lambda r, b: _hung(r, 2, damping=r.uniform(0.1, 0.5, b)[np.newaxis], gravity=(0.0, -1.0)),
     "springs: hung in space": lambda r, b: _hung(r, 3, masses=r.uniform(0.5, 2.0, (9, b)), gravity=r.normal(size=(3, b))),
     "springs: hung in space, dragged": lambda r, b: _hung(r, 3, drag=r.uniform(0.1, 0.5, 9), damping=r.uniform(0.1, 0.5, 20)),

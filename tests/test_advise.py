@@ -35,11 +35,14 @@ TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 SLOW = {
     "arenstorf": (1e-2, 1e-5),
     "chain": (1e-3,),
+    "cloth": (),
     "energy_control": (),
     "figure_eight": (1e-2, 1e-4),
+    "jelly_cube": (),
     "kepler": (1e-1, 1e-3, 1e-6),
     "plummer": (),
     "pythagorean": (1e-3,),
+    "rope_bridge": (1e-3,),
 }
 CASES = {scene.name: TOLERANCES if scene.name in QUICK else SLOW.get(scene.name, TOLERANCES) for scene in sw.scenes.scenes()}
 

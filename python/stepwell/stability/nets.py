@@ -1,16 +1,16 @@
 """The safe step of a net of springs, from bounds of its frequencies: for any number of particles, in every position.
 
 A spring between particles resists a displacement along itself with its stiffness k, and one across with k·(1 − ℓ₀/ℓ), which is
-less, or negative if it is compressed. So the matrix of all forces is at most that of springs that resist all displacements with k,
-K = B·diag(k)·Bᵀ, where B has a column for each spring with 1 and −1 at its ends. The eigenvalues of M⁻¹·K other than 0 are those of
-Bᵀ·M⁻¹·B·diag(k), none of which is larger than the largest sum of the magnitudes in a row (Gershgorin). In the row of a spring from i
-to j these sum to Wᵢ/mᵢ + Wⱼ/mⱼ, with W the stiffness of all springs at a particle. It is the bound of ω². Dampers of the springs have
-the same form, and drag adds its largest drag/m.
+less, or negative if it is compressed. So the matrix of all forces is at most that of springs that resist all displacements with
+k, K = B·diag(k)·Bᵀ, where B has a column for each spring with 1 and −1 at its ends. The eigenvalues of M⁻¹·K other than 0 are
+those of Bᵀ·M⁻¹·B·diag(k), none of which is larger than the largest sum of the magnitudes in a row (Gershgorin). In the row of a
+spring from i to j these sum to Wᵢ/mᵢ + Wⱼ/mⱼ, with W the stiffness of all springs at a particle. It is the bound of ω². Dampers
+of the springs have the same form, and drag adds its largest drag/m.
 
 In a mode x of a damped net v̇ = −C·v − K·y each eigenvalue λ solves λ² + c·λ + κ = 0 with c = x*C·x and κ = x*K·x, x*x = 1: real
 numbers between 0 and the bounds. A Runge-Kutta method is stable if it is for every such oscillator; so is False Euler, whose
-eigenvalues solve z² − (2 − h·c − h²·κ)·z + 1 − h·c = 0. As the step grows, oscillators come in at the upper bounds of κ and c only,
-so those are tried. Undamped, every method takes modes one by one, and its limit Φ is that of an oscillator.
+eigenvalues solve z² − (2 − h·c − h²·κ)·z + 1 − h·c = 0. As the step grows, oscillators come in at the upper bounds of κ and c
+only, so those are tried. Undamped, every method takes modes one by one, and its limit Φ is that of an oscillator.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def safe_step(springs: Springs, method: str | Method) -> Any:
     rate = np.zeros(()) if springs.damping is None else _bound(springs, springs.damping, by_mass)
     if springs.drag is not None:
         rate = rate + _share(springs.drag, by_mass).max(axis=0)
-    return _shaped(_damped(*np.broadcast_arrays(square, rate), how), springs)
+    square, rate = np.broadcast_arrays(square, rate)
+    return _shaped(_damped(square, rate, how), springs)
 
 
 def _share(numbers: Array, by_mass: Array) -> Array:

@@ -1,7 +1,7 @@
 """Small motions of a net of springs about a state: a linear system of the particles that are not fixed.
 
-A fixed particle keeps any velocity, and a net without one drifts. Of a linear system ``parts`` finds such motions exactly and sets
-them aside; in the eigenvalues of a whole step their rounding would hide the limit.
+A fixed particle keeps any velocity, and a net without one drifts. Of a linear system ``parts`` finds such motions exactly and
+sets them aside; in the eigenvalues of a whole step their rounding would hide the limit.
 """
 
 from __future__ import annotations

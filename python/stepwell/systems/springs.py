@@ -83,9 +83,12 @@ class Springs(System):
         self.fixed = _particles("fixed", fixed, self.n)
         if len(self.fixed) == self.n:
             raise ArgumentError(f"fixed: expected at least one particle that is free, got all {self.n}")
-        if rest is None and placed is None:
-            raise ArgumentError("rest: expected the lengths of the springs at rest, or layout= with the particles' places, got None")
-        lengths = _lengths(self.pairs, placed) if rest is None else _checks.not_negative("rest", rest, "lengths")
+        if rest is not None:
+            lengths = _checks.not_negative("rest", rest, "lengths")
+        elif placed is not None:
+            lengths = _lengths(self.pairs, placed)
+        else:
+            raise ArgumentError("rest: expected the lengths of the springs at rest, or layout= with the places, got None")
         springs = len(self.pairs)
         self.stiffness = _per_row("stiffness", _checks.not_negative("stiffness", stiffness), springs, "springs")
         self.rest = _per_row("rest", lengths, springs, "springs")
@@ -128,7 +131,8 @@ class Springs(System):
             shape = _checks.shape_of(name, state)
             if shape and (len(shape) < 2 or shape[0] != self.n or shape[1] not in (1, 2, 3)):
                 raise ShapeError(
-                    f"{name}: expected shape ({self.n}, 1 to 3, batch…) = ({self.axes}, batch…), got {shape}; batch axes come last"
+                    f"{name}: expected shape ({self.n}, 1 to 3, batch…) = ({self.axes}, batch…), got {shape}; "
+                    "batch axes come last"
                 )
             dims |= set(shape[1:2])
         if len(dims) > 1:
@@ -165,11 +169,11 @@ class Springs(System):
     def safe_step(self, method: str | Method) -> Any:
         """A step below which a method is stable, known before anything is run, for any number of springs.
 
-        No mode of an undamped net swings faster than ω, ω² = max (Wᵢ/mᵢ + Wⱼ/mⱼ) over the springs from i to j, where W is
-        the sum of the stiffnesses at a particle, and a fixed one has 1/m = 0. That holds in every position, for any rest lengths.
-        With damping or drag the rate of damping has a bound of the same kind, and every pair of both up to their bounds must be
-        stable. For one spring, and for lattices whose particles can swing against all of their neighbours, there is no longer safe
-        step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
+        No mode of an undamped net swings faster than ω, ω² = max (Wᵢ/mᵢ + Wⱼ/mⱼ) over the springs from i to j, where W is the sum
+        of the stiffnesses at a particle, and a fixed one has 1/m = 0. That holds in every position, for any rest lengths. With
+        damping or drag the rate of damping has a bound of the same kind, and every pair of both up to their bounds must be
+        stable. For one spring, and for lattices whose particles can swing against all of their neighbours, there is no longer
+        safe step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
 
         What grows by itself, such as a compressed spring that gives way sideways, is no matter of the step. Damping is part of
         the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False Heun and Semi-False Heun with damping it is

@@ -40,11 +40,11 @@ def in_order(pairs: Any, fixed: Any) -> list[Ends]:
 
 
 class Springs:
-    """A spring of length ℓ = |d|, d = yⱼ − yᵢ, pulls i with f·d and j with −f·d, f = (k·(ℓ − ℓ₀) + c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
+    """A spring of length ℓ = |d|, d = yⱼ − yᵢ, pulls i with f·d and j with −f·d, f = k − (k·ℓ₀ − c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
 
-    v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. A spring of no length has no direction and no force: 1 stands in the place of a divisor
-    of zero. The forces on a particle are summed in the order of the springs. The rate of a fixed particle is −0, and sums start
-    from it: x + −0 is x, also where x is a zero.
+    v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. Written so, f stays finite where the square of ℓ is too large for a number. A spring of
+    no length has no direction and no force: 1 stands in the place of a divisor of zero. The forces on a particle are summed in
+    the order of the springs. The rate of a fixed particle is −0, and sums start from it: x + −0 is x, also where x is a zero.
 
     Blocks are of shape (n, dim, …); masses and drag of shape (n, …), the others of shape (springs, …), or 1 for all.
     """
@@ -65,6 +65,7 @@ class Springs:
     ) -> None:
         self.h = h
         self.masses, self.stiffness, self.rest, self.damping = masses, stiffness, rest, damping
+        self.held = stiffness * rest
         ends = numbers_of(pairs).reshape(-1, 2)
         self.i, self.j = ends.T
         fixed_ones = numbers_of(fixed)
@@ -83,15 +84,17 @@ class Springs:
         """The force on the first end of each spring, shape (springs, dim, …)."""
         d = self.across(y)
         length = np.sqrt(square(d))
-        inverse = 1.0 / bits.where(bits.less(0.0, length), length, 1.0)
-        push = self.stiffness * (length - self.rest)
-        if self.damping is not None:
+        divisor = bits.where(bits.less(0.0, length), length, 1.0)
+        if self.damping is None:
+            push = self.held / divisor
+        else:
+            inverse = 1.0 / divisor
             w = self.across(v)
             along = w[:, 0] * d[:, 0]
             for c in range(1, d.shape[1]):
                 along = along + w[:, c] * d[:, c]
-            push = push + (self.damping * along) * inverse
-        forces: Array = (push * inverse)[:, np.newaxis] * d
+            push = (self.held - (self.damping * along) * inverse) * inverse
+        forces: Array = (self.stiffness - push)[:, np.newaxis] * d
         return forces
 
     def dv(self, t: float, v: Array, y: Array) -> Array:

@@ -15,8 +15,8 @@ from ..base import Scene
 def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
     """A square cloth of n × n particles, one unit of length wide, from rest in a level position, hung by two corners of one side.
 
-    Springs join neighbours in rows and columns, and across every mesh. The masses are 1 in all, gravity is 9.81, and the springs are
-    so stiff that False Euler is stable from 480 steps per unit of time on, whatever n is: half of what the scene takes.
+    Springs join neighbours in rows and columns, and across every mesh. The masses are 1 in all, gravity is 9.81, and the springs
+    are so stiff that False Euler is stable from 480 steps per unit of time on, whatever n is: half of what the scene takes.
 
     Args:
         n: particles in a row, two or more.
@@ -56,7 +56,7 @@ def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
         name="cloth",
         title=f"Cloth of {n} × {n} particles",
         section="beyond the document",
-        description="A cloth falls from a level position and swings from two corners: large nets, and a step that is known beforehand.",
+        description="A cloth falls from a level position and swings from two corners: a large net, whose safe step is known.",
         error="as far from the true places or velocities as the largest true ones",
         system=system,
         v=np.zeros_like(y),

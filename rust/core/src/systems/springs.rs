@@ -2,10 +2,10 @@
 //!
 //! A spring between the particles i and j, d = yⱼ − yᵢ apart, of length ℓ = |d|, pulls i with f·d and j with −f·d, where
 //!
-//! f = (k·(ℓ − ℓ₀) + c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
+//! f = k − (k·ℓ₀ − c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
 //!
-//! A spring of no length has no direction: 1 stands in the place of a divisor of zero, and f·d is zero since d is. The forces on a
-//! particle are summed in the order of the springs, from −0, which changes no sum. v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. The rate of
+//! Written so, f stays finite where the square of ℓ is too large for a number. A spring of no length has no direction: 1 stands in the
+//! place of a divisor of zero, and f·d is zero since d is. The forces on a particle are summed in the order of the springs, from −0, which changes no sum. v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. The rate of
 //! a fixed particle is −0, so that its velocity stays what it is.
 
 use crate::{
@@ -74,8 +74,8 @@ fn quantities(given: &Given) -> Vec<(String, usize)> {
 
 fn operations(given: &Given) -> usize {
     let (n, dim, springs) = (given.whole("n"), given.whole("dim"), given.list("pairs").len() / 2);
-    let damping = if given.has("damping") { 3 * dim + 2 } else { 0 };
-    springs * (6 * dim + 7 + damping) + n * dim * (2 + given.count("gravity").min(1) + 2 * given.count("drag").min(1))
+    let damping = if given.has("damping") { 3 * dim + 3 } else { 0 };
+    springs * (6 * dim + 5 + damping) + n * dim * (2 + given.count("gravity").min(1) + 2 * given.count("drag").min(1))
 }
 
 /// The number of a spring or of a particle: one may serve for all.
@@ -92,6 +92,8 @@ pub(crate) struct Springs<N: Number> {
     pub(crate) is_fixed: Vec<bool>,
     stiffness: Vec<N>,
     rest: Vec<N>,
+    /// k·ℓ₀
+    held: Vec<N>,
     /// None if there is no damping.
     damping: Vec<N>,
     masses: Vec<N>,
@@ -114,7 +116,7 @@ pub(crate) fn net<N: Number>(p: &Parameters<N>) -> Springs<N> {
     let mut is_fixed = vec![false; p.given.whole("n")];
     p.given.list("fixed").iter().for_each(|particle| is_fixed[*particle as usize] = true);
     let by_mass: Vec<N> = p.numbers("masses").iter().map(|mass| h / *mass).collect();
-    let drag = p.numbers("drag");
+    let [stiffness, rest, drag] = ["stiffness", "rest", "drag"].map(|name| p.numbers(name));
     let slowing = if drag.is_empty() {
         Vec::new()
     } else {
@@ -125,8 +127,9 @@ pub(crate) fn net<N: Number>(p: &Parameters<N>) -> Springs<N> {
         dim: p.given.whole("dim"),
         ends: ends.iter().map(|ends| ends.map(|particle| particle as usize)).collect(),
         is_fixed,
-        stiffness: p.numbers("stiffness").to_vec(),
-        rest: p.numbers("rest").to_vec(),
+        stiffness: stiffness.to_vec(),
+        held: (0..stiffness.len().max(rest.len())).map(|s| of(stiffness, s) * of(rest, s)).collect(),
+        rest: rest.to_vec(),
         damping: p.numbers("damping").to_vec(),
         masses: p.numbers("masses").to_vec(),
         by_mass,
@@ -136,10 +139,10 @@ pub(crate) fn net<N: Number>(p: &Parameters<N>) -> Springs<N> {
 }
 
 impl<N: Number> Springs<N> {
-    /// The stiffness, the rest length and the damping of a spring.
+    /// k, k·ℓ₀ and the damping of a spring.
     pub(crate) fn spring(&self, s: usize) -> [N; 3] {
         let damping = if self.damping.is_empty() { N::of(0.0) } else { of(&self.damping, s) };
-        [of(&self.stiffness, s), of(&self.rest, s), damping]
+        [of(&self.stiffness, s), of(&self.held, s), damping]
     }
 
     /// h/m of a particle.
@@ -167,14 +170,16 @@ impl<N: Number> Springs<N> {
     fn force(&self, s: usize, v: &[N], y: &[N]) -> Vec<N> {
         let d = self.across(s, y);
         let length = square(&d).sqrt();
-        let inverse = N::of(1.0) / N::choose(N::of(0.0).below(length), length, N::of(1.0));
-        let mut push = of(&self.stiffness, s) * (length - of(&self.rest, s));
-        if !self.damping.is_empty() {
+        let divisor = N::choose(N::of(0.0).below(length), length, N::of(1.0));
+        let push = if self.damping.is_empty() {
+            of(&self.held, s) / divisor
+        } else {
+            let inverse = N::of(1.0) / divisor;
             let w = self.across(s, v);
             let along = w.iter().zip(&d).map(|(w, d)| *w * *d).reduce(|sum, product| sum + product).unwrap_or(N::of(0.0));
-            push += (of(&self.damping, s) * along) * inverse;
-        }
-        let pull = push * inverse;
+            (of(&self.held, s) - (of(&self.damping, s) * along) * inverse) * inverse
+        };
+        let pull = of(&self.stiffness, s) - push;
         d.into_iter().map(|d| pull * d).collect()
     }
 

@@ -40,8 +40,8 @@ pub struct Rows {
     pub v: Aligned,
     /// Of springs, in the order in which they are computed.
     pub stiffness: Aligned,
-    /// Rest lengths.
-    pub rest: Aligned,
+    /// k·ℓ₀
+    pub held: Aligned,
     /// Nothing if there is none.
     pub damping: Aligned,
     /// Forces on first ends, with a margin before and behind them.
@@ -89,7 +89,7 @@ struct Ends<const D: usize> {
 
 /// The forces of a vector of springs.
 #[inline(always)]
-fn pull<const D: usize, const DAMPED: bool>(ends: &Ends<D>, [stiffness, rest, damping]: [Vector; 3]) -> [Vector; D] {
+fn pull<const D: usize, const DAMPED: bool>(ends: &Ends<D>, [stiffness, held, damping]: [Vector; 3]) -> [Vector; D] {
     let (mut d, mut square, mut along) = ([[0.0; SIDE]; D], [0.0; SIDE], [0.0; SIDE]);
     for c in 0..D {
         for l in 0..SIDE {
@@ -107,12 +107,14 @@ fn pull<const D: usize, const DAMPED: bool>(ends: &Ends<D>, [stiffness, rest, da
         let length = square[l].sqrt();
         // Bits, not a choice, which would become eight branches.
         let some = u64::from(0.0 < length).wrapping_neg();
-        let inverse = 1.0 / f64::from_bits(length.to_bits() & some | 1.0f64.to_bits() & !some);
-        let mut push = stiffness[l] * (length - rest[l]);
-        if DAMPED {
-            push += (damping[l] * along[l]) * inverse;
-        }
-        pull[l] = push * inverse;
+        let divisor = f64::from_bits(length.to_bits() & some | 1.0f64.to_bits() & !some);
+        let push = if DAMPED {
+            let inverse = 1.0 / divisor;
+            (held[l] - (damping[l] * along[l]) * inverse) * inverse
+        } else {
+            held[l] / divisor
+        };
+        pull[l] = stiffness[l] - push;
     }
     for c in 0..D {
         for l in 0..SIDE {
@@ -127,7 +129,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
     #[inline(always)]
     fn compute(rows: &mut Rows, at: usize, ends: &Ends<D>) {
         let damping = if DAMPED { load(&rows.damping, at) } else { [0.0; SIDE] };
-        let forces = pull::<D, DAMPED>(ends, [load(&rows.stiffness, at), load(&rows.rest, at), damping]);
+        let forces = pull::<D, DAMPED>(ends, [load(&rows.stiffness, at), load(&rows.held, at), damping]);
         let length = rows.springs;
         for c in 0..D {
             rows.forces[c * length + MARGIN + at..][..SIDE].copy_from_slice(&forces[c]);

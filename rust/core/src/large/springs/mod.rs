@@ -48,7 +48,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         y: Aligned::new(dim * particles),
         v: room(has_damping, dim * particles),
         stiffness: Aligned::new(springs),
-        rest: Aligned::new(springs),
+        held: Aligned::new(springs),
         damping: room(has_damping, springs),
         forces: Aligned::new(dim * (springs + 2 * MARGIN)),
         by_mass: Aligned::new(particles),
@@ -85,8 +85,8 @@ impl Rates for Springs {
         let net = net(&Parameters { given: &spec.given, h: self.h, numbers, sample: |_, _| f64::NAN });
         let Springs { order, rows, n, .. } = self;
         for (at, spring) in order.springs.iter().enumerate() {
-            let [stiffness, rest, damping] = net.spring(*spring as usize);
-            (rows.stiffness[at], rows.rest[at]) = (stiffness, rest);
+            let [stiffness, held, damping] = net.spring(*spring as usize);
+            (rows.stiffness[at], rows.held[at]) = (stiffness, held);
             if let Some(row) = rows.damping.get_mut(at) {
                 *row = damping;
             }
