@@ -15,7 +15,7 @@ from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody
+from ..systems import NBody, Springs
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -47,8 +47,8 @@ class RunPicture(Drawn, Value):
 
     @property
     def kind(self) -> str:
-        """What is drawn: ``"orbits"`` of bodies, ``"swing"`` of a single coordinate, or ``"rows"`` of coordinates."""
-        if isinstance(self.run.system, NBody):
+        """What is drawn: ``"orbits"`` of bodies or particles, ``"swing"`` of one coordinate, or ``"rows"`` of coordinates."""
+        if isinstance(self.run.system, (NBody, Springs)) and self.run.system.y_shape[1] > 1:
             return "orbits"
         return "rows" if self.scene.system.y_shape else "swing"
 
