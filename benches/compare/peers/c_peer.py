@@ -156,7 +156,7 @@ FORMS = {
     "bodies_leapfrog": bodies,
     "cluster_leapfrog": cluster,
     "shared_cluster_leapfrog": cluster,
-    "cloth_false_euler": cloth,
+    "cloth_leapfrog": cloth,
 }
 
 

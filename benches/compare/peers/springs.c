@@ -1,4 +1,4 @@
-/* Springs in space by False Euler. SCATTER adds each force to both ends at once; KEPT computes all forces in a loop that becomes vectors,
+/* Springs in space by leapfrog. SCATTER adds each force to both ends at once; KEPT computes all forces in a loop that becomes vectors,
    and then sums those of each particle in the order of the springs. PARTICLES and SPRINGS are known to the compiler.
 
    in: v, y, pairs, stiffness, rest, 1/m (0 where a particle is fixed), gravity. */
@@ -31,7 +31,7 @@ static void order(const double *pairs)
     }
 }
 
-void cloth_false_euler(long n, long steps, double h, const double *const *in, double *v_out, double *y_out)
+void cloth_leapfrog(long n, long steps, double h, const double *const *in, double *v_out, double *y_out)
 {
     const double *k = in[3], *rest = in[4], *by_mass = in[5], *gravity = in[6];
     (void)n;
@@ -41,7 +41,8 @@ void cloth_false_euler(long n, long steps, double h, const double *const *in, do
             u[c][i] = in[0][3 * i + c];
             x[c][i] = in[1][3 * i + c];
         }
-    for (long step = 0; step < steps; step++) {
+    for (long step = 0; step <= steps; step++) {
+        double kick = step > 0 && step < steps ? h : 0.5 * h, drift = step < steps ? h : 0.0;
         memset(f, 0, sizeof f);
         for (int s = 0; s < SPRINGS; s++) {
             int i = first[s], j = second[s];
@@ -66,9 +67,9 @@ void cloth_false_euler(long n, long steps, double h, const double *const *in, do
 #endif
         for (int c = 0; c < 3; c++)
             for (int i = 0; i < PARTICLES; i++) {
-                double w = h * by_mass[i], fall = by_mass[i] > 0.0 ? h * gravity[c] : 0.0;
+                double w = kick * by_mass[i], fall = by_mass[i] > 0.0 ? kick * gravity[c] : 0.0;
                 u[c][i] += w * f[c][i] + fall;
-                x[c][i] += h * u[c][i];
+                x[c][i] += drift * u[c][i];
             }
     }
     for (int i = 0; i < PARTICLES; i++)

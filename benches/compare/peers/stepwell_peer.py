@@ -61,7 +61,7 @@ SYSTEMS = {
     "bodies_leapfrog": (bodies, "leapfrog"),
     "cluster_leapfrog": (bodies, "leapfrog"),
     "shared_cluster_leapfrog": (bodies, "leapfrog"),
-    "cloth_false_euler": (cloth, "false_euler"),
+    "cloth_leapfrog": (cloth, "leapfrog"),
     **{f"own_{each.name}": (functools.partial(own, each), "rk4") for each in EQUATIONS},
 }
 OWN = tuple(kind for kind in SYSTEMS if kind.startswith("own_"))
@@ -88,9 +88,9 @@ def kernels(*without: str, **how):
     return {kind: functools.partial(made, *what, how) for kind, what in SYSTEMS.items() if kind not in without}
 
 
-as_many_as_pay = kernels("cluster_leapfrog", "cloth_false_euler", *OWN, threads=None)
+as_many_as_pay = kernels("cluster_leapfrog", "cloth_leapfrog", *OWN, threads=None)
 #: Large clusters and nets are no single tape, and so are not fused.
-fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", "cloth_false_euler", threads=1, fused=True)
+fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", "cloth_leapfrog", threads=1, fused=True)
 all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),

@@ -43,7 +43,7 @@ class Springs:
     """A spring of length ℓ = |d|, d = yⱼ − yᵢ, pulls i with f·d and j with −f·d, f = k − (k·ℓ₀ − c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
 
     v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. Written so, f stays finite where the square of ℓ is too large for a number. A spring of
-    no length has no direction and no force: 1 stands in the place of a divisor of zero. The forces on a particle are summed in
+    no length has no direction and no force: 1 stands in place of a divisor of zero. The forces on a particle are summed in
     the order of the springs. The rate of a fixed particle is −0, and sums start from it: x + −0 is x, also where x is a zero.
 
     Blocks are of shape (n, dim, …); masses and drag of shape (n, …), the others of shape (springs, …), or 1 for all.

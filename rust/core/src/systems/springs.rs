@@ -4,9 +4,10 @@
 //!
 //! f = k − (k·ℓ₀ − c·((vⱼ − vᵢ)·d)/ℓ)/ℓ.
 //!
-//! Written so, f stays finite where the square of ℓ is too large for a number. A spring of no length has no direction: 1 stands in the
-//! place of a divisor of zero, and f·d is zero since d is. The forces on a particle are summed in the order of the springs, from −0, which changes no sum. v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. The rate of
-//! a fixed particle is −0, so that its velocity stays what it is.
+//! Written so, f stays finite where the square of ℓ is too large for a number. A spring of no length has no direction: 1 stands in
+//! place of a divisor of zero, and f·d is zero since d is. The forces on a particle are summed in the order of the springs, from −0,
+//! which changes no sum. v̇ = Σ f·d/m + g − (drag/m)·v, ẏ = v. The rate of a fixed particle is −0, so that its velocity stays what
+//! it is.
 
 use crate::{
     error::Error,

@@ -64,10 +64,18 @@ fn load(from: &[f64], at: usize) -> Vector {
 /// Takes the rows of a block apart.
 #[inline(always)]
 fn apart<const D: usize>(block: &[f64], rows: &mut [f64], length: usize) {
-    let (particles, _) = block.as_chunks::<D>();
-    for c in 0..D {
-        for (number, particle) in rows[c * length..][..length].iter_mut().zip(particles) {
-            *number = particle[c];
+    let (vectors, rest) = block.as_chunks::<D>().0.as_chunks::<SIDE>();
+    for (vector, particles) in vectors.iter().enumerate() {
+        for c in 0..D {
+            let row = &mut rows[c * length + SIDE * vector..][..SIDE];
+            for l in 0..SIDE {
+                row[l] = particles[l][c];
+            }
+        }
+    }
+    for (i, particle) in rest.iter().enumerate() {
+        for c in 0..D {
+            rows[c * length + SIDE * vectors.len() + i] = particle[c];
         }
     }
 }
@@ -85,6 +93,10 @@ pub struct Forces<'a, const D: usize, const DAMPED: bool> {
 struct Ends<const D: usize> {
     y: [[Vector; D]; 2],
     v: [[Vector; D]; 2],
+}
+
+impl<const D: usize> Ends<D> {
+    const NONE: Self = Ends { y: [[[0.0; SIDE]; D]; 2], v: [[[0.0; SIDE]; D]; 2] };
 }
 
 /// The forces of a vector of springs.
@@ -136,20 +148,60 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
         }
     }
 
-    /// Ends that `of` finds in a row.
+    /// Ends side by side, from these particles on.
     #[inline(always)]
-    fn ends(rows: &Rows, of: impl Fn(&[f64], usize) -> Vector) -> Ends<D> {
-        let length = rows.particles;
-        let mut ends = Ends { y: [[[0.0; SIDE]; D]; 2], v: [[[0.0; SIDE]; D]; 2] };
+    fn beside(rows: &Rows, first: [u32; 2]) -> Ends<D> {
+        let mut ends = Ends::NONE;
         for end in 0..2 {
             for c in 0..D {
-                ends.y[end][c] = of(&rows.y[c * length..][..length], end);
+                let at = c * rows.particles + first[end] as usize;
+                ends.y[end][c] = load(&rows.y, at);
                 if DAMPED {
-                    ends.v[end][c] = of(&rows.v[c * length..][..length], end);
+                    ends.v[end][c] = load(&rows.v, at);
                 }
             }
         }
         ends
+    }
+
+    /// Ends anywhere.
+    #[inline(always)]
+    fn anywhere(y: &[[f64; D]], v: &[[f64; D]], numbers: &[[u32; SIDE]; 2]) -> Ends<D> {
+        let mut ends = Ends::NONE;
+        for end in 0..2 {
+            for l in 0..SIDE {
+                let i = numbers[end][l] as usize;
+                let (place, speed) = (&y[i], if DAMPED { &v[i] } else { &[0.0; D] });
+                for c in 0..D {
+                    ends.y[end][c][l] = place[c];
+                    ends.v[end][c][l] = speed[c];
+                }
+            }
+        }
+        ends
+    }
+
+    /// The sums of the forces on so many particles, one by one.
+    #[inline(always)]
+    fn sums_of_singles(order: &Order, rows: &Rows, first: usize, count: usize) -> [Vector; D] {
+        let mut sums = [[-0.0; SIDE]; D];
+        let mut from = if first == 0 { 0 } else { order.until_single[first - 1] as usize };
+        for l in 0..count.min(SIDE) {
+            let until = order.until_single[first + l] as usize;
+            let mut sum = [-0.0; D];
+            for single in &order.singles[from..until] {
+                let turned = u64::from(single.is_second) << 63;
+                for c in 0..D {
+                    let force = rows.forces[c * rows.springs + single.at as usize];
+                    sum[c] += f64::from_bits(force.to_bits() ^ turned);
+                }
+            }
+            for c in 0..D {
+                sums[c][l] = sum[c];
+            }
+            from = until;
+        }
+        sums
     }
 
     /// The sums of the forces on a vector of particles.
@@ -178,6 +230,46 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
     }
 }
 
+impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
+    /// The rates of the particles from a place on, of which these are the sums of the forces.
+    #[inline(always)]
+    fn finish(rows: &Rows, at: usize, sums: [Vector; D], speeds: &[[f64; D]], out: &mut [[f64; D]]) {
+        let by_mass = load(&rows.by_mass, at);
+        let mut rates = sums;
+        for c in 0..D {
+            for l in 0..SIDE {
+                rates[c][l] *= by_mass[l];
+            }
+            if let Some(fall) = rows.fall.get(c) {
+                for l in 0..SIDE {
+                    rates[c][l] += fall;
+                }
+            }
+        }
+        if !rows.slowing.is_empty() {
+            let slowing = load(&rows.slowing, at);
+            for (l, v) in speeds[at..].iter().take(SIDE).enumerate() {
+                for c in 0..D {
+                    rates[c][l] -= slowing[l] * v[c];
+                }
+            }
+        }
+        if let Ok(whole) = <&mut [[f64; D]; SIDE]>::try_from(&mut *out) {
+            for l in 0..SIDE {
+                for c in 0..D {
+                    whole[l][c] = rates[c][l];
+                }
+            }
+        } else {
+            for (l, out) in out.iter_mut().enumerate() {
+                for c in 0..D {
+                    out[c] = rates[c][l];
+                }
+            }
+        }
+    }
+}
+
 impl<const D: usize, const DAMPED: bool> Task for Forces<'_, D, DAMPED> {
     #[inline(always)]
     fn run(self) {
@@ -187,41 +279,23 @@ impl<const D: usize, const DAMPED: bool> Task for Forces<'_, D, DAMPED> {
         if DAMPED {
             apart::<D>(v, &mut rows.v, length);
         }
+        let ((places, _), (speeds, _)) = (y.as_chunks::<D>(), v.as_chunks::<D>());
         for run in &order.runs {
-            let ends = Self::ends(rows, |row, end| load(row, run.ends[end] as usize));
+            let ends = Self::beside(rows, run.ends);
             Self::compute(rows, run.at as usize, &ends);
         }
         for (vector, numbers) in order.others.iter().enumerate() {
-            let ends = Self::ends(rows, |row, end| numbers[end].map(|i| row[i as usize]));
+            let ends = Self::anywhere(places, speeds, numbers);
             Self::compute(rows, order.first_other + SIDE * vector, &ends);
         }
         let (out, _) = out[..y.len()].as_chunks_mut::<D>();
-        let (v, _) = v.as_chunks::<D>();
         for (vector, out) in out.chunks_mut(SIDE).enumerate() {
             let at = SIDE * vector;
-            let mut rates = Self::sums(order, rows, vector);
-            let by_mass = load(&rows.by_mass, at);
-            for c in 0..D {
-                for l in 0..SIDE {
-                    rates[c][l] *= by_mass[l];
-                }
-                if let Some(fall) = rows.fall.get(c) {
-                    for l in 0..SIDE {
-                        rates[c][l] += fall;
-                    }
-                }
-            }
-            for (l, out) in out.iter_mut().enumerate() {
-                for c in 0..D {
-                    out[c] = rates[c][l];
-                }
-            }
-            if !rows.slowing.is_empty() {
-                for (l, (out, v)) in out.iter_mut().zip(&v[at..]).enumerate() {
-                    for c in 0..D {
-                        out[c] -= rows.slowing[at + l] * v[c];
-                    }
-                }
+            let before = if at == 0 { 0 } else { order.until_single[at - 1] };
+            if order.until_single[at + out.len() - 1] > before {
+                Self::finish(rows, at, Self::sums_of_singles(order, rows, at, out.len()), speeds, out);
+            } else {
+                Self::finish(rows, at, Self::sums(order, rows, vector), speeds, out);
             }
         }
     }

@@ -9,6 +9,8 @@ use super::SIDE;
 
 /// Before and behind the forces there is room for what a vector reaches beyond them.
 pub const MARGIN: usize = SIDE;
+/// Forces that a vector of them must give to particles on average; with fewer it is faster to add them one by one.
+const MIN_FORCES_PER_ADDEND: usize = 2;
 
 /// A vector of springs whose ends are particles side by side.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +32,15 @@ pub struct Addend {
     pub is_second: bool,
 }
 
+/// A force that is added to a particle by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Single {
+    /// The place of the force, with the margin before it.
+    pub at: u32,
+    /// As of an [`Addend`].
+    pub is_second: bool,
+}
+
 /// The order of a net.
 pub struct Order {
     /// Of each place the spring that is computed there; the last are filled with the last spring.
@@ -44,6 +55,10 @@ pub struct Order {
     pub addends: Vec<Addend>,
     /// Behind the addends of each vector of particles.
     pub until: Vec<u32>,
+    /// Forces one by one, particle after particle, for vectors of particles whose forces hardly ever lie side by side.
+    pub singles: Vec<Single>,
+    /// Behind the single forces of each particle.
+    pub until_single: Vec<u32>,
 }
 
 /// Both ends of a spring.
@@ -82,8 +97,22 @@ impl Order {
 
         let mut place = vec![0; pairs.len() / 2];
         springs.iter().enumerate().rev().for_each(|(at, spring)| place[*spring as usize] = at);
-        let (addends, until) = addends(n, pairs, is_fixed, &place);
-        Order { springs, runs, others, first_other, addends, until }
+        let (addends, until, singles, until_single) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut order = Order { springs, runs, others, first_other, addends, until, singles, until_single };
+        for particles in of_particles(n, pairs, is_fixed, &place).chunks(SIDE) {
+            let addends = vectors_of_forces(particles);
+            let by_vector = addends.len() * MIN_FORCES_PER_ADDEND <= particles.iter().map(Vec::len).sum::<usize>();
+            if by_vector {
+                order.addends.extend(addends);
+            }
+            for forces in particles {
+                let single = |(at, is_second): &(usize, bool)| Single { at: (MARGIN + at) as u32, is_second: *is_second };
+                order.singles.extend(forces.iter().filter(|_| !by_vector).map(single));
+                order.until_single.push(order.singles.len() as u32);
+            }
+            order.until.push(order.addends.len() as u32);
+        }
+        order
     }
 }
 
@@ -98,26 +127,21 @@ fn of_particles(n: usize, pairs: &[u32], is_fixed: &[bool], place: &[usize]) -> 
     forces
 }
 
-/// Vectors of forces for vectors of particles. Each takes the next force of as many particles as have theirs side by side.
-fn addends(n: usize, pairs: &[u32], is_fixed: &[bool], place: &[usize]) -> (Vec<Addend>, Vec<u32>) {
-    let forces = of_particles(n, pairs, is_fixed, place);
-    let (mut addends, mut until) = (Vec::new(), Vec::new());
-    for particles in forces.chunks(SIDE) {
-        let mut left: Vec<&[(usize, bool)]> = particles.iter().map(Vec::as_slice).collect();
-        // Where a vector would begin that has a particle's next force in its place.
-        let begins = |lane: usize, left: &[(usize, bool)]| left.first().map(|(at, is_second)| (MARGIN + at - lane, *is_second));
-        loop {
-            let next: Vec<Option<(usize, bool)>> = left.iter().enumerate().map(|(lane, left)| begins(lane, left)).collect();
-            let shared = |one: &(usize, bool)| next.iter().flatten().filter(|other| *other == one).count();
-            let Some((at, is_second)) = next.iter().flatten().copied().max_by_key(shared) else { break };
-            let mut takes = 0;
-            for (lane, left) in left.iter_mut().enumerate().filter(|(lane, _)| next[*lane] == Some((at, is_second))) {
-                takes |= 1 << lane;
-                *left = &left[1..];
-            }
-            addends.push(Addend { at: at as u32, takes, is_second });
+/// Vectors of forces for a vector of particles. Each takes the next force of as many particles as have theirs side by side.
+fn vectors_of_forces(particles: &[Vec<(usize, bool)>]) -> Vec<Addend> {
+    let mut addends = Vec::new();
+    let mut left: Vec<&[(usize, bool)]> = particles.iter().map(Vec::as_slice).collect();
+    // Where a vector would begin that has a particle's next force in its place.
+    let begins = |lane: usize, left: &[(usize, bool)]| left.first().map(|(at, is_second)| (MARGIN + at - lane, *is_second));
+    loop {
+        let next: Vec<Option<(usize, bool)>> = left.iter().enumerate().map(|(lane, left)| begins(lane, left)).collect();
+        let shared = |one: &(usize, bool)| next.iter().flatten().filter(|other| *other == one).count();
+        let Some((at, is_second)) = next.iter().flatten().copied().max_by_key(shared) else { return addends };
+        let mut takes = 0;
+        for (lane, left) in left.iter_mut().enumerate().filter(|(lane, _)| next[*lane] == Some((at, is_second))) {
+            takes |= 1 << lane;
+            *left = &left[1..];
         }
-        until.push(addends.len() as u32);
+        addends.push(Addend { at: at as u32, takes, is_second });
     }
-    (addends, until)
 }
