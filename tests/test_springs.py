@@ -422,6 +422,25 @@ def test_the_safe_step_is_never_above_the_exact_limit(method: str, given: dict[s
             assert sw.method(method).limit == 0.0
 
 
+def test_the_exact_limit_of_nets_that_drift_or_are_fixed_is_known() -> None:
+    """A triangle at rest breathes with ω² = 3k/m, whichever way it drifts and turns; a mode has the shape of the net."""
+    net = sw.Springs([(0, 1), (1, 2), (2, 0)], stiffness=np.array([[1.0, 4.0]]), rest=1.0)
+    y = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, math.sqrt(0.75)]])
+    found = sw.stability_limit(net, "leapfrog", v=0.0, y=y)
+    np.testing.assert_allclose(found, 2.0 / np.sqrt([3.0, 12.0]), rtol=1e-9)
+    assert found.decided.all()
+    mode = found.modes[0].y
+    assert mode.shape == (3, 2)
+    out = y - y.mean(axis=0)
+    assert abs(np.vdot(mode, out)) == pytest.approx(np.linalg.norm(mode) * np.linalg.norm(out), rel=1e-6)
+    held = sw.Springs([(0, 1)], stiffness=4.0, rest=1.0, fixed=[0])
+    limit = sw.stability_limit(held, "leapfrog", v=0.0, y=[[0.0, 0.0], [1.2, 0.0]])
+    assert limit == pytest.approx(1.0, rel=1e-12)
+    assert (limit.mode.y[0] == 0.0).all()
+    with pytest.raises(UnsupportedError, match="give at=.* or ask its safe_step for a bound"):
+        sw.stability_limit(held, "leapfrog")
+
+
 def test_a_lattice_needs_the_safe_step() -> None:
     """Springs of no rest length resist all displacements alike, so the lattice is two of graphs: in its fastest mode all
     neighbours swing against each other, with ω² = (8k/m)·sin²(½π(n − 1)/n); the bound is 8k/m. It holds below that, and grows

@@ -16,7 +16,18 @@ from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, Stepwell
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, Springs, System
+from .systems import (
+    Chain,
+    LinearSystem,
+    NBody,
+    Oscillator,
+    Pendulum,
+    RestrictedThreeBody,
+    Sampled,
+    Sinusoid,
+    Springs,
+    System,
+)
 from .world import World
 
 if TYPE_CHECKING:
