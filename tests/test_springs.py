@@ -437,7 +437,7 @@ def test_the_exact_limit_of_nets_that_drift_or_are_fixed_is_known() -> None:
     limit = sw.stability_limit(held, "leapfrog", v=0.0, y=[[0.0, 0.0], [1.2, 0.0]])
     assert limit == pytest.approx(1.0, rel=1e-12)
     assert (limit.mode.y[0] == 0.0).all()
-    with pytest.raises(UnsupportedError, match="give at=.* or ask its safe_step for a bound"):
+    with pytest.raises(UnsupportedError, match=r"give at=.* or ask its safe_step for a bound"):
         sw.stability_limit(held, "leapfrog")
 
 
