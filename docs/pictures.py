@@ -146,8 +146,30 @@ def tape() -> Figure:
     return figure
 
 
+def cloth() -> Figure:
+    """The scene of that name at four times: each row and column a line, seen from the side."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    scene, n = sw.scenes.cloth(), 32
+    run = scene.run("leapfrog", every=160)
+    figure = Figure(figsize=(14, 4.2))
+    for i, (t, y) in enumerate(zip(run.t, run.y, strict=True)):
+        axes = figure.add_axes((0.01 + 0.245 * i, 0.02, 0.24, 0.9))
+        net = y.reshape(n, n, 3)
+        seen = np.stack([net[..., 0] + 0.55 * net[..., 1], net[..., 2] + 0.35 * net[..., 1]], axis=-1)
+        for line in (*seen, *seen.transpose(1, 0, 2)):
+            axes.plot(*line.T, color="#333333", linewidth=0.6)
+        axes.plot(*seen[0, [0, -1]].T, "o", color="#000000", markersize=6)
+        axes.set(xlim=(-0.62, 1.05), ylim=(-1.45, 0.1), aspect="equal")
+        axes.set_title(f"t = {t:.2f}", fontsize=14)
+        axes.set_axis_off()
+    return figure
+
+
 if __name__ == "__main__":
     write("tape.png", tape())
+    write("cloth.png", cloth())
     examples()
     turns = sw.scenes.aircraft()
     write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())

@@ -51,6 +51,13 @@ def _moments(rng: np.random.Generator, b: int) -> Any:
     return rng.uniform(1.0, 2.0, (3, b))
 
 
+def _hung(rng: np.random.Generator, dim: int, **given: Any) -> sw.Springs:
+    """A net of three by three particles that hangs from two corners."""
+    layout = np.stack(np.meshgrid(range(3), range(3), [0]), axis=-1).reshape(9, 3)[:, :dim] + 0.1 * rng.normal(size=(9, dim))
+    pairs = [(i, j) for i in range(9) for j in range(i + 1, 9) if max(abs(i // 3 - j // 3), abs(i % 3 - j % 3)) == 1]
+    return sw.Springs(pairs, stiffness=rng.uniform(0.5, 2.0, len(pairs)), layout=layout, fixed=[0, 2], **given)
+
+
 #: One maker for each kernel variant of each system.
 SYSTEMS: dict[str, Make] = {
     "block with friction": lambda r, b: sw.Oscillator(0.0, friction=r.uniform(0.0, 0.5, b), form="physical"),
@@ -100,6 +107,15 @@ SYSTEMS: dict[str, Make] = {
     "pendulum in space, length projection": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.Projection("length"), (b,)),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
+    "springs: a triangle": lambda r, b: sw.Springs(
+        [(0, 1), (1, 2), (2, 0)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=1.0, dim=2
+    ),
+    "springs: hung, damped": lambda r, b: _hung(r, 2, damping=r.uniform(0.1, 0.5, b)[np.newaxis], gravity=(0.0, -1.0)),
+    "springs: hung in space": lambda r, b: _hung(r, 3, masses=r.uniform(0.5, 2.0, (9, b)), gravity=r.normal(size=(3, b))),
+    "springs: hung in space, dragged": lambda r, b: _hung(r, 3, drag=r.uniform(0.1, 0.5, 9), damping=r.uniform(0.1, 0.5, 20)),
+    "springs: on a line": lambda r, b: sw.Springs(
+        [(0, 1), (1, 2), (3, 2)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=0.5, fixed=[0, 3], dim=1
+    ),
     "top, free": lambda r, b: sw.RigidBody(_moments(r, b)),
     "top, damped, torques of its own": lambda r, b: sw.RigidBody(
         _moments(r, b), [_sine(r, b), None, _held(r, b)], damping=r.uniform(0.0, 0.3, b) * np.ones((3, 1))

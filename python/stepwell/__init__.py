@@ -28,6 +28,7 @@ from .systems import (
     Rods,
     Sampled,
     Sinusoid,
+    Springs,
     System,
 )
 from .world import World
@@ -71,6 +72,7 @@ __all__ = [
     "Sampled",
     "Scene",
     "Sinusoid",
+    "Springs",
     "Status",
     "StepwellError",
     "System",

@@ -17,7 +17,7 @@ import numpy as np
 
 from . import Contestant, MissingPeerError, Ready, Workload, fastest, threads
 
-OSCILLATORS, BODIES = (Path(__file__).with_name(name) for name in ("kernels.c", "bodies.c"))
+OSCILLATORS, BODIES, SPRINGS = (Path(__file__).with_name(name) for name in ("kernels.c", "bodies.c", "springs.c"))
 FLAGS = ["-O3", "-fno-math-errno", "-shared", "-fPIC"]
 BLOCKS = (32, 64, 80, 96, 128)
 FEW = (1, 8)  # for a member or a few
@@ -140,6 +140,13 @@ def cluster(work: Workload, quick: bool, exact: bool) -> list[Form]:
     return [Form(BODIES, each, options, 1) for each in told]
 
 
+def cloth(work: Workload, quick: bool, exact: bool) -> list[Form]:
+    """Forces added to both ends one after the other, or kept and summed particle by particle."""
+    sizes = f"-DPARTICLES={len(work.data['v'])}", f"-DSPRINGS={len(work.data['pairs'])}"
+    hows = [EXACT] if exact else [FAST, ()]
+    return [Form(SPRINGS, (form,), (*sizes, *how)) for form in ("scatter", "kept") for how in hows]
+
+
 FORMS = {
     "free_false_euler": oscillators,
     "forced_standard_heun": oscillators,
@@ -149,6 +156,7 @@ FORMS = {
     "bodies_leapfrog": bodies,
     "cluster_leapfrog": cluster,
     "shared_cluster_leapfrog": cluster,
+    "cloth_leapfrog": cloth,
 }
 
 

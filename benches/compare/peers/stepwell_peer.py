@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 
+import numpy as np
 import stepwell as sw
 
 from ..own.equations import EQUATIONS, Equation
@@ -33,6 +34,14 @@ def bodies(data) -> sw.System:
     return sw.NBody(data["masses"], force="newton", softening=data["softening"])
 
 
+def cloth(data) -> sw.System:
+    """Particles and springs; what has no 1/m is fixed."""
+    by_mass = data["by_mass"]
+    masses, fixed = 1.0 / np.where(by_mass > 0.0, by_mass, 1.0), np.flatnonzero(by_mass == 0.0)
+    given = {name: data[name] for name in ("stiffness", "rest", "gravity")}
+    return sw.Springs(data["pairs"].astype(int), masses=masses, fixed=fixed, **given)
+
+
 def own(equation: Equation, data) -> sw.System:
     """Own equations with the members' parameters."""
     return equation.system(**{name: data[name] for name in equation.own})
@@ -52,6 +61,7 @@ SYSTEMS = {
     "bodies_leapfrog": (bodies, "leapfrog"),
     "cluster_leapfrog": (bodies, "leapfrog"),
     "shared_cluster_leapfrog": (bodies, "leapfrog"),
+    "cloth_leapfrog": (cloth, "leapfrog"),
     **{f"own_{each.name}": (functools.partial(own, each), "rk4") for each in EQUATIONS},
 }
 OWN = tuple(kind for kind in SYSTEMS if kind.startswith("own_"))
@@ -78,9 +88,9 @@ def kernels(*without: str, **how):
     return {kind: functools.partial(made, *what, how) for kind, what in SYSTEMS.items() if kind not in without}
 
 
-as_many_as_pay = kernels("cluster_leapfrog", *OWN, threads=None)
-#: Large clusters are no single tape, and so are not fused.
-fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", threads=1, fused=True)
+as_many_as_pay = kernels("cluster_leapfrog", "cloth_leapfrog", *OWN, threads=None)
+#: Large clusters and nets are no single tape, and so are not fused.
+fused = kernels("cluster_leapfrog", "shared_cluster_leapfrog", "cloth_leapfrog", threads=1, fused=True)
 all_of_them = {"shared_cluster_leapfrog": kernels(threads=threads())["shared_cluster_leapfrog"]}
 CONTESTANTS = [
     Contestant("stepwell, 1 thread", kernels(threads=1)),

@@ -21,13 +21,14 @@ from ..errors import UnsupportedError
 from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
-from ..systems import LinearSystem, System
+from ..systems import LinearSystem, Springs, System
 from ..systems.base import a_system
 from . import maps
 from .analysis import given_state, state
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
 from .limit_search import Search
 from .parts import parts
+from .small_motions import lifted, linearised
 
 __all__ = ["Mode", "StabilityLimit", "StabilityLimits", "stability_limit"]
 
@@ -52,7 +53,8 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: their contribution to the samples is bounded.
         method: its name, or what ``stepwell.method`` returns.
-        at: a state (v, y) at which a nonlinear system is linearised.
+        at: a state (v, y) at which a nonlinear system is linearised. Of ``Springs`` it is the limit of small motions of what is
+            not fixed; ``safe_step`` is a bound of it for every state, and for any number of springs.
         t: the time of that state.
         v: in place of ``at``, the velocities of the state.
         y: in place of ``at``, its coordinates.
@@ -75,8 +77,11 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     fits_together(system, how)
     t = _checks.number("t", t)
     if at is None and not system.linear:
-        raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there")
+        bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""
+        raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there{bound}")
     v, y = (None, None) if at is None else state("at", system, at)
+    if isinstance(system, Springs) and system.control is None and v is not None and y is not None:
+        return _of_springs(system, how, v, y)
     search = Search(system, how, v, y, t) if not system.linear else Search(system, how, None, None, 0.0)
     if system.linear and len(search.rates) > 2:
         limits, grows, modes = _by_parts(search)
@@ -89,6 +94,17 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     if not limits.shape:
         return StabilityLimit(float(limits), modes[()], float(grows))
     return limits_of(limits, modes, grows)
+
+
+def _of_springs(springs: Springs, method: Method, v: Array, y: Array) -> Any:
+    """The limit of small motions about a state."""
+    found = stability_limit(linearised(springs, v, y), method)
+    if isinstance(found, StabilityLimit):
+        return StabilityLimit(float(found), lifted(springs, found.mode), found.grows)
+    modes = np.empty(found.shape, dtype=object)
+    for index in np.ndindex(found.shape):
+        modes[index] = lifted(springs, found.modes[index])
+    return limits_of(np.asarray(found), modes, found.grows)
 
 
 def _by_parts(search: Search) -> tuple[Array, Array, Any]:

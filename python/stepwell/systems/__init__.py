@@ -17,6 +17,7 @@ from .pendulum_3d import Pendulum3D
 from .restricted_three_body import RestrictedThreeBody
 from .rigid_body import RigidBody
 from .rods import Rods
+from .springs import Springs
 
 if TYPE_CHECKING:
     from .aircraft import Aircraft
@@ -34,6 +35,7 @@ __all__ = [
     "Rods",
     "Sampled",
     "Sinusoid",
+    "Springs",
     "System",
 ]
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from ..methods import Method
     from .inputs import Input
 
-#: A description as the core takes it: names with words, whole numbers, rows of numbers for each member (or one for all), and
-#: tables of samples: start, interval, a row for each sample.
+#: A description as the core takes it: names with words, whole numbers, lists of whole numbers (as bytes, four for each), rows of
+#: numbers for each member (or one for all), and tables of samples: start, interval, a row for each sample.
 Given = list[tuple[str, Any]]
 
 
@@ -104,8 +104,9 @@ class System(Fixed, Value, ABC):
     def given(self, batch: Shape) -> dict[str, Any]:
         """Its parameters by name, for states of that batch shape: the arguments of its reference class except the step.
 
-        Each is a word, a whole number, an array (its own axes first, then those of the batch), a signal, a list of signals, or
-        None if it was not given. The core takes the same under the same names.
+        Each is a word, a whole number, a list of whole numbers as bytes (four for each, the lowest first), an array (its own axes
+        first, then those of the batch), a signal, a list of signals, or None if it was not given. The core takes the same under
+        the same names.
         """
 
     def alone(self, h: float, batch: Shape) -> Any:
@@ -286,7 +287,7 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
             entries.append((name, rows(value, batch)))
             continue
         match value:
-            case str() | int():
+            case str() | int() | bytes():
                 entries.append((name, value))
             case list():
                 entries.append((name, len(value)))

@@ -54,6 +54,8 @@ pub struct Given {
     pub words: Vec<(String, String)>,
     /// Whole numbers, such as the dimensions of a space.
     pub wholes: Vec<(String, usize)>,
+    /// Lists of whole numbers, such as the ends of springs.
+    pub lists: Vec<(String, Arc<[u32]>)>,
     /// Parameters: how many rows each has, and for each row whether all members have it in common.
     pub rows: Vec<(String, Vec<bool>)>,
     /// Sampled inputs, and whether all members have all samples in common.
@@ -75,6 +77,11 @@ impl Given {
     /// The whole number of that name; zero if it was not given.
     pub fn whole(&self, name: &str) -> usize {
         find(&self.wholes, name).copied().unwrap_or(0)
+    }
+
+    /// The list of whole numbers of that name; empty if it was not given.
+    pub fn list(&self, name: &str) -> &[u32] {
+        find(&self.lists, name).map_or(&[], |list| list)
     }
 
     /// How many rows the parameter of that name has; zero if it was not given.

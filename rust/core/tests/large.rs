@@ -36,6 +36,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         system: system.to_owned(),
         words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        lists: Vec::new(),
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![false; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
         equations: None,
@@ -60,6 +61,42 @@ fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Given 
     given("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
 }
 
+/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across, which do
+/// not. The first particle is fixed if there is more than one row.
+fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Given {
+    let n = rows * columns;
+    let mut pairs: Vec<[usize; 2]> = (0..n).filter(|i| i % columns + 1 < columns).map(|i| [i, i + 1]).collect();
+    pairs.extend((columns..n).map(|i| [i, i - columns]));
+    pairs.extend((2..n / 2).step_by(3).map(|i| [n - i, i / 2]));
+    let fixed = if rows > 1 { vec![0] } else { Vec::new() };
+    let mut parameters = vec![("masses", 1), ("stiffness", 1), ("rest", 1)];
+    for (name, count) in numbers {
+        parameters.retain(|(known, _)| known != name);
+        parameters.push((name, if *count == 0 { pairs.len() } else { *count }));
+    }
+    match control.first() {
+        Some((_, "energy")) => parameters.extend([("control.gain", 1), ("control.target", 1)]),
+        Some(_) => parameters.push(("control.target", 1)),
+        None => {}
+    }
+    let list = |numbers: Vec<usize>| numbers.into_iter().map(|number| number as u32).collect();
+    let lists = vec![("pairs".to_owned(), list(pairs.concat())), ("fixed".to_owned(), list(fixed))];
+    Given { lists, ..given("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
+}
+
+/// Nets of springs: a pair, and those of every kind; 0 stands for as many numbers as there are springs.
+fn nets() -> Vec<Given> {
+    let damped = [("masses", 12), ("stiffness", 0), ("rest", 0), ("damping", 0), ("gravity", 3), ("drag", 12)];
+    vec![
+        net(1, 2, 1, &[], &[]),
+        net(1, 4, 2, &[("damping", 1)], &[]),
+        net(3, 4, 3, &damped, &[]),
+        net(2, 6, 3, &damped[..3], &[]),
+        net(3, 4, 2, &[("masses", 12), ("gravity", 2)], &[]),
+        net(2, 11, 2, &[("drag", 1), ("rest", 0)], &[]),
+    ]
+}
+
 fn systems() -> Vec<Given> {
     let sine = [("x.amplitude", 1), ("x.omega", 1), ("x.phase", 1)];
     let mut all = vec![
@@ -77,6 +114,8 @@ fn systems() -> Vec<Given> {
             all.extend(CONTROLS.map(|control| bodies(n, dim, force, control)));
         }
     }
+    all.extend(nets());
+    all.extend(CONTROLS.map(|control| net(2, 5, 3, &[("masses", 10), ("gravity", 3)], control)));
     all.extend([bodies(35, 2, "newton", &[]), bodies(35, 3, "newton", CONTROLS[4]), bodies(66, 2, "logarithmic", CONTROLS[1])]);
     all
 }
@@ -208,6 +247,8 @@ fn every_level_makes_the_same_of_a_large_member() {
         bodies(100, 3, "newton", CONTROLS[3]),
         systems().remove(6),
         given("chain", &[], &[], &[("stiffness", 301), ("mass", 300)], &[]),
+        net(13, 31, 3, &[("stiffness", 0), ("damping", 0), ("gravity", 3), ("drag", 1)], &[]),
+        net(17, 24, 2, &[("rest", 0), ("masses", 17 * 24)], CONTROLS[4]),
     ] {
         let parameters = numbers(13 * (given.parameters() + 9), 7);
         let spec = spec(&given, &parameters, 13);

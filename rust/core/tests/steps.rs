@@ -101,6 +101,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         system: system.to_owned(),
         words: words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        lists: Vec::new(),
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![true; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
         equations: None,
@@ -126,6 +127,42 @@ const CONTROLS: [[(&str, &str); 2]; 4] = [
     [("control", "projection"), ("control.way", "scaling")],
     [("control", "projection"), ("control.way", "nacozy")],
 ];
+
+/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across, which do
+/// not. The first particle is fixed if there is more than one row.
+fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Given {
+    let n = rows * columns;
+    let mut pairs: Vec<[usize; 2]> = (0..n).filter(|i| i % columns + 1 < columns).map(|i| [i, i + 1]).collect();
+    pairs.extend((columns..n).map(|i| [i, i - columns]));
+    pairs.extend((2..n / 2).step_by(3).map(|i| [n - i, i / 2]));
+    let fixed = if rows > 1 { vec![0] } else { Vec::new() };
+    let mut parameters = vec![("masses", 1), ("stiffness", 1), ("rest", 1)];
+    for (name, count) in numbers {
+        parameters.retain(|(known, _)| known != name);
+        parameters.push((name, if *count == 0 { pairs.len() } else { *count }));
+    }
+    match control.first() {
+        Some((_, "energy")) => parameters.extend([("control.gain", 1), ("control.target", 1)]),
+        Some(_) => parameters.push(("control.target", 1)),
+        None => {}
+    }
+    let list = |numbers: Vec<usize>| numbers.into_iter().map(|number| number as u32).collect();
+    let lists = vec![("pairs".to_owned(), list(pairs.concat())), ("fixed".to_owned(), list(fixed))];
+    Given { lists, ..given("springs", control, &[("n", n), ("dim", dim)], &parameters, &[]) }
+}
+
+/// Nets of springs: a pair, and those of every kind; 0 stands for as many numbers as there are springs.
+fn nets() -> Vec<Given> {
+    let damped = [("masses", 12), ("stiffness", 0), ("rest", 0), ("damping", 0), ("gravity", 3), ("drag", 12)];
+    vec![
+        net(1, 2, 1, &[], &[]),
+        net(1, 4, 2, &[("damping", 1)], &[]),
+        net(3, 4, 3, &damped, &[]),
+        net(2, 6, 3, &damped[..3], &[]),
+        net(3, 4, 2, &[("masses", 12), ("gravity", 2)], &[]),
+        net(2, 11, 2, &[("drag", 1), ("rest", 0)], &[]),
+    ]
+}
 
 /// Systems of every kind, in every form.
 fn systems() -> Vec<Given> {
@@ -170,6 +207,8 @@ fn systems() -> Vec<Given> {
         all.extend(CONTROLS.iter().flat_map(|control| [bodies(3, 2, force, control), bodies(10, 3, force, control)]));
     }
     all.push(bodies(35, 2, "newton", &[]));
+    all.extend(nets());
+    all.extend(CONTROLS.map(|control| net(2, 5, 3, &[("masses", 10), ("gravity", 3)], &control)));
     all.extend(own());
     all
 }
@@ -411,6 +450,14 @@ fn what_cannot_be_made_is_refused() {
     misshapen(given("linear", &[], &[("n_v", 1)], &[("rows", 5)], &[]));
     misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("masses", 2), ("strength", 3), ("softening", 1)], &[]));
     misshapen(given("nbody", &[("force", "newton")], &[("dim", 2)], &[("softening", 1)], &[]));
+    misshapen(net(2, 3, 2, &[("masses", 5)], &[]));
+    misshapen(net(2, 3, 2, &[("drag", 2)], &[]));
+    misshapen(net(2, 3, 2, &[("stiffness", 2)], &[]));
+    misshapen(net(2, 3, 2, &[("gravity", 3)], &[]));
+    unknown(net(2, 3, 4, &[], &[]));
+    for pairs in [vec![], vec![0, 1, 2], vec![0, 6]] {
+        unknown(Given { lists: vec![("pairs".to_owned(), pairs.into())], ..net(2, 3, 2, &[], &[]) });
+    }
 }
 
 #[test]
@@ -429,6 +476,10 @@ fn forces_of_the_velocity_are_refused_where_they_do_harm() {
         assert_eq!(term(&bodies(3, 2, "newton", &[]), method), None);
     }
     assert_eq!(term(&damped, "rk4"), None);
+    let [undamped, damped, dragged] =
+        [&[][..], &[("damping", 1), ("drag", 1)], &[("drag", 1)]].map(|numbers| net(2, 3, 2, numbers, &[]));
+    let terms = [&undamped, &damped, &dragged].map(|net| term(net, "verlet"));
+    assert_eq!(terms, [None, Some("damping"), Some("drag")]);
 }
 
 #[test]

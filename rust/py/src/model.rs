@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::{
     prelude::*,
-    types::{PyString, PyTuple, PyType},
+    types::{PyBytes, PyString, PyTuple, PyType},
 };
 use stepwell_core::{
     controls::force,
@@ -48,10 +48,12 @@ impl Equations {
     }
 }
 
-/// The value of a name: a word, a whole number, rows of a parameter, samples with their start and interval, or rates.
+/// The value of a name: a word, a whole number, a list of whole numbers (as bytes, four for each), rows of a parameter, samples with
+/// their start and interval, or rates.
 enum Value {
     Word(String),
     Whole(usize),
+    List(Arc<[u32]>),
     Samples((f64, f64, Py<PyArray2<f64>>)),
     Rows(Py<PyArray2<f64>>),
     Equations(Arc<equations::Equations>),
@@ -66,6 +68,9 @@ impl<'py> FromPyObject<'_, 'py> for Value {
             Ok(Value::Rows(array.to_owned().unbind()))
         } else if given.is_instance_of::<PyString>() {
             given.extract().map(Value::Word)
+        } else if let Ok(bytes) = given.cast::<PyBytes>() {
+            let (numbers, _) = bytes.as_bytes().as_chunks::<4>();
+            Ok(Value::List(numbers.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()))
         } else if given.is_instance_of::<PyTuple>() {
             given.extract().map(Value::Samples)
         } else if let Ok(rates) = given.cast::<Equations>() {
@@ -129,6 +134,7 @@ impl ModelSpec {
             match value {
                 Value::Word(word) => names.words.push((name, word)),
                 Value::Whole(whole) => names.wholes.push((name, whole)),
+                Value::List(list) => names.lists.push((name, list)),
                 Value::Rows(array) => {
                     let [count, members] = [0, 1].map(|axis| array.bind(py).readonly().as_array().shape()[axis]);
                     // A force changes between steps, so it is never computed with beforehand for all members at once.

@@ -4,8 +4,8 @@
 //! over blocks that are long rows ([`course`], [`executor`]), and calls the rates of the system ([`Rates`]). There are two kinds of these:
 //!
 //! - [`tapes`]: the rates are tapes of their own, over rows of lanes, a lane for each of several members.
-//! - kernels written by hand, for one member at a time, whose numbers lie side by side: [`bodies`], [`chain`], [`linear`]. A system names
-//!   its own in its `KIND`.
+//! - kernels written by hand, for one member at a time, whose numbers lie side by side: [`bodies`], [`chain`], [`linear`],
+//!   [`springs`]. A system names its own in its `KIND`.
 //!
 //! Neither knows of the methods, and no method knows of them.
 
@@ -21,6 +21,7 @@ mod inputs;
 pub mod linear;
 pub mod matrix;
 mod panels;
+pub mod springs;
 pub mod tapes;
 
 use crate::{

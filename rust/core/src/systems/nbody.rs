@@ -65,7 +65,7 @@ pub(crate) fn law(given: &Given) -> Option<Law> {
 }
 
 /// The sum of a number of each body: body i in part i mod `LANES`, then part after part.
-fn total<N: Number>(values: impl IntoIterator<Item = N>) -> N {
+pub(crate) fn total<N: Number>(values: impl IntoIterator<Item = N>) -> N {
     let mut parts: Vec<N> = Vec::with_capacity(LANES);
     for (i, value) in values.into_iter().enumerate() {
         match parts.get_mut(i % LANES) {
@@ -77,7 +77,7 @@ fn total<N: Number>(values: impl IntoIterator<Item = N>) -> N {
 }
 
 /// d·d
-fn square<N: Number>(d: &[N]) -> N {
+pub(crate) fn square<N: Number>(d: &[N]) -> N {
     d.iter().map(|d| *d * *d).reduce(|length, d| length + d).unwrap_or(N::of(0.0))
 }
 

@@ -21,6 +21,7 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
         system: system.to_owned(),
         words: of.words.iter().map(|(name, word)| (name.to_string(), word.to_string())).collect(),
         wholes: of.wholes.iter().map(|(name, whole)| (name.to_string(), *whole)).collect(),
+        lists: Vec::new(),
         rows: of.rows.iter().map(|(name, rows)| (name.to_string(), commons(rows))).collect(),
         tables: of.tables.iter().map(|(name, t)| (name.to_string(), t.samples.iter().all(Row::is_common))).collect(),
         equations: None,
