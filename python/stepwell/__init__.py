@@ -11,12 +11,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
+from .contact import Floor, Sphere
 from .control import Control, EnergyControl, LengthControl, NormControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
 from .methods import Method, method, methods
 from .result import Run, Status
-from .systems import Chain, LinearSystem, NBody, Oscillator, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
+from .systems import Chain, LinearSystem, NBody, Oscillator, Particles, Pendulum, RestrictedThreeBody, Sampled, Sinusoid, System
 from .world import World
 
 if TYPE_CHECKING:
@@ -40,12 +41,14 @@ __all__ = [
     "EnergyControl",
     "Explanation",
     "ExportedStep",
+    "Floor",
     "LengthControl",
     "LinearSystem",
     "Method",
     "NBody",
     "NormControl",
     "Oscillator",
+    "Particles",
     "Pendulum",
     "Projection",
     "RestrictedThreeBody",
@@ -53,6 +56,7 @@ __all__ = [
     "Sampled",
     "Scene",
     "Sinusoid",
+    "Sphere",
     "Status",
     "StepwellError",
     "System",

@@ -18,6 +18,7 @@ from . import _core, _memory
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
+from .reference import contact
 from .reference import run as reference
 from .reference.types import Blocks, Whole
 from .systems import Sampled, System
@@ -137,11 +138,10 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.system.scaled(plan.dt, plan.batch)
-    project = getattr(s, "project", None)  # only what keeps a system on its energy has it
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
-        v, y = steps.step(s, t, plan.dt, v, y)
-        return project(v, y) if project else (v, y)
+        made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
+        return made
 
     step = _fused_step(plan, s) if plan.fused else plain
     slot = v if carried else _start(plan, v, y)
@@ -169,7 +169,7 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
     tracer = Tracer(plan.system, tape)
     match what:
         case "step":
-            symbols = tracer.step(plan.method)
+            symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
             symbols = tracer.attempt(plan.method)
         case _:

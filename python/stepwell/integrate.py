@@ -321,6 +321,8 @@ def _adapt(
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
     if system.keeper is not None:
         raise UnsupportedError(f"tolerance: goes with systems that nothing controls, got {system!r}; use its .uncontrolled")
+    if system.contacts:
+        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use steps of fixed length")
     if carry is not None and not isinstance(carry, AdaptiveState):
         raise DTypeError(f"carry: with a tolerance expected that of run.resume, got {type(carry).__name__}")
     if at is None or (tolerance is None) == (carry is None):

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _checks, _core, engine
 from ._checks import Array
+from .contact import Surface
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
 from .integrate import fits_together, goes_on_alike, velocities
@@ -200,6 +201,6 @@ def _frozen(what: Any) -> Any:
             _frozen(each)
     elif isinstance(what, dict):
         _frozen(list(what.values()))
-    elif isinstance(what, (System, Sampled, Sinusoid)):
+    elif isinstance(what, (System, Sampled, Sinusoid, Surface)):
         _frozen(list(vars(what).values()))
     return what

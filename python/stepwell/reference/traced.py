@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from . import adaptive
+from . import adaptive, contact
 from .run import linear_step
 from .signal import Constant, Held, Sine
 
@@ -79,7 +79,8 @@ class Tracer:
         """The system under its control, scaled to the step h."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        s = self.system.reference(h, **given)
+        surfaces = {name: self.symbols(value, batch) for name, value in self.system.given_contacts(batch).items()}
+        s = contact.around(self.system.reference(h, **given), h, surfaces)
         if self.system.control is None:
             return s
         control: Any = copy.copy(self.system.control)
@@ -88,15 +89,13 @@ class Tracer:
                 setattr(control, name.removeprefix("control."), self.symbols(value, value.shape))
         return control.around(s, h)
 
-    def step(self, method: Any) -> list[Any]:
+    def step(self, method: Any, choice: int = 0) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
         h = self.tape.step()
         s, (v, y, more) = self.scaled(h), self.state()
         if hasattr(s, "work"):
             s.work = next(more)
-        v, y = method.steps.step(s, self.tape.time(), h, v, y)
-        if hasattr(s, "project"):
-            v, y = s.project(v, y)
+        v, y = contact.step(method.steps, s, choice, self.tape.time(), h, v, y)
         return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:

@@ -6,6 +6,7 @@ from .inputs import Sampled, Sinusoid
 from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
+from .particles import Particles
 from .pendulum import Pendulum
 from .restricted_three_body import RestrictedThreeBody
 
@@ -14,6 +15,7 @@ __all__ = [
     "LinearSystem",
     "NBody",
     "Oscillator",
+    "Particles",
     "Pendulum",
     "RestrictedThreeBody",
     "Sampled",

@@ -13,11 +13,14 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._value import Value
+from ..contact import parameters
 from ..errors import DTypeError, UnsupportedError
+from ..reference import contact
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
 if TYPE_CHECKING:
+    from ..contact import Surface
     from ..control import AnyControl, ConstraintControl, EnergyControl, Projection
     from .inputs import Input
 
@@ -49,6 +52,7 @@ class System(Value, ABC):
         control: the control or projection of its energy, or None; ``integrate`` sets it.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
+        contacts: surfaces that its points meet, if the rows of its blocks are points.
     """
 
     kernel: ClassVar[str]
@@ -65,6 +69,7 @@ class System(Value, ABC):
     control: EnergyControl | Projection | None = None
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
+    contacts: tuple[Surface, ...] = ()
     _free: System | None = None
 
     @property
@@ -104,13 +109,27 @@ class System(Value, ABC):
 
     def scaled(self, h: float, batch: Shape) -> Any:
         """The NumPy reference of this system with its control, scaled to the step h, for states of that batch shape."""
-        s = self.alone(h, batch)
+        s = contact.around(self.alone(h, batch), h, self.given_contacts(batch))
         return s if self.control is None else self.control.around(s, h)
 
     def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system and of its control, in the form that the core takes."""
-        given = self.given(batch)
-        return flat(given if self.control is None else given | self.control.given(), batch)
+        """The parameters of this system, of its surfaces and of its control, in the form that the core takes."""
+        return flat(self.all_given(batch), batch)
+
+    def given_contacts(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of the surfaces that its points meet, by name."""
+        return parameters(self.contacts, self.y_shape[-1], batch) if self.contacts else {}
+
+    def said_of_contacts(self) -> list[str]:
+        """The surfaces as an argument, for its repr."""
+        if not self.contacts:
+            return []
+        return [f"floor={self.contacts[0] if len(self.contacts) == 1 else list(self.contacts)}"]
+
+    def all_given(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of this system, of its surfaces and of its control, by name."""
+        given = self.given(batch) | self.given_contacts(batch)
+        return given if self.control is None else given | self.control.given()
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
@@ -200,6 +219,8 @@ class System(Value, ABC):
         return {"keeps": "projection" if strength is None else "control", "strength": strength}
 
     def _controllable(self, control: Any) -> None:
+        if self.contacts:
+            raise UnsupportedError(f"control: {self!r} meets surfaces, and a control of its energy would undo what they do")
         if (name := getattr(control, "constraint", None)) is not None:
             raise UnsupportedError(f"control: {control!r} keeps a {name}, and {self!r} has no such constraint")
         if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):

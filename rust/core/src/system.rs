@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use crate::{
-    controls,
+    contact, controls,
     error::Error,
     large::Long,
     method::{Needs, Record},
@@ -117,6 +117,10 @@ impl Kind {
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
         controls::check(self, given)?;
+        contact::check(given, shape)?;
+        if contact::is_given(given) && controls::is_given(given) {
+            return Err(given.unknown("control"));
+        }
         let term = (self.velocity_term)(given).or(controls::is_given(given).then_some("energy control"));
         match term {
             Some(term) if method.needs == Needs::Acceleration => {
