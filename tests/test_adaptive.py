@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
+from cases import SYSTEMS, WITHOUT_SURFACES
 from stepwell.errors import ArgumentError, StepwellError, UnsupportedError
 from stepwell.result import Status
 
@@ -40,7 +40,7 @@ def same(a: sw.Run, b: sw.Run) -> None:
     ("name", "method"),
     [
         pytest.param(name, method, marks=() if j == i % len(ABLE) else pytest.mark.long)
-        for i, name in enumerate(SYSTEMS)
+        for i, name in enumerate(WITHOUT_SURFACES)
         for j, method in enumerate(ABLE)
     ],
 )

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
+from cases import SYSTEMS, WITHOUT_SURFACES
 from stepwell import _core, engine
 from stepwell.reference.traced import Tracer
 from test_tracing import ABLE, CONTROLS, METHODS, fits, made
@@ -71,7 +71,7 @@ def test_what_a_method_carries(name: str) -> None:
                 assert_one_graph(tape, core, Tracer(system, tape).slot(method, which, choice))
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", WITHOUT_SURFACES)
 def test_an_attempt(name: str) -> None:
     system, _, _ = made(name)
     for method in ABLE[:1] if int(np.prod(system.v_shape)) > MANY else ABLE:

@@ -258,9 +258,9 @@ def parameters(given: tuple[Surface, ...], dim: int, batch: Shape) -> dict[str, 
         return {}
     found: dict[str, Any] = {"contacts": len(given)}
     for i, each in enumerate(given):
-        found[f"contact[{i}]"] = each.kind
+        found[f"contact_{i}"] = each.kind
         for name, value in each.given(dim).items():
             if name in VECTORS:
                 value = value.reshape((len(value), *(1,) * (len(batch) - value.ndim + 1), *value.shape[1:]))
-            found[f"contact[{i}].{name}"] = value
+            found[f"contact_{i}_{name}"] = value
     return found

@@ -260,9 +260,9 @@ def surfaces(h: Any, given: dict[str, Any]) -> list[Surface]:
     """The surfaces that are given by name."""
     found: list[Surface] = []
     for i in range(given.get("contacts", 0)):
-        of = {name.removeprefix(f"contact[{i}]."): value for name, value in given.items() if name.startswith(f"contact[{i}].")}
+        of = {name.removeprefix(f"contact_{i}_"): value for name, value in given.items() if name.startswith(f"contact_{i}_")}
         common = h, of["way"], of.get("restitution"), of.get("friction"), of.get("omega")
-        if given[f"contact[{i}]"] == "plane":
+        if given[f"contact_{i}"] == "plane":
             found.append(Plane(*common, of["normal"], of["offset"]))
         else:
             found.append(Sphere(*common, of["side"], of["centre"], of["radius"]))
@@ -299,11 +299,12 @@ class Touching:
         kick = [b - a for a, b in zip(v0, v1, strict=True)]
         lag = [(y1[c] - y0[c]) / h - 0.5 * (v0[c] + v1[c]) for c in range(dim)]
         step, v, y, touched = Step(v0, y0, v1, y1, kick, lag), v1, y1, None
-        for surface in self.met:
-            touches, v, y = surface.meet(step, v, y)
-            touched = touches if touched is None else touched | touches
-        if self.is_limited:
-            v, y = self.limit(step, touched, v, y)
+        with np.errstate(all="ignore"):  # what is divided by zero is not chosen
+            for surface in self.met:
+                touches, v, y = surface.meet(step, v, y)
+                touched = touches if touched is None else touched | touches
+            if self.is_limited:
+                v, y = self.limit(step, touched, v, y)
         return touched, np.stack(v, axis=1), np.stack(y, axis=1)
 
     def limit(self, step: Step, touched: Any, v: Vector, y: Vector) -> tuple[Vector, Vector]:

@@ -179,7 +179,7 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             let (kind, method) = (kind(given)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
             if contact::is_given(given) {
-                return Err(given.unknown("contact[0]"));
+                return Err(given.unknown("contact_0"));
             }
             let (tape, next) = record(tape, || attempts(kind, given, shape, &program, estimate.order));
             Ok(Steps { tape, next, shape, tally: false })

@@ -4,9 +4,9 @@
 //! that the method made, knowing the one before. What is computed, and why no energy is added, is in `reference/contact.py` and
 //! docs/contact.md.
 //!
-//! Given: the whole number `contacts`; for each surface the word `contact[i]`, `plane` or `sphere`, the word `contact[i].way`, and
-//! `contact[i].restitution`, `.friction` (maybe), `.omega` (of a spring); of a plane the vector `.normal` and `.offset`; of a sphere the
-//! word `.side`, `inside` or `outside`, the vector `.centre` and `.radius`.
+//! Given: the whole number `contacts`; for surface i, with `contact_i` before each name, a word, `plane` or `sphere`, the word `_way`, and
+//! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word
+//! `_side`, `inside` or `outside`, the vector `_centre` and `_radius`.
 
 mod meet;
 mod surface;
@@ -50,7 +50,7 @@ pub fn check(given: &Given, shape: Shape) -> Result<(), Error> {
 
 /// How many numbers a point has.
 pub fn dimensions(given: &Given) -> usize {
-    given.count("contact[0].normal").max(given.count("contact[0].centre")).max(1)
+    given.count("contact_0_normal").max(given.count("contact_0_centre")).max(1)
 }
 
 /// The surfaces that act after a step.

@@ -69,7 +69,7 @@ pub fn difference<N: Number>(a: &[N], b: &[N]) -> Vec<N> {
 
 /// An error if a surface that is given is wrong.
 pub fn check(given: &Given, i: usize, dim: usize) -> Result<(), Error> {
-    let name = |part: &str| format!("contact[{i}]{part}");
+    let name = |part: &str| format!("contact_{i}{part}");
     let count = |part: &str| given.count(&name(part));
     let expect = |what: &'static str, part: &str, expected: usize| match count(part) {
         got if got == expected => Ok(()),
@@ -77,23 +77,23 @@ pub fn check(given: &Given, i: usize, dim: usize) -> Result<(), Error> {
     };
     match given.word(&name("")) {
         "plane" => {
-            expect("normal", ".normal", dim)?;
-            expect("offset", ".offset", 1)?;
+            expect("normal", "_normal", dim)?;
+            expect("offset", "_offset", 1)?;
         }
         "sphere" => {
-            expect("centre", ".centre", dim)?;
-            expect("radius", ".radius", 1)?;
-            if !matches!(given.word(&name(".side")), "inside" | "outside") {
-                return Err(given.unknown(&name(".side")));
+            expect("centre", "_centre", dim)?;
+            expect("radius", "_radius", 1)?;
+            if !matches!(given.word(&name("_side")), "inside" | "outside") {
+                return Err(given.unknown(&name("_side")));
             }
         }
         _ => return Err(given.unknown(&name(""))),
     }
-    match given.word(&name(".way")) {
-        "safe" | "restitution" => expect("restitution", ".restitution", 1),
+    match given.word(&name("_way")) {
+        "safe" | "restitution" => expect("restitution", "_restitution", 1),
         "flip" => Ok(()),
-        "spring" => expect("omega", ".omega", 1),
-        _ => Err(given.unknown(&name(".way"))),
+        "spring" => expect("omega", "_omega", 1),
+        _ => Err(given.unknown(&name("_way"))),
     }
 }
 
@@ -104,23 +104,23 @@ pub fn all<N: Number>(p: &Parameters<N>, is_wanted: impl Fn(Way) -> bool) -> Vec
 
 impl<N: Number> Surface<N> {
     fn new(p: &Parameters<N>, i: usize) -> Surface<N> {
-        let name = |part: &str| format!("contact[{i}]{part}");
+        let name = |part: &str| format!("contact_{i}{part}");
         let form = if p.given.word(&name("")) == "plane" {
-            Form::Plane { normal: p.numbers(&name(".normal")).to_vec(), offset: p.number(&name(".offset")) }
+            Form::Plane { normal: p.numbers(&name("_normal")).to_vec(), offset: p.number(&name("_offset")) }
         } else {
-            let is_inside = p.given.word(&name(".side")) == "inside";
-            Form::Sphere { is_inside, centre: p.numbers(&name(".centre")).to_vec(), radius: p.number(&name(".radius")) }
+            let is_inside = p.given.word(&name("_side")) == "inside";
+            Form::Sphere { is_inside, centre: p.numbers(&name("_centre")).to_vec(), radius: p.number(&name("_radius")) }
         };
-        let way = match p.given.word(&name(".way")) {
+        let way = match p.given.word(&name("_way")) {
             "safe" => Way::Safe,
             "spring" => Way::Spring,
             _ => Way::Turn,
         };
         Surface {
             way,
-            restitution: p.maybe(&name(".restitution")),
-            friction: p.maybe(&name(".friction")),
-            stiffness: p.maybe(&name(".omega")).map(|omega| p.h * (omega * omega)),
+            restitution: p.maybe(&name("_restitution")),
+            friction: p.maybe(&name("_friction")),
+            stiffness: p.maybe(&name("_omega")).map(|omega| p.h * (omega * omega)),
             form,
         }
     }

@@ -140,7 +140,7 @@ struct SprungRates {
 
 /// Rates with the springs that are given, or the rates themselves.
 pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
-    let has_spring = (0..asked.given.whole("contacts")).any(|i| asked.given.word(&format!("contact[{i}].way")) == "spring");
+    let has_spring = (0..asked.given.whole("contacts")).any(|i| asked.given.word(&format!("contact_{i}_way")) == "spring");
     if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }
 }
 
