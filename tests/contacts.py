@@ -22,6 +22,9 @@ PARABOLIC = [m.name for m in sw.methods() if m.name not in LAG]
 
 G = 9.81
 
+#: Of the spheres.
+CENTRE = (0.1, -0.2)
+
 
 def impacts(method: str, floor: Any, gravity: Any, backend: str, steps: int = 4) -> tuple[sw.Run, Any]:
     """Impacts at the speed 1 with h = 1 for every phase and every increment h·g up to 2, towards the last axis."""
@@ -124,20 +127,52 @@ def sticks(method: str, backend: str = "rust") -> None:
 
 
 def reflects(method: str, backend: str = "rust") -> None:
-    """Inside a circle without a force the angular momentum, the speed and the point of each impact are those of a billiard."""
+    """Inside a circle of radius 1.5, without a force: a billiard keeps its angular momentum, its speed, and the point inside."""
     angle = np.linspace(0.1, 6.2, 25)
     v = np.stack([np.cos(angle), np.sin(angle)])[np.newaxis]
     y = np.array([0.4, 0.1])[np.newaxis, :, np.newaxis]
-    ball = sw.Particles(gravity=0.0, floor=sw.Sphere((0.0, 0.0), 1.0, inside=True))
+    ball = sw.Particles(gravity=0.0, floor=sw.Sphere(CENTRE, 1.5, inside=True))
     run = sw.integrate(ball, method, v=v, y=y, dt=0.03, steps=600, every=1, backend=backend)
-    spin = run.y[:, 0, 0] * run.v[:, 0, 1] - run.y[:, 0, 1] * run.v[:, 0, 0]
+    from_centre = run.y[:, 0] - np.array(CENTRE)[:, np.newaxis]
+    spin = from_centre[:, 0] * run.v[:, 0, 1] - from_centre[:, 1] * run.v[:, 0, 0]
     square = (run.v**2).sum(axis=(1, 2))
     # Verlet finds v as a difference of y over h = 0.03, a rounding of 1/h.
     bound = len(run.t) * ROUNDING * (2.0 / run.dt if method == "verlet" else 1.0)
     assert np.abs(spin - spin[0]).max() <= bound
     assert np.abs(square - 1.0).max() <= bound
-    assert np.sqrt((run.y**2).sum(axis=2)).max() <= 1.0 + ROUNDING
-    assert (np.abs(np.diff(run.v, axis=0)) > 0.1).any(axis=2).sum(axis=0).min() > 8  # 18 radii, at most 2 from wall to wall
+    assert np.sqrt((from_centre**2).sum(axis=1)).max() <= 1.5 * (1.0 + ROUNDING)
+    assert (np.abs(np.diff(run.v, axis=0)) > 0.1).any(axis=2).sum(axis=0).min() > 4  # a way of 18, at most 3 from wall to wall
+
+
+def passes(method: str, backend: str = "rust") -> None:
+    """A step longer than a ball does not pass through it; a point behind a floor that comes out is left alone."""
+    bullet = sw.Particles(gravity=0.0, floor=sw.Sphere((0.0, 0.0), 0.1))
+    run = sw.integrate(bullet, method, v=[[5.0, 0.0]], y=[[-1.0, 0.0]], dt=0.5, steps=1, backend=backend)
+    np.testing.assert_allclose(run.v[-1], [[-5.0, 0.0]], rtol=0, atol=5.0 * ROUNDING)
+    np.testing.assert_allclose(run.y[-1], [[-0.1 - (2.5 - 0.9), 0.0]], rtol=0, atol=5.0 * ROUNDING)
+    for floor in (sw.Floor(0.5), sw.Sphere((0.0, -10.0), 10.0, restitution=0.5)):
+        out = sw.Particles(gravity=0.0, floor=floor)
+        run = sw.integrate(out, method, v=[[0.0, 1.0]], y=[[0.0, -0.5]], dt=0.1, steps=3, backend=backend)
+        np.testing.assert_allclose(run.v[-1], [[0.0, 1.0]], rtol=0, atol=16.0 * ROUNDING)
+        np.testing.assert_allclose(run.y[-1], [[0.0, -0.2]], rtol=0, atol=16.0 * ROUNDING)
+
+
+def rolls(method: str, backend: str = "rust") -> None:
+    """A point slides off a ball, on its surface and without a gain but the method's own; in a rough bowl it comes to rest."""
+    c, h = np.array(CENTRE), 0.01
+    gain = 0.5 * (h * G) ** 2 * max(0.0, 2.0 * LAG.get(method, 0.0))
+    off = sw.Particles(gravity=G, floor=sw.Sphere(CENTRE, 1.5, restitution=0.0))
+    start = c + 1.5 * np.array([np.sin(0.1), np.cos(0.1)])
+    run = sw.integrate(off, method, v=0.0, y=start[np.newaxis], dt=h, steps=60, every=1, backend=backend)
+    assert np.diff(run.energy).max() <= gain + 4.0 * G * ROUNDING / h
+    # A step along the old v, as by Standard Euler, leaves the ball along the tangent, and only the next brings it back: (2·h·v)²/2R.
+    hop = 2.0 * (h * h * (run.v**2).sum(axis=(1, 2))).max() / 1.5 if gain else 0.0
+    assert np.abs(np.sqrt(((run.y[:, 0] - c) ** 2).sum(axis=1)) - 1.5).max() <= 1.5 * ROUNDING + hop
+    assert run.y[-1, 0, 0] - start[0] > 0.05  # it does move
+    bowl = sw.Particles(gravity=G, floor=sw.Sphere(CENTRE, 1.5, inside=True, restitution=0.5, friction=0.5))
+    run = sw.integrate(bowl, method, v=0.0, y=(c + np.array([0.3, 0.0]))[np.newaxis], dt=h, steps=600, every=1, backend=backend)
+    assert np.abs(run.v[-50:]).max() <= (64.0 * ROUNDING if method == "verlet" else 0.0)
+    assert abs(np.sqrt(((run.y[-1, 0] - c) ** 2).sum()) - 1.5) <= 1.5 * ROUNDING
 
 
 def corners(method: str, backend: str = "rust", seed: int = 0) -> None:
@@ -173,4 +208,4 @@ def corners(method: str, backend: str = "rust", seed: int = 0) -> None:
     assert count > 500
 
 
-ALL = {f.__name__: f for f in (no_energy_added, squares, bounces, slides, sticks, reflects, corners)}
+ALL = {f.__name__: f for f in (no_energy_added, squares, bounces, slides, sticks, reflects, passes, rolls, corners)}

@@ -1,6 +1,7 @@
 """Each line of the way that contact is computed, wrong in one way: the checks of ``contacts.py`` notice it.
 
-The reference is changed in its text and run in place of the right one; that the core computes the same is shown by test_graphs.py.
+The reference is changed in its text and run in place of the right one; that the core computes the same is shown by
+test_graphs.py.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ VARIED = (
 
 #: Those whose solution is known, and of them those that a fixed step does well.
 SOLVED = tuple(scene for scene in SCENES if scene.exact is not None)
-HARD = ("arenstorf", "figure_eight", "kepler", "pythagorean")
+HARD = ("arenstorf", "bouncing_ball", "figure_eight", "kepler", "pythagorean")
 GENTLE = tuple(scene for scene in SOLVED if scene.name not in HARD)
 
 every_scene = pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
@@ -87,6 +87,8 @@ def test_the_exact_solution_satisfies_the_equations_of_motion(scene):
     e = 2e-4 * scene.dt
     for t in scene.horizon * np.linspace(0.0, 1.0, 23):
         (v0, v, v1), (y0, y, y1) = scene.exact(np.array([t - e, t, t + e]))
+        if scene.system.contacts and not y[..., -1].all():
+            continue  # the floor holds it
         for wanted, found, scale in (
             (rates.dv(t, v, y), (v1 - v0) / (2 * e), scene.scales[0]),
             (rates.dy(t, v, y), (y1 - y0) / (2 * e), scene.scales[1]),

@@ -41,7 +41,7 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
     gravity = number("gravity", gravity, positive=True, unit="length per unit of time squared")
     speed = math.sqrt(2.0 * gravity * height)
     fall, along = speed / gravity, ALONG * speed
-    horizon = 11.0 * fall
+    horizon = 10.5 * fall
     leaving, impacts = _impacts(speed, fall, restitution, gravity, horizon)
 
     def exact(t: Array) -> tuple[Array, Array]:
