@@ -165,7 +165,7 @@ def rolls(method: str, backend: str = "rust") -> None:
     start = c + 1.5 * np.array([np.sin(0.1), np.cos(0.1)])
     run = sw.integrate(off, method, v=0.0, y=start[np.newaxis], dt=h, steps=60, every=1, backend=backend)
     assert np.diff(run.energy).max() <= gain + 4.0 * G * ROUNDING / h
-    # A step along the old v, as by Standard Euler, leaves the ball along the tangent, and only the next brings it back: (2·h·v)²/2R.
+    # A step along the old v, as by Standard Euler, leaves the ball along the tangent; only the next brings it back: (2·h·v)²/2R.
     hop = 2.0 * (h * h * (run.v**2).sum(axis=(1, 2))).max() / 1.5 if gain else 0.0
     assert np.abs(np.sqrt(((run.y[:, 0] - c) ** 2).sum(axis=1)) - 1.5).max() <= 1.5 * ROUNDING + hop
     assert run.y[-1, 0, 0] - start[0] > 0.05  # it does move

@@ -124,7 +124,7 @@ class Surface:
         return touches, v, y
 
     def bounce(self, step: Step, place: Place, speed: Any) -> tuple[Any, Change]:
-        """Leave with e² of the energy of impact, or rest if the flight would be shorter than two steps.
+        """A point leaves with e² of the energy of impact, or rests if the flight would be shorter than two steps.
 
         ``w`` is the velocity that belongs to the same time as y. In a uniform field w² + 2G·d is constant for every method, and
         so is (e·u − G·τ)² + 2G·τ(e·u − ½G·τ) for every time τ since the bounce.
@@ -292,7 +292,7 @@ class Touching:
             dv = np.stack([dv[:, c] - push[c] for c in range(y.shape[1])], axis=1)
         return dv
 
-    def settle(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
+    def resolve(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
         """Which points met a surface in a step, and the state after that, from the states before and after the step."""
         dim, h = before[1].shape[1], self.h
         v0, y0, v1, y1 = ([block[:, c] for c in range(dim)] for block in (*before, *after))
@@ -338,9 +338,9 @@ def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any
     if not getattr(s, "met", None):
         return after
     if not hasattr(steps, "finish"):
-        return s.settle(before, after)[1:]
+        return s.resolve(before, after)[1:]
     end, (slot, y1) = t + h, after
     v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
-    touched, v, y = s.settle((v0, before[1]), (v1, y1))
+    touched, v, y = s.resolve((v0, before[1]), (v1, y1))
     anew = steps.start(s, choice, end, v, y)
     return bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], y.shape), anew, slot), y

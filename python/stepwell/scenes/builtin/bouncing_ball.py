@@ -23,8 +23,8 @@ ALONG = 0.1
 def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81) -> Scene:
     """A ball is thrown sideways, falls, and bounces lower and lower, until it slides along the floor.
 
-    An impact at the speed u leaves e·u, so the times between impacts are a geometric series: with the speed u of the first impact the
-    ball has come to rest at (1 + e)/(1 − e)·u/g.
+    An impact at the speed u leaves e·u, so the times between impacts are a geometric series: with the speed u of the first impact
+    the ball comes to rest after (1 + e)/(1 − e)·u/g.
 
     Args:
         restitution: e, 0 to 1, without a unit.
@@ -61,12 +61,12 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
         name="bouncing_ball",
         title=f"Bouncing ball, e = {restitution:g}",
         section="§1",
-        description="A ball bounces lower and lower and comes to rest; no impact adds energy, at whatever part of a step it comes.",
+        description="A ball bounces lower and lower and comes to rest; no impact adds energy, wherever in a step it is.",
         error="as far from the true place as the ball rolls, or from the true velocity as that of the first impact",
         system=Particles(gravity=gravity, floor=Floor(restitution), dim=2),
         v=np.array([[along, 0.0]]),
         y=np.array([[0.0, height]]),
-        dt=fall / 27.0,
+        dt=fall / 26.5,
         horizon=horizon,
         exact=exact,
     )
@@ -74,7 +74,9 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
 
 def _impacts(speed: float, fall: float, restitution: float, gravity: float, horizon: float) -> tuple[Array, Array]:
     """The speeds after each impact and the times of the impacts; the last speed is 0 where the ball comes to rest."""
-    leaving, times, t = [], [], fall
+    leaving: list[float] = []
+    times: list[float] = []
+    t = fall
     while t <= horizon and len(times) < MOST_IMPACTS:
         speed_left = leaving[-1] if leaving else speed
         up = restitution * speed_left

@@ -72,7 +72,7 @@ impl<N: Number> Contacts<N> {
     }
 
     /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
-    pub fn settle_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
+    pub fn resolve_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
         let step = Step::new(self.h, before, [v, y]);
         let mut touched: Option<N::Truth> = None;
         for surface in &self.surfaces {
@@ -86,12 +86,12 @@ impl<N: Number> Contacts<N> {
     }
 
     /// Which points met a surface in a step, and the state after that.
-    fn settle(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<N::Truth>, [Block<N>; 2]) {
+    fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<N::Truth>, [Block<N>; 2]) {
         let mut touched = Vec::with_capacity(y.len() / self.dim);
         for from in (0..y.len()).step_by(self.dim) {
             let to = from + self.dim;
             let [v0, y0] = before.map(|block| &block.as_slice()[from..to]);
-            touched.extend(self.settle_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]));
+            touched.extend(self.resolve_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]));
         }
         (touched, [v, y])
     }
@@ -105,13 +105,13 @@ impl<N: Number> Contacts<N> {
         before: [&Block<N>; 2],
         after: [Block<N>; 2],
     ) -> [Block<N>; 2] {
-        let Some([start, finish]) = carry else { return self.settle(before, after).1 };
+        let Some([start, finish]) = carry else { return self.resolve(before, after).1 };
         let first = |program: &Program, t: N, v: &Block<N>, y: &Block<N>| {
             program.run(s, t, self.h, v, y).into_iter().next().unwrap_or_else(|| v.clone())
         };
         let (end, [slot, y1]) = (t + self.h, after);
         let (v0, v1) = (first(finish, t, before[0], before[1]), first(finish, end, &slot, &y1));
-        let (touched, [v, y]) = self.settle([&v0, before[1]], [v1, y1]);
+        let (touched, [v, y]) = self.resolve([&v0, before[1]], [v1, y1]);
         let anew = first(start, end, &v, &y);
         let slot = Block::from_fn(slot.len(), |i, _| N::choose(touched[i / self.dim], anew[i], slot[i]));
         [slot, y]

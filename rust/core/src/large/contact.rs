@@ -71,7 +71,7 @@ impl RowContacts {
     }
 
     /// Changes the points that met a surface, of states whose velocities are known.
-    fn settle(&mut self, v0: &[f64], v: &mut [f64], y: &mut [f64]) {
+    fn resolve(&mut self, v0: &[f64], v: &mut [f64], y: &mut [f64]) {
         let (dim, lanes) = (self.dim, self.lanes.len());
         self.touched.clear();
         self.touched.resize(y.len(), false);
@@ -81,7 +81,7 @@ impl RowContacts {
             if !contacts.is_near(&y0[..dim], &y1[..dim]) {
                 continue;
             }
-            let touched = contacts.settle_point([&v0[..dim], &y0[..dim]], [&mut v1[..dim], &mut y1[..dim]]);
+            let touched = contacts.resolve_point([&v0[..dim], &y0[..dim]], [&mut v1[..dim], &mut y1[..dim]]);
             for c in 0..dim {
                 let number = (dim * at.0 + c) * lanes + at.1;
                 (v[number], y[number]) = (v1[c], y1[c]);
@@ -98,7 +98,7 @@ impl RowContacts {
         let Some([start, finish]) = carry else {
             let (v, y) = blocks.slots_mut();
             let v0 = std::mem::take(&mut self.before[0]);
-            self.settle(&v0, v, y);
+            self.resolve(&v0, v, y);
             self.before[0] = v0;
             return;
         };
@@ -116,7 +116,7 @@ impl RowContacts {
         }
         let v0 = std::mem::take(&mut self.velocities[0]);
         let (v, y) = blocks.slots_mut();
-        self.settle(&v0, v, y);
+        self.resolve(&v0, v, y);
         self.velocities[0] = v0;
         start.run(to_carry, blocks.rates.as_mut(), blocks.sizes, end, h, &mut blocks.arena);
         let slots = blocks.slots_mut().0.iter_mut().zip(&self.after[0]).zip(&self.touched);
