@@ -7,7 +7,7 @@ import pytest
 import stepwell as sw
 from stepwell.charts import measure
 
-#: The scenes with a solution that a fixed step does well; the others have their own test of orders. A ball's motion is not smooth.
+#: The scenes with a solution that a fixed step does well; the others have their own test of orders. A ball's is not smooth.
 HARD = ("bouncing_ball", "figure_eight", "kepler", "pythagorean", "arenstorf")
 SCENES = [scene for scene in sw.scenes.scenes() if scene.exact is not None and scene.name not in HARD]
 METHODS = sw.methods()

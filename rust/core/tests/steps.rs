@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 use stepwell_core::{
-    bodies, controls,
+    bodies,
+    contact::{self, Contacts},
+    controls,
     error::Error,
     method::{self, Needs, Record},
     number::{Number, Symbol, record},
