@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import stepwell as sw
 from PIL import Image
 from stepwell import _core, engine
@@ -81,6 +82,64 @@ def examples() -> None:
                 if written.stat().st_size <= MOST_BYTES:
                     break
             print(f"docs/images/equations/{file.stem}.png")
+
+
+#: Phases of an impact within a step, and the increment h·g of the velocity at an impact of speed 1.
+PHASES, KICK = 401, 0.2
+
+
+def impacts(floor: sw.Floor) -> Any:
+    """The energy after an impact over that before it, by leapfrog; a point that a spring holds has left it after 12 steps."""
+    y = (1.0 + 0.5 * KICK) * np.linspace(0.0, 1.0, PHASES, endpoint=False)
+    ball = sw.Particles(gravity=KICK, floor=floor, dim=1)
+    run = sw.integrate(ball, "leapfrog", v=-1.0, y=y[np.newaxis, np.newaxis], dt=1.0, steps=12, every=1)
+    energy = (0.5 * run.v**2 + KICK * run.y)[:, 0, 0]
+    away = (run.y[:, 0, 0] >= 0.0) & (run.v[:, 0, 0] > 0.0)
+    return energy[np.argmax(away, axis=0), np.arange(PHASES)] / energy[0]
+
+
+def mirrored() -> Any:
+    """The same where v and y are both turned over, which no way does."""
+    y = (1.0 + 0.5 * KICK) * np.linspace(0.0, 1.0, PHASES, endpoint=False)
+    v = np.full(PHASES, -1.0)
+    before, out, hit = 0.5 * v * v + KICK * y, np.ones(PHASES), np.zeros(PHASES, dtype=bool)
+    for _ in range(3):
+        y, v = y + v - 0.5 * KICK, v - KICK
+        now = (y < 0.0) & ~hit
+        out = np.where(now, (0.5 * v * v - KICK * y) / before, out)
+        hit |= now
+    return out
+
+
+def contact() -> Figure:
+    """What four ways of contact make of the energy, for every phase of the impact."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from stepwell.charts.style import COLOURS, FONT, GREY
+
+    lines = (
+        ("one-sided spring, Φ = 1.5", impacts(sw.Floor(way="spring", omega=1.5)), COLOURS[2], (0.12, 0.83)),
+        ("one-sided spring, Φ = 0.5", impacts(sw.Floor(way="spring", omega=0.5)), COLOURS[1], (0.55, 0.92)),
+        ("v and y turned over", mirrored(), COLOURS[4], (0.12, 1.78)),
+        ("safe, and flip", impacts(sw.Floor()), COLOURS[0], (0.24, 1.02)),
+    )
+    with rc_context(FONT):
+        figure = Figure(figsize=(12.0, 6.4), dpi=100)
+        axes = figure.add_axes((0.075, 0.12, 0.905, 0.72))
+        phase = np.linspace(0.0, 1.0, PHASES, endpoint=False)
+        for name, ratio, colour, place in lines:
+            axes.plot(phase, ratio, color=colour, linewidth=2.2)
+            axes.text(*place, name, color=colour, weight="bold")
+        axes.set_xlim(0.0, 1.0)
+        axes.set_ylim(0.78, 1.92)
+        axes.set_xlabel("phase: height above the floor at the start of the step, as a share of the way of that step")
+        axes.set_ylabel("energy after the impact / before it")
+        axes.spines[["top", "right"]].set_visible(False)
+        figure.text(
+            0.012, 0.94, "An impact adds energy or takes it, by its phase; the safe way does neither", size=19, weight="bold"
+        )
+        figure.text(0.012, 0.885, "Leapfrog, e = 1, h·g = 0.2 of the speed of impact.", size=13, color=GREY)
+    return figure
 
 
 def tape() -> Figure:
@@ -168,6 +227,7 @@ def cloth() -> Figure:
 
 
 if __name__ == "__main__":
+    write("contact.png", contact())
     write("tape.png", tape())
     write("cloth.png", cloth())
     examples()

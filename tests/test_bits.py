@@ -182,7 +182,7 @@ def _member(system: sw.System, i: int, b: int) -> sw.System:
                 return type(value)(map(one, value))
             case dict():
                 return {name: one(each) for name, each in value.items()}
-            case sw.System() | sw.Sinusoid() | sw.Sampled():
+            case sw.System() | sw.Sinusoid() | sw.Sampled() | sw.Floor() | sw.Sphere():
                 return changed(value, **{name: one(each) for name, each in vars(value).items()})
         return value
 

@@ -42,7 +42,7 @@ VARIED = (
 
 #: Those whose solution is known, and of them those that a fixed step does well.
 SOLVED = tuple(scene for scene in SCENES if scene.exact is not None)
-HARD = ("arenstorf", "figure_eight", "kepler", "pythagorean", "sliding_block", "sticking_block")
+HARD = ("arenstorf", "bouncing_ball", "figure_eight", "kepler", "pythagorean", "sliding_block", "sticking_block")
 GENTLE = tuple(scene for scene in SOLVED if scene.name not in HARD)
 
 every_scene = pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)
@@ -94,6 +94,8 @@ def test_the_exact_solution_satisfies_the_equations_of_motion(scene):
     rates = scene.system.scaled(e, ())  # what friction does depends on the step
     for t in scene.horizon * np.linspace(0.0, 1.0, 23):
         (v0, v, v1), (y0, y, y1) = scene.exact(np.array([t - e, t, t + e]))
+        if scene.system.contacts and not y[..., -1].all():
+            continue  # the floor holds it
         for wanted, found, scale in (
             (rates.dv(t, v, y) / e, (v1 - v0) / (2 * e), scene.scales[0]),
             (rates.dy(t, v, y) / e, (y1 - y0) / (2 * e), scene.scales[1]),
@@ -563,10 +565,10 @@ def test_options_go_to_integrate():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: sw.scenes.oscillator(omega=0.0), "omega: expected numbers above zero"),
+        (lambda: sw.scenes.oscillator(omega=0.0), "omega: expected 1e-100 to"),
         (lambda: sw.scenes.forced_oscillator(damping=1.0), "damping: expected a ratio below 1"),
         (lambda: sw.scenes.forced_oscillator(damping=0.0), "damping: expected numbers above zero"),
-        (lambda: sw.scenes.forced_oscillator(drive=-1.0), "drive: expected numbers above zero"),
+        (lambda: sw.scenes.forced_oscillator(drive=-1.0), "drive: expected 1e-100 to"),
         (lambda: sw.scenes.chain(0), "n: expected 1 or more"),
         (lambda: sw.scenes.chain(3, {4: 1.0}), "modes: expected 1 or more, up to 3, got 4"),
         (lambda: sw.scenes.chain(3, {}), "modes: expected the amplitude of at least one mode"),
@@ -574,7 +576,7 @@ def test_options_go_to_integrate():
         (lambda: sw.scenes.kepler(share=0.0), "share: expected a share of the mass above 0 and below 1, got 0"),
         (lambda: sw.scenes.pendulum(0.0), "amplitude: expected degrees above 0 and below 180, got 0"),
         (lambda: sw.scenes.pendulum(180.0), "amplitude: expected degrees above 0 and below 180, got 180"),
-        (lambda: sw.scenes.pendulum(90.0, -1.0), "omega: expected numbers above zero"),
+        (lambda: sw.scenes.pendulum(90.0, -1.0), "omega: expected 1e-100 to"),
         (lambda: sw.scenes.plummer(1), "n: expected 2 or more"),
         (lambda: sw.scenes.plummer(seed=-1), "seed: expected 0 or more"),
         (lambda: sw.scenes.plummer(softening=-1.0), "softening: expected a length of zero or more"),

@@ -10,8 +10,7 @@ import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS
 from stepwell._value import changed
-from stepwell.reference import adaptive
-from stepwell.reference.around import whole_step
+from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
 from stepwell.systems.base import flat
 from symbols import Symbol, Tape, evaluate
@@ -78,7 +77,7 @@ def test_every_method_on_every_system(name: str) -> None:
         if fits(system, method):
             tape = Tape()
             symbols = Tracer(system, tape).step(method)
-            expected = whole_step(method.steps.step, system.scaled(H, system.batch), T, H, v, y)
+            expected = contact.step(method.steps, system.scaled(H, system.batch), 0, T, H, v, y)
             assert_computes(numbers(system, tape, symbols, v, y), *expected)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
+from .contact import Floor, Sphere
 from .control import Control, EnergyControl, LengthControl, NormControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
 from .integrate import integrate
@@ -21,6 +22,7 @@ from .systems import (
     LinearSystem,
     NBody,
     Oscillator,
+    Particles,
     Pendulum,
     Pendulum3D,
     RestrictedThreeBody,
@@ -56,12 +58,14 @@ __all__ = [
     "EnergyControl",
     "Explanation",
     "ExportedStep",
+    "Floor",
     "LengthControl",
     "LinearSystem",
     "Method",
     "NBody",
     "NormControl",
     "Oscillator",
+    "Particles",
     "Pendulum",
     "Pendulum3D",
     "Projection",
@@ -72,6 +76,7 @@ __all__ = [
     "Sampled",
     "Scene",
     "Sinusoid",
+    "Sphere",
     "Springs",
     "Status",
     "StepwellError",

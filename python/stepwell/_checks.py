@@ -130,19 +130,6 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
     return float(array)
 
 
-#: The slowest and the fastest of a scene's oscillations, in radians per unit of time: its times and the squares of its rates stay
-#: finite.
-SLOWEST, FASTEST = 1e-100, 1e100
-
-
-def frequency(argument: str, value: Any) -> float:
-    """Return ``value`` as one frequency in radians per unit of time, such that squares and periods of it are finite."""
-    found = number(argument, value, positive=True, unit="rad per unit of time")
-    if not SLOWEST <= found <= FASTEST:
-        raise ArgumentError(f"{argument}: expected {SLOWEST:g} … {FASTEST:g} rad per unit of time, got {found:g}")
-    return found
-
-
 def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     """Return ``value`` as a whole number in ``least … most``."""
     if type(value) is int and least <= value <= most:

@@ -18,8 +18,8 @@ from . import _core, _memory
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
+from .reference import contact
 from .reference import run as reference
-from .reference.around import whole_step
 from .reference.types import Blocks, Whole
 from .systems import Sampled, System
 from .systems.base import flat, rows
@@ -145,7 +145,8 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     steps, s = plan.method.steps, plan.scaled()
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
-        return whole_step(steps.step, s, t, plan.dt, v, y)
+        made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
+        return made
 
     step = _fused_step(plan, s) if plan.fused else plain
     slot = v if carried else _start(plan, v, y)
@@ -173,7 +174,7 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
     tracer = Tracer(plan.system, tape, plan.force)
     match what:
         case "step":
-            symbols = tracer.step(plan.method)
+            symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
             symbols = tracer.attempt(plan.method)
         case _:

@@ -352,6 +352,8 @@ def _adapt(
             f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
             f"estimated; use dt= and steps="
         )
+    if system.contacts:
+        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
     control = a_control(control)
     not_of_a_step(system.keeper if control is None else control)
     if at is None or (tolerance is None) == (went is None):

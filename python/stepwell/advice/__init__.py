@@ -152,6 +152,8 @@ def _refusal(scene: Scene, candidate: Candidate) -> str | None:
     """Why the method cannot step the scene with its control, or None; found by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps are tried for scenes without a control only"
+    if candidate.by == "tolerance" and scene.system.contacts:
+        return "adaptive steps do not go with surfaces"
     dt = TIMED_STEP * scene.dt
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

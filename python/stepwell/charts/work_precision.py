@@ -93,8 +93,8 @@ def work_precision(
     reasons = {method.name: measure.refusal(scene, method) for method in chosen}
     refused = {name: reason for name, reason in reasons.items() if reason is not None}
     able = [method for method in chosen if reasons[method.name] is None]
-    goes = asked and scene.system.rubbing is None
-    adaptive = [method for method in able if method.error_order is not None and goes]
+    paced = asked and scene.system.rubbing is None and not scene.system.contacts  # adaptive steps do not go with these
+    adaptive = [method for method in able if method.error_order is not None and paced]
     curves: list[Curve] = []
 
     def done() -> None:

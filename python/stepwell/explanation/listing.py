@@ -135,7 +135,7 @@ def parameters(plan: Plan) -> tuple[list[str], list[str]]:
         inputs = system.given_inputs()
         given = matrix_of(plan) | {name: each.signal() for name, each in inputs.items()}
     else:
-        given = system.given(plan.batch) | system.given_around()
+        given = system.all_given(plan.batch)
     return named_numbers(plan, given)
 
 

@@ -167,7 +167,9 @@ class Traced:
         plan, tape = self.plan, _core.Tape()
         tracer = Named(plan.system, tape)
         method, v_shape = plan.method, plan.system.v_shape
-        symbols = tracer.step(method) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
+        symbols = (
+            tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
+        )
         told, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
         slot = method.carry or "v"
         before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]

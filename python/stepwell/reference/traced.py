@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from .._value import changed
-from . import adaptive
-from .around import surrounded, whole_step
+from . import adaptive, contact
+from .around import surrounded
 from .run import linear_step
 from .signal import Constant, Held, Sine
 
@@ -80,7 +80,8 @@ class Tracer:
         """The system under its control, scaled to the step h."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        s, control = self.system.reference(h, **given), self._control()
+        surfaces = {name: self.symbols(value, batch) for name, value in self.system.given_contacts(batch).items()}
+        s, control = contact.around(self.system.reference(h, **given), h, surfaces), self._control()
         s = s if control is None else control.around(s, h)
         rubbing, force = self.system.rubbing, self.force
         if rubbing is not None:
@@ -98,13 +99,13 @@ class Tracer:
         symbols = {name.removeprefix("control."): self.symbols(value, value.shape) for name, value in numbers.items()}
         return changed(control, **symbols)
 
-    def step(self, method: Any) -> list[Any]:
+    def step(self, method: Any, choice: int = 0) -> list[Any]:
         """The state after a step, and what a control has added up by then."""
         h = self.tape.step()
         s, (v, y, more) = self.scaled(h), self.state()
         if hasattr(s, "work"):
             s.work = next(more)
-        v, y = whole_step(method.steps.step, s, self.tape.time(), h, v, y)
+        v, y = contact.step(method.steps, s, choice, self.tape.time(), h, v, y)
         return self.flat(v, y) + ([s.work] if hasattr(s, "work") else [])
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:

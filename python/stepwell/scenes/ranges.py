@@ -14,3 +14,17 @@ def within(argument: str, value: Any, least: float, most: float, unit: str = "")
     if not least <= found <= most:
         raise ArgumentError(f"{argument}: expected {least:g} to {most:g}{f' {unit}' if unit else ''}, got {found:g}")
     return found
+
+
+#: The smallest and the largest of numbers above zero whose squares, quotients and products must be numbers above zero.
+SMALLEST, LARGEST = 1e-100, 1e100
+
+
+def moderate(argument: str, value: Any, unit: str = "") -> float:
+    """Return ``value`` as one float above zero, such that squares and quotients are finite and not zero."""
+    return within(argument, value, SMALLEST, LARGEST, unit)
+
+
+def frequency(argument: str, value: Any) -> float:
+    """Return ``value`` as one frequency, such that squares and periods of it are finite."""
+    return moderate(argument, value, "rad per unit of time")

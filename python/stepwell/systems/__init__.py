@@ -12,6 +12,7 @@ from .inputs import Sampled, Sinusoid
 from .linear import LinearSystem
 from .nbody import NBody
 from .oscillator import Oscillator
+from .particles import Particles
 from .pendulum import Pendulum
 from .pendulum_3d import Pendulum3D
 from .restricted_three_body import RestrictedThreeBody
@@ -28,6 +29,7 @@ __all__ = [
     "LinearSystem",
     "NBody",
     "Oscillator",
+    "Particles",
     "Pendulum",
     "Pendulum3D",
     "RestrictedThreeBody",

@@ -12,12 +12,15 @@ import numpy as np
 from .. import _checks
 from .._checks import Array, Shape
 from .._value import Fixed, Value, changed
+from ..contact import parameters
 from ..errors import ArgumentError, DTypeError, UnsupportedError
+from ..reference import contact
 from ..reference.around import surrounded
 from ..reference.signal import Constant, Held, Sine
 from .inputs import Sampled
 
 if TYPE_CHECKING:
+    from ..contact import Surface
     from ..control import AnyControl, ConstraintControl, EnergyControl, Projection
     from ..methods import Method
     from .inputs import Input
@@ -51,6 +54,7 @@ class System(Fixed, Value, ABC):
         rubbing: by how much friction that sticks reduces each velocity in a unit of time, or None; broadcasts over the batch.
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
+        contacts: surfaces that its points meet, if the rows of its blocks are points.
     """
 
     kernel: ClassVar[str]
@@ -68,6 +72,7 @@ class System(Fixed, Value, ABC):
     rubbing: Array | None = None
     constraint: ClassVar[str | None] = None
     kept: ConstraintControl | Projection | None = None
+    contacts: tuple[Surface, ...] = ()
     _free: System | None = None
 
     @property
@@ -114,22 +119,36 @@ class System(Fixed, Value, ABC):
         return self.reference(h, **self.given(batch))
 
     def scaled(self, h: float, batch: Shape, force: Array | None = None) -> Any:
-        """The NumPy reference of this system with its control and friction, scaled to the step h, for states of that batch shape.
+        """The NumPy reference of this system with surfaces, control and friction, scaled to the step h, for states of that batch.
 
         ``force`` is added to v̇.
         """
-        s = self.alone(h, batch)
+        s = contact.around(self.alone(h, batch), h, self.given_contacts(batch))
         s = s if self.control is None else self.control.around(s, h)
         return s if force is None and self.rubbing is None else surrounded(s, h, force, self.rubbing)
+
+    def given_contacts(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of the surfaces that its points meet, by name."""
+        return parameters(self.contacts, self.y_shape[-1], batch) if self.contacts else {}
+
+    def said_of_contacts(self) -> list[str]:
+        """The surfaces as an argument, for its repr."""
+        if not self.contacts:
+            return []
+        return [f"floor={self.contacts[0] if len(self.contacts) == 1 else list(self.contacts)}"]
 
     def given_around(self) -> dict[str, Any]:
         """Parameters of what is around its equations, by name: control and friction."""
         given = {} if self.control is None else self.control.given()
         return given if self.rubbing is None else given | {"friction.limit": self.rubbing}
 
+    def all_given(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of this system, of its surfaces, its control and its friction, by name."""
+        return self.given(batch) | self.given_contacts(batch) | self.given_around()
+
     def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system, of its control and its friction, in the form that the core takes."""
-        return flat(self.given(batch) | self.given_around(), batch)
+        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes."""
+        return flat(self.all_given(batch), batch)
 
     def named(self, name: str, index: Shape) -> str:
         """The name of a number among the parameters: that of an argument, and the index in it."""
@@ -219,6 +238,8 @@ class System(Fixed, Value, ABC):
         return {"keeps": "projection" if strength is None else "control", "strength": strength}
 
     def _controllable(self, control: Any) -> None:
+        if self.contacts:
+            raise UnsupportedError(f"control: {self!r} meets surfaces, and a control of its energy would undo what they do")
         if (name := getattr(control, "constraint", None)) is not None:
             raise UnsupportedError(f"control: {control!r} keeps a {name}, and {self!r} has no such constraint")
         if getattr(control, "way", "scaling") not in ("scaling", "nacozy") or not hasattr(control, "around"):

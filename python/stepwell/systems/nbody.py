@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, contact
 from .._checks import Array, Shape
 from .._value import changed
 from ..errors import ShapeError
@@ -31,6 +31,7 @@ class NBody(System):
         force: the force and its potential, one of the table.
         G: gravitational constant, above zero; broadcasts over the batch.
         softening: length ε, which replaces distances r by √(r² + ε²) so that bodies may meet; broadcasts.
+        floor: a ``Floor`` or ``Sphere`` that bodies meet, or a list of them; each body meets them by itself.
         dim: 2 or 3; if None, taken from the shape of the state.
 
     Raises:
@@ -49,6 +50,7 @@ class NBody(System):
         force: str = "logarithmic",
         G: Any = 1.0,
         softening: Any = 0.0,
+        floor: Any = None,
         dim: int | None = None,
     ) -> None:
         self.masses = _checks.not_negative("masses", masses)
@@ -58,15 +60,23 @@ class NBody(System):
         self.G = _checks.numbers("G", G, positive=True)
         self.softening = _checks.not_negative("softening", softening, "lengths")
         self.dim = None if dim is None else _checks.count("dim", dim, 2, 3)
-        self.v_shape = self.y_shape = (len(self.masses), self.dim or 2)
-        self.batch = _checks.batch_shape({"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape})
+        self.contacts = contact.surfaces("floor", floor)
+        size = self.dim
+        for name, found in contact.dimensions(self.contacts).items():
+            if found not in (2, 3) or found != (size or found):
+                raise ShapeError(f"{name}: expected a vector of {size or '2 or 3'} components, as many as dim, got {found}")
+            size = found
+        self.dim = size
+        self.v_shape = self.y_shape = (len(self.masses), size or 2)
+        shapes = {"masses": self.masses.shape[1:], "G": self.G.shape, "softening": self.softening.shape}
+        self.batch = _checks.batch_shape(shapes | contact.batches(self.contacts))
 
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} bodies"
         softening = [f"softening={self.softening}"] * bool(self.softening.any())
-        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening]
+        return [f"masses={masses}", f"force={self.force!r}", f"G={self.G}", *softening, *self.said_of_contacts()]
 
     def sized(self, *states: Any) -> NBody:
         """The same bodies in as many dimensions as the states, v and y, have."""
@@ -94,7 +104,7 @@ class NBody(System):
             return _checks.member(np.broadcast_to(aligned(values, own, batch), (*values.shape[:own], *batch)), index)
 
         numbers = {"masses": one(self.masses, 1), "G": one(self.G), "softening": one(self.softening)}
-        alone = changed(self, **numbers, batch=())
+        alone = changed(self, **numbers, batch=(), contacts=tuple(each.member(one) for each in self.contacts))
         return alone if self.control is None else changed(alone, control=self.control.member(one))
 
     def closest(self, y: Array) -> tuple[tuple[int, int], float]:
@@ -115,7 +125,7 @@ class NBody(System):
     @property
     def keeps_energy(self) -> bool:
         """Whether the energy is constant in the true motion."""
-        return self.control is None and self.force != "printed"
+        return self.control is None and not self.contacts and self.force != "printed"
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """Force, dimensions, masses, G·m, softening."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable
 from operator import index
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from .._value import changed
 from ..errors import ArgumentError, DTypeError, ShapeError
 from ..reference.elimination import factored
 from ..reference.systems import rods as reference
@@ -106,14 +106,11 @@ class Rods(RodSystem):
             raise ShapeError(f"lengths: expected one for each of {len(self.rods)} rods, or one number, got shape {lengths.shape}")
         self.lengths = lengths if lengths.ndim else np.full(len(self.rods), lengths)
         self.gravity = _checks.numbers("gravity", gravity)
-        self._shape(self.dim or 3)
+        self.v_shape = self.y_shape = (len(self.masses), self.dim or 3)
         if len(self.rods) > np.prod(self.y_shape):
             raise ArgumentError(f"rods: expected at most as many as coordinates, {np.prod(self.y_shape)}, got {len(self.rods)}")
         shapes = {"masses": self.masses.shape[1:], "lengths": self.lengths.shape[1:], "gravity": self.gravity.shape}
         self.batch = _checks.batch_shape(shapes)
-
-    def _shape(self, dim: int) -> None:
-        self.v_shape = self.y_shape = (len(self.masses), dim)
 
     @property
     def anchors(self) -> tuple[tuple[float, ...], ...]:
@@ -164,9 +161,8 @@ class Rods(RodSystem):
         if len(dims) > 1:
             raise ShapeError(f"v and y: expected as many dimensions in both, got shapes {shapes['v']} and {shapes['y']}")
         if dims and self.dim is None:
-            bound = copy.copy(self)
-            (bound.dim,) = dims
-            bound._shape(bound.dim)
+            (dim,) = dims
+            bound = changed(self, dim=dim, v_shape=(n, dim), y_shape=(n, dim))
             if len(self.rods) > np.prod(bound.y_shape):
                 raise ArgumentError(
                     f"rods: expected at most as many as coordinates, {np.prod(bound.y_shape)}, got {len(self.rods)}"

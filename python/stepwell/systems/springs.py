@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from .._value import changed
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..reference.systems import springs as reference
 from ..reference.systems.nbody import square
@@ -97,7 +97,7 @@ class Springs(System):
         given = None if drag is None else _checks.not_negative("drag", drag)
         self.drag = None if given is None else _per_row("drag", given, self.n, "particles")
         self.velocity_term = "damping" if self.damping is not None else "drag" if self.drag is not None else None
-        self._shape(self.dim or 2)
+        self.v_shape = self.y_shape = (self.n, self.dim or 2)
         arrays = {name: getattr(self, name) for name in ("stiffness", "rest", "damping", "masses", "gravity", "drag")}
         self.batch = _checks.batch_shape({name: each.shape[1:] for name, each in arrays.items() if each is not None})
 
@@ -111,9 +111,6 @@ class Springs(System):
             spring = int(np.argmax((self.pairs >= n).any(axis=1)))
             raise ArgumentError(f"pairs: expected particles below {n}, of which there are so many, got {last} in spring {spring}")
         return n
-
-    def _shape(self, dim: int) -> None:
-        self.v_shape = self.y_shape = (self.n, dim)
 
     def said(self) -> list[str]:
         """What its repr says of its arguments."""
@@ -137,11 +134,10 @@ class Springs(System):
             dims |= set(shape[1:2])
         if len(dims) > 1:
             raise ShapeError("v and y: expected as many dimensions in both")
-        bound = copy.copy(self)
-        if dims:
-            (bound.dim,) = dims
-            bound._shape(bound.dim)
-        return bound
+        if not dims:
+            return self
+        (dim,) = dims
+        return changed(self, dim=dim, v_shape=(self.n, dim), y_shape=(self.n, dim))
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """Particles, dimensions, ends of springs, and all numbers."""

@@ -13,6 +13,7 @@
 
 pub use stepwell_base::{bodies, functions, isa};
 
+pub mod contact;
 pub mod controls;
 pub mod elimination;
 pub mod error;

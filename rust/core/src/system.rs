@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use crate::{
-    controls,
+    contact, controls,
     error::Error,
     large::Long,
     method::{Needs, Record},
@@ -122,6 +122,10 @@ impl Kind {
     pub fn fit(&self, given: &Given, method: &Record) -> Result<Shape, Error> {
         let shape = (self.shape)(given)?;
         controls::check(self, given, shape)?;
+        contact::check(given, shape)?;
+        if contact::is_given(given) && controls::is_given(given) {
+            return Err(given.unknown("control"));
+        }
         // What a method carries in place of v would have to change with v.
         let apart = controls::is_after_the_step(given) && method.carry.is_none();
         let around = [(controls::friction::is_given(given), "friction"), (controls::is_given(given) && !apart, "energy control")];

@@ -7,6 +7,8 @@ use std::{
 };
 
 use crate::{
+    contact,
+    contact::Contacts,
     controls,
     error::Error,
     large::{Facts, MAX_TAPE_OPERATIONS, group::Courses, tapes::Rated},
@@ -117,7 +119,7 @@ pub(crate) fn block(first: usize, count: usize) -> Block<Symbol> {
 
 /// The system of a scene, scaled to the step h, under its control if it has one.
 fn system(kind: &Kind, p: &Parameters<Symbol>, tally: Symbol) -> Box<dyn System<Symbol>> {
-    controls::wrap(p, (kind.symbols)(p), tally)
+    controls::wrap(p, contact::wrap(p, (kind.symbols)(p)), tally)
 }
 
 /// The kind of system that is given.
@@ -168,14 +170,17 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
             Ok(Steps { tape, next, shape, tally: false })
         }
-        How::Method { name, .. } => {
-            let (kind, program) = (kind(given)?, method(name)?.program());
-            let (tape, (next, tally)) = record(tape, || step(kind, given, shape, &program));
+        How::Method { name, choice } => {
+            let (kind, method) = (kind(given)?, method(name)?);
+            let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
             Ok(Steps { tape, next, shape, tally })
         }
         How::Attempts { name } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
+            if contact::is_given(given) {
+                return Err(given.unknown("contact_0"));
+            }
             let (tape, next) = record(tape, || attempts(kind, given, shape, &program, estimate.order));
             Ok(Steps { tape, next, shape, tally: false })
         }
@@ -187,13 +192,18 @@ pub(crate) fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Ve
     blocks.into_iter().flat_map(|block| block.iter().map(|symbol| symbol.0)).collect()
 }
 
-fn step(kind: &Kind, given: &Given, shape: Shape, program: &Program) -> (Vec<Id>, bool) {
+fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize) -> (Vec<Id>, bool) {
     let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
-    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let s = system(kind, &parameters(given, h), Symbol::new(Op::State((shape.v + shape.y) as u32)));
-    let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
-    let (new_v, new_y) = (made.next().unwrap_or_else(|| v.clone()), made.next().unwrap_or_else(|| y.clone()));
-    let (v, y) = s.project(s.bring_to_rest(t, (&v, &y), new_v), new_y);
+    let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
+    let p = parameters(given, h);
+    let s = system(kind, &p, Symbol::new(Op::State((shape.v + shape.y) as u32)));
+    let mut made = method.program().run(s.as_ref(), t, h, &v0, &y0).into_iter();
+    let (new_v, new_y) = (made.next().unwrap_or_else(|| v0.clone()), made.next().unwrap_or_else(|| y0.clone()));
+    let (mut v, mut y) = s.project(s.bring_to_rest(t, (&v0, &y0), new_v), new_y);
+    if let Some(contacts) = Contacts::new(&p) {
+        let carry = contact::carry(method, choice);
+        [v, y] = contacts.after(carry.as_ref(), s.as_ref(), t, [&v0, &y0], [v, y]);
+    }
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));
@@ -248,7 +258,7 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
-        let s = controls::force::wrap(&p, (kind.symbols)(&p));
+        let s = controls::force::wrap(&p, contact::wrap(&p, (kind.symbols)(&p)));
         let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
         ids([&made.next().unwrap_or(v), &y])
     }))
@@ -281,12 +291,20 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     };
     let choice = which.parse().unwrap_or(0);
     match what {
-        "step" => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
+        "step" => trace_step(tape, given, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
         "attempt" => trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next)),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
         _ => Err(unknown()),
+    }
+}
+
+/// The same method, started in its `choice`-th way.
+fn started(how: &How, choice: usize) -> How {
+    match how {
+        How::Method { name, choice: before } => How::Method { name: name.clone(), choice: choice.max(*before) },
+        other => other.clone(),
     }
 }
 
@@ -309,7 +327,9 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let attempt = if matches!(how, How::Attempts { .. }) { method.attempt() } else { None };
             // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
             let controls = if controls::is_given(given) { 2 } else { 1 };
-            (controls * rates, controls * rates * attempt.unwrap_or_else(|| method.program()).evaluations())
+            let contacts = contact::operations(given, shape);
+            let evaluations = attempt.unwrap_or_else(|| method.program()).evaluations();
+            (controls * rates, controls * rates * evaluations + contacts)
         }
     })
 }

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 use stepwell_core::{
-    bodies, controls,
+    bodies,
+    contact::{self, Contacts},
+    controls,
     error::Error,
     method::{self, Needs, Record},
     number::{Number, Symbol, record},
@@ -177,6 +179,12 @@ fn systems() -> Vec<Given> {
     all.push(given("pendulum", &[], &[], &[("omega", 1)], &[]));
     all.push(given("pendulum", &[], &[], &[("omega", 1), ("damping", 1), ("a", 1)], &[]));
     all.push(given("pendulum", &[], &[], &[&[("omega", 1)], &SINE_A[..]].concat(), &[]));
+    let points = [("masses", 2), ("gravity", 2)];
+    let plane = [("contact_0_normal", 2), ("contact_0_offset", 1), ("contact_0_restitution", 1), ("contact_0_friction", 1)];
+    all.push(given("particles", &[], &[("dim", 2)], &points, &[]));
+    all.push(given("particles", &[], &[("dim", 2)], &[&points[..], &[("drag", 1)]].concat(), &[]));
+    let words = [("contact_0", "plane"), ("contact_0_way", "safe")];
+    all.push(given("particles", &words, &[("dim", 2), ("contacts", 1)], &[&points[..], &plane].concat(), &[]));
     all.push(given("restricted_three_body", &[], &[], &[("mu", 1)], &[]));
     let inertia = ("inertia", 3);
     all.push(given("rigid_body", &[], &[], &[inertia], &[]));
@@ -239,10 +247,15 @@ fn own() -> [Given; 4] {
 
 /// What a step makes: the state, then the tally.
 fn step<N: Number>(method: &Record, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
-    let system = controls::wrap(p, make(p), tally);
+    let system = controls::wrap(p, contact::wrap(p, make(p)), tally);
     let (v, y) = state.split_at(shape.v);
-    let next = method.program().run(&*system, t, p.h, &DVector::from_column_slice(v), &DVector::from_column_slice(y));
-    let (v, y) = system.project(next[0].clone(), next[1].clone());
+    let (v0, y0) = (DVector::from_column_slice(v), DVector::from_column_slice(y));
+    let next = method.program().run(&*system, t, p.h, &v0, &y0);
+    let (mut v, mut y) = system.project(next[0].clone(), next[1].clone());
+    if let Some(contacts) = Contacts::new(p) {
+        let carry = contact::carry(method, 0);
+        [v, y] = contacts.after(carry.as_ref(), &*system, t, [&v0, &y0], [v, y]);
+    }
     v.iter().chain(&y).copied().chain(system.tally()).collect()
 }
 

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import count, fits, number
+from ..._checks import count, fits
 from ...errors import ArgumentError
 from ...systems import Springs
 from ..base import Scene
+from ..ranges import LARGEST, within
 
 
 def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
@@ -28,7 +29,7 @@ def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
     """
     n = count("n", n, 2)
     fits("n: the springs", 200.0 * n * n, (), "take fewer particles")
-    shear, damping = number("shear", shear), number("damping", damping)
+    shear, damping = within("shear", shear, 0.0, LARGEST), within("damping", damping, 0.0, LARGEST)
     for name, share in (("shear", shear), ("damping", damping)):
         if share < 0.0:
             raise ArgumentError(f"{name}: expected a share of zero or more, got {share:g}")

@@ -6,13 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, frequency, number
+from ..._checks import Array, number
 from ...errors import ArgumentError
 from ...systems import Oscillator, Sinusoid
 from ..base import Scene
-
-#: Squares and products of the numbers stay finite.
-LARGEST = 1e100
+from ..ranges import LARGEST, frequency, within
 
 
 def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 1.0, drive: Any = 0.7, phase: Any = 0.5) -> Scene:
@@ -35,11 +33,9 @@ def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 
     damping = number("damping", damping, positive=True)
     if damping >= 1:
         raise ArgumentError(f"damping: expected a ratio below 1, where the oscillator still swings, got {damping:g}")
-    amplitude = number("amplitude", amplitude)
+    amplitude = within("amplitude", amplitude, -LARGEST, LARGEST)
     drive = frequency("drive", drive)
     phase = number("phase", phase, unit="rad")
-    if abs(amplitude) > LARGEST:
-        raise ArgumentError(f"amplitude: expected at most {LARGEST:g}, got {amplitude:g}")
     y0, v0 = 1.0, 0.0
 
     # y = Re(steady·exp(i·drive·t) + free·exp(decay·t)); sin is the real part of −i·exp.

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import count, fits, number
+from ..._checks import count, fits
 from ...systems import Springs
 from ..base import Scene
+from ..ranges import LARGEST, within
 
 
 def jelly_cube(n: Any = 4, twist: Any = 4.0) -> Scene:
@@ -25,7 +26,7 @@ def jelly_cube(n: Any = 4, twist: Any = 4.0) -> Scene:
     Raises:
         ArgumentError: what is wrong with which argument.
     """
-    n, twist = count("n", n, 2), number("twist", twist, unit="radians per unit of time")
+    n, twist = count("n", n, 2), within("twist", twist, -LARGEST, LARGEST, "radians per unit of time")
     fits("n: the springs", 600.0 * n**3, (), "take fewer particles")
     at = np.arange(n**3).reshape(n, n, n)
     pairs = []

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, frequency
+from ..._checks import Array
 from ...systems import Oscillator
 from ..base import Scene
+from ..ranges import frequency
 
 
 def oscillator(omega: Any = 1.0) -> Scene:

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import count, fits, number
+from ..._checks import count, fits
 from ...systems import Springs
 from ..base import Scene
+from ..ranges import moderate
 
 
 def rope_bridge(planks: Any = 15, load: Any = 5.0) -> Scene:
@@ -24,7 +25,7 @@ def rope_bridge(planks: Any = 15, load: Any = 5.0) -> Scene:
     Raises:
         ArgumentError: what is wrong with which argument.
     """
-    planks, load = count("planks", planks, 1), number("load", load, positive=True)
+    planks, load = count("planks", planks, 1), moderate("load", load)
     fits("planks: the springs", 300.0 * planks, (), "take fewer planks")
     ends = planks + 2
     left, right = np.arange(ends), ends + np.arange(ends)

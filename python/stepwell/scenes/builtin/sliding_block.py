@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ..._checks import Array
 from ...systems import Oscillator
 from ..base import Scene
+from ..ranges import moderate
 
 
 def sliding_block(friction: Any = 0.5 * 9.81, speed: Any = 3.0) -> Scene:
@@ -21,8 +22,8 @@ def sliding_block(friction: Any = 0.5 * 9.81, speed: Any = 3.0) -> Scene:
     Raises:
         ArgumentError: what is wrong with which argument.
     """
-    friction = number("friction", friction, positive=True)
-    speed = number("speed", speed, positive=True)
+    friction = moderate("friction", friction)
+    speed = moderate("speed", speed)
     stop = speed / friction
 
     def exact(t: Array) -> tuple[Array, Array]:

@@ -4,6 +4,7 @@ use std::sync::{Arc, atomic::Ordering::Relaxed};
 
 use super::{
     Facts, Rates,
+    contact::RowContacts,
     course::{Course, Goal},
     executor::{Executor, stride},
 };
@@ -106,6 +107,8 @@ pub struct LargeGroup {
     step: Executor,
     start: Option<Executor>,
     finish: Option<Executor>,
+    /// The surfaces that points meet after a step.
+    contacts: Option<RowContacts>,
     recorded: usize,
     /// Whether the parameters taken for the first member hold for all.
     prepared: bool,
@@ -129,6 +132,7 @@ impl LargeGroup {
             step: executor(&blocks.courses.step),
             start: blocks.courses.start.as_ref().map(executor),
             finish: blocks.courses.finish.as_ref().map(executor),
+            contacts: None,
             recorded,
             prepared: false,
             stop: Stop::default(),
@@ -146,6 +150,7 @@ impl Group for LargeGroup {
         // Parameters that all members share are copied once: copying a large matrix takes longer than a step.
         if !std::mem::replace(&mut self.prepared, spec.is_common()) {
             self.blocks.rates.prepare(spec, first, count);
+            self.contacts = RowContacts::new(spec, self.clock.h, self.blocks.rates.lanes(), first, count);
         }
         self.blocks.rates.tally_mut().fill(0.0);
     }
@@ -184,10 +189,17 @@ impl Group for LargeGroup {
                 return;
             }
             let (t, h) = (self.clock.at(k), self.clock.h);
+            if let Some(contacts) = &mut self.contacts {
+                contacts.keep(self.blocks.slots());
+            }
             let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
             self.step.run(&courses.step, rates.as_mut(), *sizes, t, h, arena);
             let (v, y) = arena.split_at_mut(*stride);
             rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
+            if let Some(contacts) = &mut self.contacts {
+                let carry = self.start.as_mut().zip(self.finish.as_mut()).map(|(start, finish)| [start, finish]);
+                contacts.after(&mut self.blocks, carry, t, h);
+            }
         }
     }
 

@@ -12,6 +12,7 @@
 pub mod adaptive;
 pub mod bodies;
 pub mod chain;
+pub mod contact;
 pub mod control;
 pub mod course;
 pub mod executor;
@@ -142,7 +143,7 @@ pub struct Long {
     pub make: fn(&Asked) -> Box<dyn Rates>,
 }
 
-/// Rates of one member by the kernel of the system, under the control and the force that are given.
+/// Rates of one member by the kernel of the system, with the springs of surfaces, under the control and the force that are given.
 pub fn single(long: Long, asked: &Asked) -> Box<dyn Rates> {
-    force::wrap(control::wrap((long.make)(asked), asked), asked)
+    force::wrap(control::wrap(contact::wrap((long.make)(asked), asked), asked), asked)
 }

@@ -1,0 +1,345 @@
+"""Contact of points with planes and spheres: a one-sided spring, or what happens to a point after the step that met one.
+
+Vectors are lists of their components, each an array over the points (and the batch). Only the way "safe" needs more than the
+state after the step. It sees what the step did to v and y, whatever the method: the mean acceleration, (v₁ − v₀)/h, and the lag
+(y₁ − y₀)/h − ½(v₀ + v₁). In a uniform field the lag is 0, or half an increment of v for the methods of the Euler family.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import bits
+from .around import whole_step
+
+#: A distance is known to within so many times the numbers that it is computed from: eight roundings.
+ROUNDING = 2.0**-50
+
+#: The bits of a number but for its sign.
+MAGNITUDE = 2**63 - 1
+
+Vector = list[Any]
+
+
+def dot(a: Any, b: Any) -> Any:
+    """a·b, from the first component on."""
+    whole = a[0] * b[0]
+    for i in range(1, len(a)):
+        whole = whole + a[i] * b[i]
+    return whole
+
+
+def magnitudes(a: Any, b: Any) -> Any:
+    """The sum of |aᵢ·bᵢ|."""
+    whole = bits.and_bits(a[0] * b[0], MAGNITUDE)
+    for i in range(1, len(a)):
+        whole = whole + bits.and_bits(a[i] * b[i], MAGNITUDE)
+    return whole
+
+
+class Step(NamedTuple):
+    """What a step of the method did to the points: the states before and after, the increment of v, and the lag."""
+
+    v0: Vector
+    y0: Vector
+    v1: Vector
+    y1: Vector
+    kick: Vector
+    lag: Vector
+
+
+class Place(NamedTuple):
+    """Where a point is to a surface after the step.
+
+    Attributes:
+        near: whether it reached the surface.
+        normal: out of the surface, at the point.
+        distance: from the plane that touches the surface there; negative behind it.
+        before: the distance at the start of the step.
+        slack: how exact these distances are.
+    """
+
+    near: Any
+    normal: Vector
+    distance: Any
+    before: Any
+    slack: Any
+
+
+class Change(NamedTuple):
+    """What contact makes of a point: the velocity along the normal, the distance, whether it rests, and at which distance."""
+
+    speed: Any
+    distance: Any
+    rests: Any | None
+    low: Any
+
+
+class Surface:
+    """What planes and spheres have in common; ``friction`` None means that there is none."""
+
+    is_curved = False
+
+    def __init__(self, h: Any, way: str, restitution: Any, friction: Any, omega: Any) -> None:
+        self.h = h
+        self.way = way
+        self.restitution = restitution
+        self.friction = friction
+        self.stiffness = None if omega is None else h * (omega * omega)
+
+    def place(self, y0: Vector, y: Vector) -> Place:
+        """Where points are that began the step at ``y0``."""
+        raise NotImplementedError
+
+    def push(self, y: Vector) -> Vector:
+        """What a one-sided spring takes from an increment of v."""
+        raise NotImplementedError
+
+    def back(self, y: Vector, distance: Any) -> Vector:
+        """A point on the touching plane, put at that distance from the surface itself."""
+        return y
+
+    def meet(self, step: Step, v: Vector, y: Vector) -> tuple[Any, Vector, Vector]:
+        """Which points meet the surface, and all of them after that."""
+        place = self.place(step.y0, y)
+        normal, speed = place.normal, dot(v, place.normal)
+        if self.way == "safe":
+            touches, change = self.bounce(step, place, speed)
+        else:
+            leaving = -speed if self.restitution is None else -(self.restitution * speed)
+            touches = bits.less(place.distance, 0.0) & bits.less(speed, 0.0)
+            change = Change(leaving, place.distance, None, None)
+        turn, lift = change.speed - speed, change.distance - place.distance
+        if self.friction is None:
+            new_v = [v + turn * n for v, n in zip(v, normal, strict=True)]
+            new_y = [y + lift * n for y, n in zip(y, normal, strict=True)]
+        else:
+            new_v, new_y = self.rub(step, v, y, (speed, turn, lift), normal, change)
+        if change.rests is not None:
+            resting = self.back(new_y, change.low)
+            new_y = [bits.where(change.rests, rest, y) for rest, y in zip(resting, new_y, strict=True)]
+        v = [bits.where(touches, new, old) for new, old in zip(new_v, v, strict=True)]
+        y = [bits.where(touches, new, old) for new, old in zip(new_y, y, strict=True)]
+        return touches, v, y
+
+    def bounce(self, step: Step, place: Place, speed: Any) -> tuple[Any, Change]:
+        """A point leaves with e² of the energy of impact, or rests if the flight would be shorter than two steps.
+
+        ``w`` is the velocity that belongs to the same time as y. In a uniform field w² + 2G·d is constant for every method, and
+        so is (e·u − G·τ)² + 2G·τ(e·u − ½G·τ) for every time τ since the bounce.
+        """
+        push, late = -dot(step.kick, place.normal), dot(step.lag, place.normal)
+        size = bits.and_bits(push, MAGNITUDE)
+        quarter = 0.25 * size
+        ahead = bits.where(bits.less(quarter, late), 0.5 * size, 0.0)
+        gains = bits.less(push, 0.0) & bits.less(quarter, -late)
+        w = speed + ahead
+        touches = place.near & bits.less(w, 0.0)
+        pull = push / self.h
+        square = (w * w + (pull + pull) * place.distance) - bits.where(gains, push * push, 0.0)
+        impact = np.sqrt(bits.where(bits.less(0.0, square), square, 0.0))
+        leaving = self.restitution * impact
+        rests = bits.at_most(leaving, push) | bits.at_most(square, 0.0)
+        since = (-(place.distance + place.distance)) / (impact - w)
+        since = bits.where(bits.less(since, 0.0), 0.0, since)
+        since = bits.where(bits.less(self.h, since), self.h, since)
+        low = bits.where(bits.less(place.before + place.slack, 0.0) | bits.less(push, 0.0), place.before, 0.0)
+        height = since * (leaving - (0.5 * pull) * since)
+        rising = (leaving - pull * since) - ahead
+        return touches, Change(bits.where(rests, 0.0, rising), bits.where(rests, low, height), rests, low)
+
+    def rub(self, step: Step, v: Vector, y: Vector, along: Any, normal: Vector, change: Change) -> tuple[Vector, Vector]:
+        """Coulomb's friction: the tangential velocity loses μ times what the normal one gains.
+
+        A point that rests is slowed during the whole step, so it slides by the mean velocity, and one that sticks stays.
+        """
+        speed, turn, lift = along
+        slide = [v - speed * n for v, n in zip(v, normal, strict=True)]
+        fast, grip = np.sqrt(dot(slide, slide)), self.friction * turn
+        sticks = bits.at_most(fast, grip)
+        kept = bits.where(sticks, 0.0, 1.0 - grip / fast)
+        new_v = [kept * s + change.speed * n for s, n in zip(slide, normal, strict=True)]
+        new_y = [y + lift * n for y, n in zip(y, normal, strict=True)]
+        if change.rests is None:
+            return new_v, new_y
+        half = 0.5 * self.h
+        share = half * bits.where(bits.less(0.0, fast), fast / grip, 0.0)
+        way = [(y0 - y) + share * v0 for y0, y, v0 in zip(step.y0, y, step.v0, strict=True)]
+        through, less = dot(way, normal), half * (1.0 - kept)
+        for i, n in enumerate(normal):
+            shift = bits.where(sticks, way[i] - through * n, -(less * slide[i]))
+            new_y[i] = bits.where(change.rests, new_y[i] + shift, new_y[i])
+        return new_v, new_y
+
+
+class Plane(Surface):
+    """Points y with normal·y = offset; what is below is behind it."""
+
+    def __init__(self, h: Any, way: str, restitution: Any, friction: Any, omega: Any, normal: Any, offset: Any) -> None:
+        super().__init__(h, way, restitution, friction, omega)
+        self.normal = list(normal)
+        self.offset = offset
+
+    def place(self, y0: Vector, y: Vector) -> Place:
+        """By the plane itself."""
+        distance = dot(y, self.normal) - self.offset
+        slack = ROUNDING * (magnitudes(y, self.normal) + bits.and_bits(self.offset, MAGNITUDE))
+        before = dot(y0, self.normal) - self.offset
+        return Place(bits.at_most(distance, slack), self.normal, distance, before, slack)
+
+    def push(self, y: Vector) -> Vector:
+        """As deep as the point is behind the plane."""
+        distance = dot(y, self.normal) - self.offset
+        strength = self.stiffness * bits.where(bits.less(distance, 0.0), distance, 0.0)
+        return [strength * n for n in self.normal]
+
+
+class Sphere(Surface):
+    """Points at a distance from a centre; what is behind it is within it, or without if points are inside."""
+
+    is_curved = True
+
+    def __init__(
+        self, h: Any, way: str, restitution: Any, friction: Any, omega: Any, side: str, centre: Any, radius: Any
+    ) -> None:
+        super().__init__(h, way, restitution, friction, omega)
+        self.is_inside = side == "inside"
+        self.centre = list(centre)
+        self.radius = radius
+
+    def outward(self, vector: Vector) -> Vector:
+        """A vector from the centre, towards the points."""
+        return [-each for each in vector] if self.is_inside else vector
+
+    def depth(self, length: Any) -> Any:
+        """The distance of a point from the surface, from that from the centre."""
+        return self.radius - length if self.is_inside else length - self.radius
+
+    def place(self, y0: Vector, y: Vector) -> Place:
+        """By the plane that touches the sphere where the straight way from ``y0`` to ``y`` meets it, or else nearest to ``y``."""
+        from0, move, from1 = (
+            [a - b for a, b in zip(*pair, strict=True)] for pair in ((y0, self.centre), (y, y0), (y, self.centre))
+        )
+        a, b, square = dot(move, move), dot(from0, move), dot(from0, from0)
+        c = square - self.radius * self.radius
+        disc = b * b - a * c
+        root = np.sqrt(bits.where(bits.less(0.0, disc), disc, 0.0))
+        if self.is_inside:
+            part = bits.where(bits.less(b, 0.0), (root - b) / a, -(c / (b + root)))
+            hits = bits.at_most(c, 0.0) & bits.at_most(part, 1.0)
+        else:
+            part = c / (root - b)
+            hits = bits.less(0.0, disc) & bits.less(b, 0.0) & bits.at_most(0.0, c) & bits.at_most(part, 1.0)
+        where = [bits.where(hits, f0 + part * m, f1) for f0, m, f1 in zip(from0, move, from1, strict=True)]
+        length = np.sqrt(dot(where, where))
+        normal = self.outward([w / length for w in where])
+        along = dot(from1, normal)
+        distance = along + self.radius if self.is_inside else along - self.radius
+        slack = ROUNDING * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
+        near = hits | bits.at_most(self.depth(np.sqrt(dot(from1, from1))), slack)
+        return Place(near, normal, distance, self.depth(np.sqrt(square)), slack)
+
+    def push(self, y: Vector) -> Vector:
+        """As deep as the point is behind the sphere, along the radius."""
+        way = [y - c for y, c in zip(y, self.centre, strict=True)]
+        length = np.sqrt(dot(way, way))
+        distance = self.depth(length)
+        strength = self.stiffness * bits.where(bits.less(distance, 0.0), distance / length, 0.0)
+        return [strength * w for w in self.outward(way)]
+
+    def back(self, y: Vector, distance: Any) -> Vector:
+        """Along the radius."""
+        way = [y - c for y, c in zip(y, self.centre, strict=True)]
+        length = self.radius - distance if self.is_inside else self.radius + distance
+        scale = length / np.sqrt(dot(way, way))
+        return [c + scale * w for c, w in zip(self.centre, way, strict=True)]
+
+
+def surfaces(h: Any, given: dict[str, Any]) -> list[Surface]:
+    """The surfaces that are given by name."""
+    found: list[Surface] = []
+    for i in range(given.get("contacts", 0)):
+        of = {name.removeprefix(f"contact_{i}_"): value for name, value in given.items() if name.startswith(f"contact_{i}_")}
+        common = h, of["way"], of.get("restitution"), of.get("friction"), of.get("omega")
+        if given[f"contact_{i}"] == "plane":
+            found.append(Plane(*common, of["normal"], of["offset"]))
+        else:
+            found.append(Sphere(*common, of["side"], of["centre"], of["radius"]))
+    return found
+
+
+class Touching:
+    """A system whose points meet surfaces. All else is the system's own."""
+
+    def __init__(self, s: Any, h: Any, met: list[Surface]) -> None:
+        self.s = s
+        self.h = h
+        self.springs = [each for each in met if each.way == "spring"]
+        self.met = [each for each in met if each.way != "spring"]
+        safe = [each for each in self.met if each.way == "safe"]
+        #: Along one plane the energy is right by itself.
+        self.is_limited = len(safe) > 1 or any(each.is_curved or each.friction is not None for each in safe)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.s, name)
+
+    def dv(self, t: Any, v: Any, y: Any) -> Any:
+        """h·v̇ and the push of the springs."""
+        dv = self.s.dv(t, v, y)
+        for spring in self.springs:
+            push = spring.push([y[:, c] for c in range(y.shape[1])])
+            dv = np.stack([dv[:, c] - push[c] for c in range(y.shape[1])], axis=1)
+        return dv
+
+    def resolve(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
+        """Which points met a surface in a step, and the state after that, from the states before and after the step."""
+        dim, h = before[1].shape[1], self.h
+        v0, y0, v1, y1 = ([block[:, c] for c in range(dim)] for block in (*before, *after))
+        kick = [b - a for a, b in zip(v0, v1, strict=True)]
+        lag = [(y1[c] - y0[c]) / h - 0.5 * (v0[c] + v1[c]) for c in range(dim)]
+        step, v, y, touched = Step(v0, y0, v1, y1, kick, lag), v1, y1, None
+        with np.errstate(all="ignore"):  # what is divided by zero is not chosen
+            for surface in self.met:
+                touches, v, y = surface.meet(step, v, y)
+                touched = touches if touched is None else touched | touches
+            if self.is_limited:
+                v, y = self.limit(step, touched, v, y)
+        return touched, np.stack(v, axis=1), np.stack(y, axis=1)
+
+    def limit(self, step: Step, touched: Any, v: Vector, y: Vector) -> tuple[Vector, Vector]:
+        """No more energy than before the step, or after it without contact; the work is that of the mean acceleration."""
+
+        def allowed(v_from: Vector, y_from: Vector) -> Any:
+            work = dot(step.kick, [to - at for to, at in zip(y, y_from, strict=True)])
+            return dot(v_from, v_from) + (work + work) / self.h
+
+        most, raw, square = allowed(step.v0, step.y0), allowed(step.v1, step.y1), dot(v, v)
+        most = bits.where(bits.less(most, raw), raw, most)
+        stays = touched & bits.at_most(most, 0.0) & bits.less(square, np.inf)
+        factor = bits.where(touched & bits.less(most, square), np.sqrt(most / square), 1.0)
+        return (
+            [bits.where(stays, 0.0, factor * each) for each in v],
+            [bits.where(stays, at, each) for at, each in zip(step.y0, y, strict=True)],
+        )
+
+
+def around(s: Any, h: Any, given: dict[str, Any]) -> Any:
+    """A system and the surfaces that are given, or the system itself if there are none."""
+    return Touching(s, h, surfaces(h, given)) if given else s
+
+
+def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any:
+    """One step by a method, with projection and contact. What a method carries begins anew where a point met a surface."""
+    before = v, y
+    after = whole_step(steps.step, s, t, h, v, y)
+    if not getattr(s, "met", None):
+        return after
+    if not hasattr(steps, "finish"):
+        return s.resolve(before, after)[1:]
+    end, (slot, y1) = t + h, after
+    v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
+    touched, v, y = s.resolve((v0, before[1]), (v1, y1))
+    anew = steps.start(s, choice, end, v, y)
+    return bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], y.shape), anew, slot), y

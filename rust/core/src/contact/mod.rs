@@ -1,0 +1,203 @@
+//! Contact of points with planes and spheres (§1, elastic reflection): what happens to a point after the step that met one.
+//!
+//! The rows of the blocks are points. A surface of the way `spring` adds a force to the rates; the others act after the step, on the state
+//! that the method made, knowing the one before. What is computed, and why no energy is added, is in `reference/contact.py` and
+//! docs/contact.md.
+//!
+//! Given: the whole number `contacts`; for surface i, with `contact_i` before each name, a word, `plane` or `sphere`, the word `_way`, and
+//! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word
+//! `_side`, `inside` or `outside`, the vector `_centre` and `_radius`.
+
+mod meet;
+mod surface;
+
+use meet::Step;
+use surface::{Surface, Way};
+
+use crate::{
+    error::Error,
+    method::Record,
+    number::Number,
+    program::Program,
+    spec::{Given, Parameters},
+    system::{Block, Energies, Gradient, Shape, System},
+};
+
+/// Operations of a point that meets a surface, approximately.
+const OPERATIONS: usize = 60;
+
+/// Whether points meet any surface.
+pub fn is_given(given: &Given) -> bool {
+    given.whole("contacts") > 0
+}
+
+/// Approximate number of operations that surfaces add to a step of blocks of this size.
+pub fn operations(given: &Given, shape: Shape) -> usize {
+    OPERATIONS * given.whole("contacts") * shape.y / dimensions(given).max(1)
+}
+
+/// An error if the surfaces that are given are wrong.
+pub fn check(given: &Given, shape: Shape) -> Result<(), Error> {
+    let dim = dimensions(given);
+    for i in 0..given.whole("contacts") {
+        surface::check(given, i, dim)?;
+    }
+    if is_given(given) && (shape.v != shape.y || !shape.y.is_multiple_of(dim)) {
+        return Err(Error::Shape { what: "points that meet a surface", expected: dim, got: shape.y });
+    }
+    Ok(())
+}
+
+/// How many numbers a point has.
+pub fn dimensions(given: &Given) -> usize {
+    given.count("contact_0_normal").max(given.count("contact_0_centre")).max(1)
+}
+
+/// The surfaces that act after a step.
+pub struct Contacts<N: Number> {
+    h: N,
+    dim: usize,
+    surfaces: Vec<Surface<N>>,
+    /// Whether the energy is compared: along one plane without friction it is right by itself.
+    is_limited: bool,
+}
+
+impl<N: Number> Contacts<N> {
+    /// The surfaces that are given; None if none acts after a step.
+    pub fn new(p: &Parameters<N>) -> Option<Contacts<N>> {
+        let surfaces = surface::all(p, |way| way != Way::Spring);
+        let safe: Vec<_> = surfaces.iter().filter(|surface| surface.way == Way::Safe).collect();
+        let is_limited = safe.len() > 1 || safe.iter().any(|surface| surface.is_curved() || surface.friction.is_some());
+        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim: dimensions(p.given), surfaces, is_limited })
+    }
+
+    /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
+    pub fn resolve_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
+        let step = Step::new(self.h, before, [v, y]);
+        let mut touched: Option<N::Truth> = None;
+        for surface in &self.surfaces {
+            let touches = meet::meet(surface, &step, v, y);
+            touched = Some(touched.map_or(touches, |before| before | touches));
+        }
+        if let (true, Some(touched)) = (self.is_limited, touched) {
+            meet::limit(&step, touched, v, y);
+        }
+        touched
+    }
+
+    /// Which points met a surface in a step, and the state after that.
+    fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<N::Truth>, [Block<N>; 2]) {
+        let mut touched = Vec::with_capacity(y.len() / self.dim);
+        for from in (0..y.len()).step_by(self.dim) {
+            let to = from + self.dim;
+            let [v0, y0] = before.map(|block| &block.as_slice()[from..to]);
+            touched.extend(self.resolve_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]));
+        }
+        (touched, [v, y])
+    }
+
+    /// The state after a step of a method. What it carries begins anew where a point met a surface.
+    pub fn after(
+        &self,
+        carry: Option<&[Program; 2]>,
+        s: &dyn System<N>,
+        t: N,
+        before: [&Block<N>; 2],
+        after: [Block<N>; 2],
+    ) -> [Block<N>; 2] {
+        let Some([start, finish]) = carry else { return self.resolve(before, after).1 };
+        let first = |program: &Program, t: N, v: &Block<N>, y: &Block<N>| {
+            program.run(s, t, self.h, v, y).into_iter().next().unwrap_or_else(|| v.clone())
+        };
+        let (end, [slot, y1]) = (t + self.h, after);
+        let (v0, v1) = (first(finish, t, before[0], before[1]), first(finish, end, &slot, &y1));
+        let (touched, [v, y]) = self.resolve([&v0, before[1]], [v1, y1]);
+        let anew = first(start, end, &v, &y);
+        let slot = Block::from_fn(slot.len(), |i, _| N::choose(touched[i / self.dim], anew[i], slot[i]));
+        [slot, y]
+    }
+}
+
+impl Contacts<f64> {
+    /// Whether a point may have met a surface in a step, from where it was and is.
+    pub fn is_near(&self, before: &[f64], y: &[f64]) -> bool {
+        self.surfaces.iter().any(|surface| surface.reaches(before, y))
+    }
+}
+
+/// The programs with which a method goes from velocities to what it carries, and back.
+pub fn carry(method: &Record, choice: usize) -> Option<[Program; 2]> {
+    Some([method.start(choice)?, method.finish(choice)?])
+}
+
+/// A system with the springs that are given, or the system itself.
+pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
+    match Springs::new(p) {
+        Some(springs) => Box::new(Sprung { system, springs }),
+        None => system,
+    }
+}
+
+/// Surfaces that push points back by springs.
+pub struct Springs<N: Number> {
+    dim: usize,
+    surfaces: Vec<Surface<N>>,
+}
+
+impl<N: Number> Springs<N> {
+    /// Those that are given; None without any.
+    pub fn new(p: &Parameters<N>) -> Option<Springs<N>> {
+        let surfaces = surface::all(p, |way| way == Way::Spring);
+        (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.given), surfaces })
+    }
+
+    /// Adds their pushes to increments of the velocities of points that are there.
+    pub fn push(&self, y: &[N], dv: &mut [N]) {
+        for (y, dv) in y.chunks(self.dim).zip(dv.chunks_mut(self.dim)) {
+            for surface in &self.surfaces {
+                surface.push(y, dv);
+            }
+        }
+    }
+}
+
+struct Sprung<N: Number> {
+    system: Box<dyn System<N>>,
+    springs: Springs<N>,
+}
+
+impl<N: Number> System<N> for Sprung<N> {
+    fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let mut dv = self.system.dv(t, v, y);
+        self.springs.push(y.as_slice(), dv.as_mut_slice());
+        dv
+    }
+
+    fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        self.system.dy(t, v, y)
+    }
+
+    fn velocity(&self, d: &Block<N>) -> Block<N> {
+        self.system.velocity(d)
+    }
+
+    fn energies(&self, v: &Block<N>, y: &Block<N>) -> Option<Energies<N>> {
+        self.system.energies(v, y)
+    }
+
+    fn gradient(&self, v: &Block<N>, y: &Block<N>, energies: &Energies<N>) -> Option<Gradient<N>> {
+        self.system.gradient(v, y, energies)
+    }
+
+    fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
+        self.system.record(quantity, v, y)
+    }
+
+    fn project(&self, v: Block<N>, y: Block<N>) -> (Block<N>, Block<N>) {
+        self.system.project(v, y)
+    }
+
+    fn tally(&self) -> Option<N> {
+        self.system.tally()
+    }
+}

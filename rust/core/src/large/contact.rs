@@ -1,0 +1,203 @@
+//! Contact of the points of a large system: the same as [`crate::contact`], over rows, member by member and point by point.
+
+use std::sync::Arc;
+
+use super::{Asked, Facts, Rates, executor::Executor, group::Blocks};
+use crate::{
+    contact::{Contacts, Springs, dimensions},
+    run::workers::Stop,
+    spec::{Parameters, Spec},
+};
+
+/// The parameters of one member.
+fn parameters<'a>(spec: &'a Spec, h: f64, member: usize) -> Parameters<'a, f64> {
+    let numbers = spec.rows.iter().map(|row| row.at(member)).collect();
+    Parameters { given: &spec.given, h, numbers, sample: |_, _| f64::NAN }
+}
+
+/// The surfaces of the members of a group, and the state before a step.
+pub struct RowContacts {
+    /// One for each lane.
+    lanes: Vec<Contacts<f64>>,
+    dim: usize,
+    /// The slots before the step.
+    before: [Vec<f64>; 2],
+    /// The slots after it, and the velocities at both ends, where a method carries something else.
+    after: [Vec<f64>; 2],
+    velocities: [Vec<f64>; 2],
+    /// Numbers of points that met a surface.
+    touched: Vec<bool>,
+}
+
+/// One row of numbers as points, whose numbers are `lanes` apart.
+fn point<const N: usize>(rows: [&[f64]; N], dim: usize, lanes: usize, at: (usize, usize)) -> [[f64; 3]; N] {
+    let (i, lane) = at;
+    rows.map(|row| {
+        let mut numbers = [0.0; 3];
+        numbers[..dim].iter_mut().enumerate().for_each(|(c, number)| *number = row[(dim * i + c) * lanes + lane]);
+        numbers
+    })
+}
+
+impl RowContacts {
+    /// For the members from `first`; lanes past the `count`-th repeat the last one. None if no surface acts after a step.
+    pub fn new(spec: &Spec, h: f64, lanes: usize, first: usize, count: usize) -> Option<RowContacts> {
+        let member = |lane: usize| first + lane.min(count.saturating_sub(1));
+        let lanes = (0..lanes).map(|lane| Contacts::new(&parameters(spec, h, member(lane)))).collect::<Option<_>>()?;
+        let none = || [Vec::new(), Vec::new()];
+        let dim = dimensions(&spec.given);
+        Some(RowContacts { lanes, dim, before: none(), after: none(), velocities: none(), touched: Vec::new() })
+    }
+
+    /// Copies the state before a step.
+    pub fn keep(&mut self, (v, y): (&[f64], &[f64])) {
+        copy(&mut self.before, [v, y]);
+    }
+
+    /// Each point and lane.
+    fn points(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let lanes = self.lanes.len();
+        let points = self.before[1].len() / (self.dim * lanes);
+        (0..points).flat_map(move |i| (0..lanes).map(move |lane| (i, lane)))
+    }
+
+    /// Whether any point may have met a surface.
+    fn is_near(&self, y: &[f64]) -> bool {
+        let (dim, lanes) = (self.dim, self.lanes.len());
+        self.points().any(|at| {
+            let [y0, y1] = point([&self.before[1], y], dim, lanes, at);
+            self.lanes[at.1].is_near(&y0[..dim], &y1[..dim])
+        })
+    }
+
+    /// Changes the points that met a surface, of states whose velocities are known.
+    fn resolve(&mut self, v0: &[f64], v: &mut [f64], y: &mut [f64]) {
+        let (dim, lanes) = (self.dim, self.lanes.len());
+        self.touched.clear();
+        self.touched.resize(y.len(), false);
+        for at in self.points() {
+            let [v0, y0, mut v1, mut y1] = point([v0, &self.before[1], v, y], dim, lanes, at);
+            let contacts = &self.lanes[at.1];
+            if !contacts.is_near(&y0[..dim], &y1[..dim]) {
+                continue;
+            }
+            let touched = contacts.resolve_point([&v0[..dim], &y0[..dim]], [&mut v1[..dim], &mut y1[..dim]]);
+            for c in 0..dim {
+                let number = (dim * at.0 + c) * lanes + at.1;
+                (v[number], y[number]) = (v1[c], y1[c]);
+                self.touched[number] = touched == Some(true);
+            }
+        }
+    }
+
+    /// The state after a step from time t, in the slots.
+    pub(super) fn after(&mut self, blocks: &mut Blocks, carry: Option<[&mut Executor; 2]>, t: f64, h: f64) {
+        if !self.is_near(blocks.slots().1) {
+            return;
+        }
+        let Some([start, finish]) = carry else {
+            let (v, y) = blocks.slots_mut();
+            let v0 = std::mem::take(&mut self.before[0]);
+            self.resolve(&v0, v, y);
+            self.before[0] = v0;
+            return;
+        };
+        let (end, courses) = (t + h, Arc::clone(&blocks.courses));
+        let (Some(to_carry), Some(to_v)) = (&courses.start, &courses.finish) else { return };
+        let (v, y) = blocks.slots();
+        copy(&mut self.after, [v, y]);
+        for (i, (state, t)) in [(&self.before, t), (&self.after, end)].into_iter().enumerate() {
+            let (v, y) = blocks.slots_mut();
+            v.copy_from_slice(&state[0]);
+            y.copy_from_slice(&state[1]);
+            finish.run(to_v, blocks.rates.as_mut(), blocks.sizes, t, h, &mut blocks.arena);
+            self.velocities[i].clear();
+            self.velocities[i].extend_from_slice(blocks.slots().0);
+        }
+        let v0 = std::mem::take(&mut self.velocities[0]);
+        let (v, y) = blocks.slots_mut();
+        self.resolve(&v0, v, y);
+        self.velocities[0] = v0;
+        start.run(to_carry, blocks.rates.as_mut(), blocks.sizes, end, h, &mut blocks.arena);
+        let slots = blocks.slots_mut().0.iter_mut().zip(&self.after[0]).zip(&self.touched);
+        slots.for_each(|((slot, before), touched)| *slot = if *touched { *slot } else { *before });
+    }
+}
+
+fn copy(to: &mut [Vec<f64>; 2], from: [&[f64]; 2]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to.clear();
+        to.extend_from_slice(from);
+    }
+}
+
+/// Rates of one member by a hand-written kernel, and the springs of its surfaces.
+struct SprungRates {
+    rates: Box<dyn Rates>,
+    h: f64,
+    springs: Option<Springs<f64>>,
+}
+
+/// Rates with the springs that are given, or the rates themselves.
+pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
+    let has_spring = (0..asked.given.whole("contacts")).any(|i| asked.given.word(&format!("contact_{i}_way")) == "spring");
+    if has_spring { Box::new(SprungRates { rates, h: asked.h, springs: None }) } else { rates }
+}
+
+impl Rates for SprungRates {
+    fn facts(&self) -> Facts {
+        self.rates.facts()
+    }
+
+    fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
+        self.springs = Springs::new(&parameters(spec, self.h, first));
+        self.rates.prepare(spec, first, count);
+    }
+
+    fn set_stop_flag(&mut self, stop: &Stop) {
+        self.rates.set_stop_flag(stop);
+    }
+
+    fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.rates.dv(t, v, y, out);
+        if let Some(springs) = &self.springs {
+            springs.push(y, &mut out[..y.len()]);
+        }
+    }
+
+    fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
+        self.rates.dy(t, v, y, out);
+    }
+
+    fn velocity(&mut self, d: &[f64], out: &mut [f64]) {
+        self.rates.velocity(d, out);
+    }
+
+    fn project(&mut self, v: &mut [f64], y: &mut [f64]) {
+        self.rates.project(v, y);
+    }
+
+    fn cache_forces(&mut self, y: &[f64]) {
+        self.rates.cache_forces(y);
+    }
+
+    fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
+        self.rates.record(v, y, rows);
+    }
+
+    fn energies(&mut self, v: &[f64], y: &[f64], dv: &mut [f64]) -> Option<[f64; 2]> {
+        self.rates.energies(v, y, dv)
+    }
+
+    fn gradient(&mut self, v: &[f64], dv: &[f64], along: (&mut [f64], &mut [f64])) -> Option<f64> {
+        self.rates.gradient(v, dv, along)
+    }
+
+    fn tally(&self) -> &[f64] {
+        self.rates.tally()
+    }
+
+    fn tally_mut(&mut self) -> &mut [f64] {
+        self.rates.tally_mut()
+    }
+}

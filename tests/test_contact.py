@@ -1,0 +1,264 @@
+"""Contact: no impact adds energy, and where the simpler ways do (§1, FACTS §5)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import contacts
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import assert_same
+from contacts import LAG, PARABOLIC, G
+from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+
+METHODS = [m.name for m in sw.methods()]
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+@every_method
+@pytest.mark.parametrize("restitution", [1.0, 0.8, 0.3, 0.0])
+@pytest.mark.parametrize("gravity", [True, False])
+def test_no_contact_adds_energy(method: str, restitution: float, gravity: bool) -> None:
+    contacts.no_energy_added(method, restitution=restitution, gravity=gravity)
+
+
+@pytest.mark.parametrize("method", PARABOLIC)
+@pytest.mark.parametrize("restitution", [1.0, 0.8, 0.5])
+def test_exactly_the_square_of_e_is_left(method: str, restitution: float) -> None:
+    contacts.squares(method, restitution=restitution)
+
+
+@every_method
+@pytest.mark.parametrize("check", ["bounces", "slides", "sticks", "reflects", "passes", "rolls"])
+def test_it_holds(method: str, check: str) -> None:
+    contacts.ALL[check](method)
+
+
+@every_method
+@pytest.mark.parametrize("seed", range(3))
+def test_corners_and_spheres_add_no_energy(method: str, seed: int) -> None:
+    contacts.corners(method, seed=seed)
+
+
+def test_a_ceiling_adds_no_energy() -> None:
+    """The field pulls away from the surface; Standard Euler gains ½·(h·g)² in the step of the impact, and may not keep it."""
+    phase, kick = np.linspace(0.01, 1.0, 50)[:, np.newaxis], np.linspace(0.01, 2.0, 40)
+    y = np.broadcast_to(-phase, (1, 1, 50, 40))
+    for method in METHODS:
+        ball = sw.Particles(gravity=-kick[np.newaxis, np.newaxis], floor=sw.Floor(normal=[-1.0]))
+        run = sw.integrate(ball, method, v=1.0, y=y, dt=1.0, steps=1, every=1)
+        energy = contacts.energies(run, kick)
+        met = run.v[1, 0, 0] - (run.v[0, 0, 0] - kick) < -contacts.ROUNDING
+        assert met.sum() > 300
+        assert np.where(met, energy[1] - energy[0], -1.0).max() <= contacts.ROUNDING * (0.5 + kick.max())
+
+
+# ---- the simpler ways
+
+
+def kicked(method: str, phi: float) -> Any:
+    """v² after a one-sided spring over v² before it, for all phases of contact, with ω = 1 and without gravity."""
+    floor = sw.Floor(way="spring", omega=1.0)
+    y = phi * np.linspace(0.0, 1.0, 2001)[np.newaxis, np.newaxis]
+    run = sw.integrate(sw.Particles(gravity=0.0, floor=floor), method, v=-1.0, y=y, dt=phi, steps=60)
+    return (run.v[-1] ** 2).ravel()
+
+
+@pytest.mark.parametrize(
+    ("phi", "least", "most", "digits"),
+    [(0.1, 0.998, 1.002, 3), (0.5, 0.957, 1.045, 3), (1.0, 1.0, 1.0, 9), (1.5, 0.64, 1.56, 2), (1.9, 0.15, 6.8, 2)],
+)
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog"])
+def test_a_spring_may_add_energy(method: str, phi: float, least: float, most: float, digits: int) -> None:
+    """The bands of FACTS §5, in as many decimals as it gives."""
+    square = kicked(method, phi)
+    half = 0.5 * 10.0**-digits
+    assert square.min() == pytest.approx(least, abs=half)
+    assert square.max() == pytest.approx(most, abs=half if most < 2.0 else 0.05)
+
+
+def test_a_spring_by_standard_euler_adds_a_lot() -> None:
+    """At Φ = 1 contact lasts until v has grown fourfold: v² by 16 (FACTS §5)."""
+    assert kicked("standard_euler", 1.0).max() == pytest.approx(16.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("phi", "height"), [(0.5, 2.0), (1.5, 50.0)])
+def test_a_ball_on_a_spring_rises_above_its_start(phi: float, height: float) -> None:
+    """Dropped from 1 with h = 1/60 it gets higher with every hundred steps; with the way "safe" never above its start."""
+    for floor, gains in ((sw.Floor(way="spring", omega=60.0 * phi), True), (sw.Floor(), False)):
+        top = dropped(floor, "false_euler", 20_000).y[:, 0, 1].max()
+        assert top > height if gains else top == 1.0
+
+
+def dropped(floor: sw.Floor, method: str, steps: int = 600) -> sw.Run:
+    return sw.integrate(sw.Particles(gravity=G, floor=floor), method, v=0.0, y=[[0.0, 1.0]], dt=1 / 60, steps=steps, every=1)
+
+
+def test_flipping_keeps_what_the_method_keeps_in_flight() -> None:
+    """½v² + g·y by leapfrog, exactly; ½v² + g·y − ½·h·g·v by False Euler in flight, which loses 2·h·g/u at each bounce."""
+    for method, lag in (("leapfrog", 0.0), ("false_euler", -0.5)):
+        run = dropped(sw.Floor(way="flip"), method)
+        v, y = run.v[:, 0, 1], run.y[:, 0, 1]
+        kept = 0.5 * v * v + G * y + lag * run.dt * G * v
+        change, met = np.diff(kept), np.diff(v) > 0.0
+        assert met.sum() > 5
+        assert np.abs(change[~met]).max() <= contacts.ROUNDING * G
+        # A flip turns v from −u to u, so the term lag·h·g·v changes by 2·lag·h·g·u, which is 4·lag·h·g/u of ½u².
+        speed = v[1:][met]
+        np.testing.assert_allclose(change[met], 2.0 * lag * run.dt * G * speed, rtol=0, atol=contacts.ROUNDING * G)
+        np.testing.assert_allclose(change[met] / (0.5 * speed**2), 4.0 * lag * run.dt * G / speed, rtol=1e-9, atol=1e-12)
+
+
+def test_mirroring_adds_energy() -> None:
+    """y → −y with the flip lifts the point by what it was behind the floor, which nobody pays for."""
+    v, y, h, energy = 0.0, 1.0, 1 / 60, []
+    for _ in range(600):  # leapfrog
+        y = y + h * v - 0.5 * h * h * G
+        v = v - h * G
+        if y < 0.0:
+            v, y = -v, -y
+        energy.append(0.5 * v * v + G * y)
+    assert energy[-1] > 1.05 * G
+
+
+def test_turning_alone_lets_a_ball_sink() -> None:
+    """With e < 1 the ways "restitution" and "flip" know no rest: a point that turns below the floor falls on."""
+    assert dropped(sw.Floor(0.5, way="restitution"), "leapfrog").y[-1, 0, 1] < -0.01
+    assert dropped(sw.Floor(0.5), "leapfrog").y[-1, 0, 1] == 0.0
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "rk4"])
+def test_the_height_lasts(method: str) -> None:
+    """A ball with e = 1 rises to its start for ever, by methods on the parabola; by Standard Euler not above what it keeps."""
+    assert dropped(sw.Floor(), method, 20_000).energy[-1] == pytest.approx(G, rel=20_000 * contacts.ROUNDING)
+
+
+def test_in_a_field_that_is_not_uniform_the_error_of_an_impact_is_of_second_order() -> None:
+    """The mean acceleration of a step is taken for that along the way behind the surface: wrong by h, over a way of h."""
+    changes = []
+    for h in (0.02, 0.01, 0.005):
+        worst = 0.0
+        for start in 0.5 + h * np.linspace(0.0, 3.0, 40):
+            bodies = sw.NBody([1.0, 0.0], floor=sw.Floor(offset=-0.25), force="logarithmic")
+            y = np.array([[0.0, 5.0], [0.0, start]])
+            run = sw.integrate(bodies, "rk4", v=[[0.0, 0.0], [0.0, -2.0]], y=y, dt=h, steps=int(1.0 / h), every=1)
+            # The potential of the body without mass, ln r to the heavy one, which stays: it is attracted by nothing.
+            energy = 0.5 * run.v[:, 1, 1] ** 2 + np.log(5.0 - run.y[:, 1, 1])
+            worst = max(worst, float(np.abs(energy - energy[0]).max()))
+        changes.append(worst)
+    assert 3.0 < changes[0] / changes[1] < 6.0
+    assert 3.0 < changes[1] / changes[2] < 6.0
+
+
+# ---- one member, many members, large systems
+
+
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "rk4", "pefrl"])
+def test_members_do_not_touch_each_other(method: str) -> None:
+    rng = np.random.default_rng(3)
+    v, y = rng.normal(size=(2, 2, 9)), rng.uniform(0.0, 1.0, (2, 2, 9))
+    e, offset = rng.uniform(0.3, 1.0, 9), rng.uniform(-0.5, 0.0, 9)
+
+    def run(pick: Any, **options: Any) -> sw.Run:
+        floor = [sw.Floor(e[pick], offset=offset[pick]), sw.Floor(normal=(1.0, 0.2), offset=-2.0)]
+        ball = sw.Particles([1.0, 2.0], floor=floor)
+        return sw.integrate(ball, method, v=v[..., pick], y=y[..., pick], dt=0.02, steps=200, every=1, **options)
+
+    whole = run(slice(None))
+    for backend, threads in (("rust", 1), ("rust", 3), ("numpy", None)):
+        assert_same(whole, run(slice(None), backend=backend, threads=threads))
+    for i in range(9):
+        assert np.array_equal(run(i).y, whole.y[..., i])
+
+
+@pytest.mark.parametrize("n", [5, 70])
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "rk4"])
+def test_a_large_system_a_world_and_a_run_in_pieces(method: str, n: int) -> None:
+    rng = np.random.default_rng(n)
+    v, y = rng.normal(size=(n, 2)), rng.normal(size=(n, 2))
+    floor = [
+        sw.Floor(0.9, 0.1, offset=-1.0),
+        sw.Sphere((0.0, 0.0), 3.0, inside=True),
+        sw.Floor(offset=-0.9, way="spring", omega=9.0),
+    ]
+    bodies = sw.NBody(np.full(n, 1.0 / n), force="newton", softening=0.1, floor=floor)
+    start: dict[str, Any] = {"v": v, "y": y, "dt": 0.02}
+    whole = sw.integrate(bodies, method, **start, steps=40, every=5)
+    assert_same(whole, sw.integrate(bodies, method, **start, steps=40, every=5, backend="numpy"))
+    assert (
+        np.abs(
+            whole.y - sw.integrate(sw.NBody(bodies.masses, force="newton", softening=0.1), method, **start, steps=40, every=5).y
+        )
+        > 0.1
+    ).any()
+    half = sw.integrate(bodies, method, **start, steps=20)
+    rest = sw.integrate(bodies, method, **half.resume, steps=20)
+    assert np.array_equal(rest.y[-1], whole.y[-1])
+    assert np.array_equal(rest.v[-1], whole.v[-1])
+    world = sw.World(bodies, method, v=v.copy(), y=y.copy(), dt=0.02)
+    for _ in range(8):
+        world.step(5)
+    assert np.array_equal(world.y, whole.y[-1])
+    assert np.array_equal(world.v, whole.v[-1])
+
+
+def test_many_particles_are_stepped_as_few() -> None:
+    """Some thousand points are a large system, in rows; their bits are those of each alone."""
+    rng = np.random.default_rng(4)
+    v, y = rng.normal(size=(1500, 2)), rng.uniform(0.0, 1.0, (1500, 2))
+    for method in ("leapfrog", "rk4"):
+        many = sw.integrate(sw.Particles(floor=sw.Floor(0.7, 0.2)), method, v=v, y=y, dt=0.02, steps=60)
+        few = sw.integrate(
+            sw.Particles(floor=sw.Floor(0.7, 0.2)), method, v=v.T[np.newaxis], y=y.T[np.newaxis], dt=0.02, steps=60
+        )
+        assert np.array_equal(many.y[-1], few.y[-1, 0].T)
+
+
+def test_a_point_that_is_not_finite_stays_so() -> None:
+    floor = [sw.Floor(0.5, 0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)]
+    for start in ([[np.inf, 1.0]], [[0.0, -1e308]]):
+        with pytest.warns(sw.DivergenceWarning):
+            run = sw.integrate(
+                sw.Particles(floor=floor), "rk4", v=[[0.0, -1.7e308]], y=np.nan_to_num(start), dt=10.0, steps=5, every=1
+            )
+        first = int(run.first_bad_step)
+        assert first >= 0
+        assert not np.isfinite(np.concatenate([run.v, run.y], axis=1)[first:].reshape(6 - first, -1)).all(axis=1).any()
+
+
+# ---- refusals
+
+
+def test_what_does_not_go_together_is_refused() -> None:
+    ball = sw.Particles(floor=sw.Floor())
+    with pytest.raises(UnsupportedError, match="tolerance: goes with systems that meet no surfaces"):
+        sw.integrate(ball, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+    with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
+        sw.integrate(sw.NBody(floor=sw.Floor()), "rk4", v=0.0, y=np.eye(3)[:, :2], dt=0.1, steps=1, control=sw.Projection())
+    with pytest.raises(ArgumentError, match=r"restitution: expected numbers of 0 to 1, got 1.5"):
+        sw.Floor(1.5)
+    with pytest.raises(ArgumentError, match="omega: expected the frequency of the spring, got None"):
+        sw.Floor(way="spring")
+    with pytest.raises(ArgumentError, match='omega: goes with way="spring" only'):
+        sw.Floor(omega=1.0)
+    with pytest.raises(ArgumentError, match="friction: goes with ways other than"):
+        sw.Floor(friction=0.1, way="spring", omega=1.0)
+    with pytest.raises(ArgumentError, match="restitution: goes with"):
+        sw.Floor(0.5, way="flip")
+    with pytest.raises(ArgumentError, match="normal: expected a vector with a direction"):
+        sw.Floor(normal=(0.0, 0.0))
+    with pytest.raises(ShapeError, match=r"floor 1 3: expected vectors of 2 components"):
+        sw.Particles(floor=[sw.Floor(normal=(0.0, 1.0)), sw.Sphere((0.0, 0.0, 0.0), 1.0)])
+    with pytest.raises(ShapeError, match=r"y: expected shape \(n, 2, batch…\)"):
+        sw.integrate(sw.Particles(floor=sw.Floor(normal=(0.0, 1.0))), "rk4", v=0.0, y=np.zeros((1, 3)), dt=0.1, steps=1)
+    with pytest.raises(ShapeError, match="floor 0: expected a vector of 3 components"):
+        sw.NBody(dim=3, floor=sw.Floor(normal=(0.0, 1.0)))
+
+
+def test_lags_are_those_of_the_methods() -> None:
+    """y₁ = y₀ + h·(v₀ + v₁)/2 + h·c in a uniform field: what the way "safe" relies on, method by method."""
+    for method in METHODS:
+        run = sw.integrate(sw.Particles(gravity=1.0, dim=1), method, v=0.5, y=0.25, dt=1.0, steps=1, every=1)
+        lag = np.diff(run.y[:, 0, 0])[0] - run.v[:, 0, 0].mean()
+        assert lag == pytest.approx(LAG.get(method, 0.0), abs=1e-14)
