@@ -128,11 +128,25 @@ def body(chart: RunPicture, i: int) -> dict[str, Any]:
     return BODIES[i] if chart.run.y.shape[1] <= len(BODIES) else BODIES[0]
 
 
+def links(chart: RunPicture) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """The pairs of points that springs or rods join, shape (pairs, 2)."""
+    system = chart.run.system
+    pairs = getattr(system, "pairs", None)
+    if pairs is None:
+        pairs = [rod for rod in getattr(system, "rods", ()) if all(isinstance(end, int) for end in rod)]
+    return np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+
+
 def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: bool) -> None:
     from matplotlib.lines import Line2D
 
     y = np.clip(chart.run.y[chart.finite], -1e9, 1e9)[..., plane]
     bodies = y.shape[1]
+    if (joined := links(chart)).size:
+        from matplotlib.collections import LineCollection
+
+        for state, colour in ((y[0], "#b0b0b0"), (y[-1], "#000000")):
+            axes.add_collection(LineCollection(state[joined], colors=colour, linewidths=1.0, zorder=3))
     long, many = len(y) > LONG_CURVE, bodies > len(BODIES)
     if chart.exact is not None:
         for i in range(bodies):
@@ -141,6 +155,8 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
         look = body(chart, i)
         line: dict[str, Any] = {"color": look["color"], "linestyle": "-" if long or many else look["linestyle"]}
         width = 0.5 if many else 0.35 if long else 1.4
+        if many and joined.size:
+            continue  # the springs show where particles are, and their paths would hide them
         axes.plot(*y[:, i].T, linewidth=width, alpha=0.45 if many else 1.0, zorder=2, rasterized=long, **line)
         mark: dict[str, Any] = {"marker": look["marker"], "linestyle": "", "markersize": 4.0 if many else 10.0, "zorder": 4}
         start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 0.7 if many else 1.6}
@@ -164,7 +180,9 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
         handles.append(Line2D([], [], **(dashed if long else EXACT)))
         labels.append("exact")
     for face, label in (("white", "start"), ("black", "end")):
-        handles.append(Line2D([], [], linestyle="", marker="o", markersize=8, markerfacecolor=face, markeredgecolor="black"))
+        mark = {"linestyle": "", "marker": "o", "markersize": 8, "markerfacecolor": face, "markeredgecolor": "black"}
+        net = {"color": "#b0b0b0" if label == "start" else "#000000", "linewidth": 1.6}
+        handles.append(Line2D([], [], **(net if many and joined.size else mark)))
         labels.append(label)
     # Above the panel, where no orbit can be.
     place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(handles)}

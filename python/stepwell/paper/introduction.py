@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 
+from ..charts import run_picture
+from ..contact import Floor
 from ..integrate import integrate
+from ..scenes import scene
 from ..stability import analyse, criteria
-from ..systems import LinearSystem, Oscillator, Sampled
+from ..systems import LinearSystem, Oscillator, Particles, Sampled
 from . import Finding, Section
 
 section_1, section_2, section_3 = Section("§1"), Section("§2"), Section("§3")
@@ -28,6 +32,35 @@ def four_criteria() -> Finding:
     best = max(found, key=lambda c: float(c.limit) / c.method.evaluations)
     return Finding(
         whole, f"{len(found)} methods; the longest step per function evaluation has {best.method.title}: Φ < {best.limit:.4g}"
+    )
+
+
+def _draw_reflection(path: Path) -> object:
+    ball = scene("bouncing_ball")
+    return run_picture(ball, ball.run("leapfrog", every=1)).plot(path)
+
+
+@section_1(
+    "demand",
+    "An elastic reflection may have a wrong frequency, but must not add energy, even if the step is not small.",
+    "`sw.Floor`, `sw.Sphere`: `Particles(floor=…)`; `sw.scenes.bouncing_ball()`",
+    "A one-sided spring, and a velocity that is turned over, do not hold that for every phase, step and method; the default of "
+    "`Floor` does.",
+    draw=_draw_reflection,
+)
+def elastic_reflection() -> Finding:
+    """The largest energy after an impact over that before it, over a hundred phases, by a spring and by the default."""
+    heights = np.linspace(0.0, 1.0, 100, endpoint=False)
+    grown = []
+    for floor in (Floor(way="spring", omega=1.5), Floor()):
+        system = Particles(gravity=0.0, floor=floor)
+        y = np.stack([np.zeros(100), heights])[np.newaxis]
+        v = np.array([0.0, -1.0])[np.newaxis, :, np.newaxis]
+        runs = [integrate(system, name, v=v, y=y, dt=1.0, steps=12) for name in ("false_euler", "leapfrog", "rk4")]
+        grown.append(max(float((run.v[-1, 0, 1] ** 2).max()) for run in runs))
+    return Finding(
+        grown[0] > 1.4 and abs(grown[1] - 1.0) < 1e-14,
+        f"the worst of 100 phases and 3 methods, Φ = 1.5: energy × {grown[0]:.2f} by a spring, × {grown[1]:.6f} by `Floor()`",
     )
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..charts import figures
+from ..charts import figures, verlet_friction
+from ..errors import UnsupportedError
 from ..integrate import integrate
 from ..methods import method
 from ..stability import Analysis, analyse, criteria, stability_limit
@@ -227,6 +228,35 @@ def verlet_cost() -> Finding:
     said = "; ".join(f"{method(name).title}: {o.multiplications} products, {o.additions} sums" for name, o in found.items())
     fits = [o.multiplications for o in found.values()] == [3, 2] and all(o.additions == 2 for o in found.values())
     return Finding(fits, said)
+
+
+def _draw_friction(path: Path) -> object:
+    return verlet_friction().plot(path)
+
+
+@section_8(
+    "warning",
+    "Forces that depend on the velocity, such as viscous drag and Coulomb friction, are a big problem for Verlet.",
+    "`Oscillator(drag=…, friction=…)`; `sw.charts.verlet_friction()`, `sw.scenes.sliding_block()`",
+    "Verlet refuses such systems. With the velocity of its secant, which only this figure has, a block never comes to rest.",
+    draw=_draw_friction,
+)
+def verlet_and_friction() -> Finding:
+    """Where a sliding block is after 5 s: by Verlet's secant, by False Euler, and exactly."""
+    chart = verlet_friction()
+    slides = chart.blocks[0]
+    secant, right = float(slides.verlet[-1]), float(slides.false_euler[-1])
+    try:
+        integrate(Oscillator(0.0, friction=4.9, form="physical"), "verlet", v=3.0, y=0.0, dt=1 / 60, steps=1)
+        refused = False
+    except UnsupportedError:
+        refused = True
+    exact = 9.0 / (2.0 * 0.5 * 9.81)
+    holds = refused and abs(secant - 0.808) < 1e-3 and abs(right - exact) < 0.03
+    return Finding(
+        holds,
+        f"a sliding block after 5 s: secant {secant:.3f} and still moving, False Euler {right:.3f} at rest, exactly {exact:.3f}",
+    )
 
 
 @section_8("figure", "Harmonic samples.", "`sw.charts.figures`; `stepwell figures`", draw=picture("verlet"))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..charts import figures, stability
+from ..charts import figures
 from ..integrate import integrate
 from ..stability import analyse
 from ..stability.analysis import KINDS
@@ -78,13 +78,13 @@ def angle() -> Finding:
 
 
 def _draw_harmonic(path: Path) -> object:
-    return stability(["false_euler"]).plot(path, kind="loci")
+    return figures().plot_harmonic(path)
 
 
 @section(
     "figure",
     "Harmonic samples with 30°, 90° and 150° a step have 12, 4 and 2.4 samples per period.",
-    '`analyse(…).samples_per_period`; `sw.charts.stability(…).plot(kind="loci")`',
+    "`analyse(…).samples_per_period`; `sw.charts.figures().plot_harmonic()`",
     draw=_draw_harmonic,
 )
 def harmonic_cases() -> Finding:
