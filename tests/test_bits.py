@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -50,12 +51,14 @@ def test_does_not_depend_on_company(case: Case) -> None:
     together = case.run(90)
     system, arguments = case.make(90)
     for i in (0, 7, 63, 89):
-        alone = sw.integrate(
-            _member(system, i, 90),
-            **(arguments | {"v": arguments["v"][..., i], "y": arguments["y"][..., i]}),
-            steps=23,
-            every=5,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sw.AccuracyWarning)  # of bodies that met, which is told of a single member
+            alone = sw.integrate(
+                _member(system, i, 90),
+                **(arguments | {"v": arguments["v"][..., i], "y": arguments["y"][..., i]}),
+                steps=23,
+                every=5,
+            )
         np.testing.assert_array_equal(alone.y, together.y[..., i])
         np.testing.assert_array_equal(alone.v, together.v[..., i])
 
@@ -128,7 +131,9 @@ def test_nothing_in_the_core_breaks_the_promise() -> None:
         "powf(",
         ".recip()",
         ".dot(",
-        ".norm",
+        ".norm(",
+        ".norm_squared(",
+        ".normalize(",
         ".sum()",
         ".sin()",
         ".cos()",

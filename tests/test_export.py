@@ -138,6 +138,7 @@ def assert_same(journeys: list[Journey], found: list[list[float]]) -> None:
 def test_every_bit_is_that_of_integrate(language: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.DivergenceWarning)
+        warnings.simplefilter("ignore", sw.ControlWarning)
         every = [*journeys(language), *controlled(language), *diverging(), *changed()]
     assert {each.method for each in every} == {method.name for method in METHODS}
     assert len({repr(each.system) for each in every}) > 40

@@ -168,7 +168,7 @@ def test_threads_are_lent_memory_of_their_own() -> None:
 
 
 def test_no_more_memory_is_kept_than_promised() -> None:
-    runs = [many() for _ in range(30)]
+    runs = [many() for _ in range(_memory.MOST_KEPT // (2 * _memory.LEAST_LENT))]
     assert sum(run.y.nbytes for run in runs) > _memory.MOST_KEPT / 3
     del runs
     gc.collect()

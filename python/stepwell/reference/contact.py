@@ -18,7 +18,7 @@ from .around import whole_step
 ROUNDING = 2.0**-50
 
 #: The bits of a number but for its sign.
-MAGNITUDE = 2**63 - 1
+MAGNITUDE = 0x7FFF_FFFF_FFFF_FFFF
 
 Vector = list[Any]
 
