@@ -47,9 +47,7 @@ pub(crate) enum Keeps<N: Number> {
 impl<N: Number> Keeps<N> {
     pub(crate) fn new(p: &Parameters<N>) -> Self {
         match (p.given.word("keeps"), p.maybe("strength")) {
-            ("control", Some(c)) => {
-                Keeps::Control { damping: N::of(2.0) * c, stiffness: N::of(0.5) * ((c * c) / p.h) }
-            }
+            ("control", Some(c)) => Keeps::Control { damping: N::of(2.0) * c, stiffness: N::of(0.5) * ((c * c) / p.h) },
             ("projection", _) => Keeps::Projection,
             _ => Keeps::Nothing,
         }
