@@ -276,6 +276,8 @@ class Touching:
     def __init__(self, s: Any, h: Any, met: list[Surface]) -> None:
         self.s = s
         self.h = h
+        #: Points that surfaces act on: all but those that are led along.
+        self.free = getattr(s, "free", slice(None))
         self.springs = [each for each in met if each.way == "spring"]
         self.met = [each for each in met if each.way != "spring"]
         safe = [each for each in self.met if each.way == "safe"]
@@ -287,16 +289,25 @@ class Touching:
 
     def dv(self, t: Any, v: Any, y: Any) -> Any:
         """h·v̇ and the push of the springs."""
-        dv = self.s.dv(t, v, y)
+        dv, place = self.s.dv(t, v, y), y[self.free]
         for spring in self.springs:
-            push = spring.push([y[:, c] for c in range(y.shape[1])])
-            dv = np.stack([dv[:, c] - push[c] for c in range(y.shape[1])], axis=1)
+            push = spring.push([place[:, c] for c in range(y.shape[1])])
+            dv = self.among(dv, np.stack([dv[self.free, c] - push[c] for c in range(y.shape[1])], axis=1))
         return dv
 
+    def among(self, block: Any, of_free: Any) -> Any:
+        """A block with these numbers for the points that surfaces act on."""
+        whole = np.array(np.broadcast_to(block, (*block.shape[:2], *of_free.shape[2:])))
+        whole[self.free] = of_free
+        return whole
+
     def resolve(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
-        """Which points met a surface in a step, and the state after that, from the states before and after the step."""
+        """Which of the points that surfaces act on met one in a step, and the state of all after that.
+
+        From the states before and after the step.
+        """
         dim, h = before[1].shape[1], self.h
-        v0, y0, v1, y1 = ([block[:, c] for c in range(dim)] for block in (*before, *after))
+        v0, y0, v1, y1 = ([block[self.free, c] for c in range(dim)] for block in (*before, *after))
         kick = [b - a for a, b in zip(v0, v1, strict=True)]
         lag = [(y1[c] - y0[c]) / h - 0.5 * (v0[c] + v1[c]) for c in range(dim)]
         step, v, y, touched = Step(v0, y0, v1, y1, kick, lag), v1, y1, None
@@ -306,7 +317,7 @@ class Touching:
                 touched = touches if touched is None else touched | touches
             if self.is_limited:
                 v, y = self.limit(step, touched, v, y)
-        return touched, np.stack(v, axis=1), np.stack(y, axis=1)
+        return touched, *(self.among(old, np.stack(new, axis=1)) for old, new in zip(after, (v, y), strict=True))
 
     def limit(self, step: Step, touched: Any, v: Vector, y: Vector) -> tuple[Vector, Vector]:
         """No more energy than before the step, or after it without contact; the work is that of the mean acceleration."""
@@ -342,4 +353,5 @@ def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any
     v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
     touched, v, y = s.resolve((v0, before[1]), (v1, y1))
     anew = steps.start(s, choice, end, v, y)
-    return bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], y.shape), anew, slot), y
+    anew, kept = anew[s.free], slot[s.free]
+    return s.among(slot, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], kept.shape), anew, kept)), y
