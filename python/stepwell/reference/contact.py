@@ -225,19 +225,20 @@ class Sphere(Surface):
         a, b, square = dot(move, move), dot(from0, move), dot(from0, from0)
         c = square - self.radius * self.radius
         disc = b * b - a * c
+        slack = ROUNDING * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
         root = np.sqrt(bits.where(bits.less(0.0, disc), disc, 0.0))
         if self.is_inside:
             part = bits.where(bits.less(b, 0.0), (root - b) / a, -(c / (b + root)))
             hits = bits.at_most(c, 0.0) & bits.at_most(part, 1.0)
         else:
             part = c / (root - b)
-            hits = bits.less(0.0, disc) & bits.less(b, 0.0) & bits.at_most(0.0, c) & bits.at_most(part, 1.0)
+            outside = bits.at_most(-(self.radius * (slack + slack)), c)  # or on the sphere, but for rounding
+            hits = bits.less(0.0, disc) & bits.less(b, 0.0) & outside & bits.at_most(part, 1.0)
         where = [bits.where(hits, f0 + part * m, f1) for f0, m, f1 in zip(from0, move, from1, strict=True)]
         length = np.sqrt(dot(where, where))
         normal = self.outward([w / length for w in where])
         along = dot(from1, normal)
         distance = along + self.radius if self.is_inside else along - self.radius
-        slack = ROUNDING * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
         near = hits | bits.at_most(self.depth(np.sqrt(dot(from1, from1))), slack)
         return Place(near, normal, distance, self.depth(np.sqrt(square)), slack)
 

@@ -175,7 +175,8 @@ class Springs(System):
         stable. For one spring, and for lattices whose particles can swing against all of their neighbours, there is no longer
         safe step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
 
-        What grows by itself, such as a compressed spring that gives way sideways, is no matter of the step. Damping is part of
+        Surfaces are not counted. A particle that rests on one is like a fixed one, which makes no mode faster; but one with
+        ``way="spring"`` is a further spring. What grows by itself, such as a compressed spring that gives way sideways, is no matter of the step. Damping is part of
         the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False Heun and Semi-False Heun with damping it is
         an estimate, exact where all modes are damped in proportion.
 
