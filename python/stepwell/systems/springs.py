@@ -176,9 +176,9 @@ class Springs(System):
         safe step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
 
         Surfaces are not counted. A particle that rests on one is like a fixed one, which makes no mode faster; but one with
-        ``way="spring"`` is a further spring. What grows by itself, such as a compressed spring that gives way sideways, is no matter of the step. Damping is part of
-        the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False Heun and Semi-False Heun with damping it is
-        an estimate, exact where all modes are damped in proportion.
+        ``way="spring"`` is a further spring. What grows by itself, such as a compressed spring that gives way sideways, is no
+        matter of the step. Damping is part of the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False
+        Heun and Semi-False Heun with damping it is an estimate, exact where all modes are damped in proportion.
 
         Args:
             method: its name, or what ``stepwell.method`` returns.
