@@ -113,8 +113,22 @@ SYSTEMS: dict[str, Make] = {
     "springs: hung, damped": lambda r, b: _hung(r, 2, damping=r.uniform(0.1, 0.5, b)[np.newaxis], gravity=(0.0, -1.0)),
     "springs: hung in space": lambda r, b: _hung(r, 3, masses=r.uniform(0.5, 2.0, (9, b)), gravity=r.normal(size=(3, b))),
     "springs: hung in space, dragged": lambda r, b: _hung(r, 3, drag=r.uniform(0.1, 0.5, 9), damping=r.uniform(0.1, 0.5, 20)),
+    "springs: on a floor": lambda r, b: _hung(
+        r,
+        2,
+        gravity=(0.0, -1.0),
+        floor=[sw.Floor(r.uniform(0.0, 1.0, b), offset=-0.3), sw.Floor(offset=0.2, way="spring", omega=2.0)],
+    ),
     "springs: on a line": lambda r, b: sw.Springs(
         [(0, 1), (1, 2), (3, 2)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=0.5, fixed=[0, 3], dim=1
+    ),
+    "springs: over a ball": lambda r, b: sw.Springs(
+        [(0, 1), (1, 2)],
+        rest=0.5,
+        damping=0.1,
+        fixed=[0],
+        gravity=r.normal(size=(3, b)),
+        floor=sw.Sphere((0, 0, 0.1), 0.5, friction=0.3),
     ),
     "top, free": lambda r, b: sw.RigidBody(_moments(r, b)),
     "top, damped, torques of its own": lambda r, b: sw.RigidBody(

@@ -30,7 +30,7 @@ def test_exactly_the_square_of_e_is_left(method: str, restitution: float) -> Non
 
 
 @every_method
-@pytest.mark.parametrize("check", ["bounces", "slides", "sticks", "reflects", "passes", "rolls"])
+@pytest.mark.parametrize("check", ["bounces", "slides", "sticks", "reflects", "passes", "rolls", "slips"])
 def test_it_holds(method: str, check: str) -> None:
     contacts.ALL[check](method)
 

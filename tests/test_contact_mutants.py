@@ -34,6 +34,7 @@ MISTAKES = [
     ("return [-each for each in vector] if self.is_inside else vector", "return vector"),
     ("return self.radius - length if self.is_inside else", "return self.radius + length if self.is_inside else"),
     ("near = hits | ", "near = "),
+    ("bits.at_most(-(self.radius * (slack + slack)), c)", "bits.at_most(0.0, c)"),
     ("length = self.radius - distance if self.is_inside else self.radius + distance", "length = self.radius + 0.01"),
     # a bounce
     ("ahead = bits.where(bits.less(quarter, late), 0.5 * size, 0.0)", "ahead = 0.0 * size"),

@@ -140,6 +140,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Springs([(0, 1), (1, 2)], rest=1.0, gravity=(0.0, -1.0)),
         lambda: sw.Springs([(0, 1), (1, 2)], rest=1.0, damping=0.1),
         lambda: sw.Springs([(0, 1), (1, 2)], rest=1.0, drag=0.1),
+        lambda: sw.Springs([(0, 1), (1, 2)], rest=1.0, floor=sw.Floor()),
+        lambda: sw.Springs([(0, 1), (1, 2)], rest=1.0, floor=[sw.Floor(), sw.Sphere((0.0, 0.0), 1.0)]),
     ],
     "Particles": [
         sw.Particles,

@@ -198,7 +198,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Springs": (
         sw.Springs,
         {"pairs": [(0, 1), (1, 2)], "stiffness": 1.0, "rest": 1.0, "layout": np.zeros((3, 2)), "damping": 0.1, "masses": 1.0}
-        | {"fixed": [0], "gravity": (0.0, -1.0), "drag": 0.1, "dim": 2},
+        | {"fixed": [0], "gravity": (0.0, -1.0), "drag": 0.1, "floor": sw.Floor(), "dim": 2},
     ),
     "Springs.safe_step": (sw.Springs([(0, 1)], rest=1.0).safe_step, {"method": "rk4"}),
     "NBody floor": (sw.NBody, {"masses": [1.0], "floor": sw.Floor()}),

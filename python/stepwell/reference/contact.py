@@ -225,19 +225,20 @@ class Sphere(Surface):
         a, b, square = dot(move, move), dot(from0, move), dot(from0, from0)
         c = square - self.radius * self.radius
         disc = b * b - a * c
+        slack = ROUNDING * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
         root = np.sqrt(bits.where(bits.less(0.0, disc), disc, 0.0))
         if self.is_inside:
             part = bits.where(bits.less(b, 0.0), (root - b) / a, -(c / (b + root)))
             hits = bits.at_most(c, 0.0) & bits.at_most(part, 1.0)
         else:
             part = c / (root - b)
-            hits = bits.less(0.0, disc) & bits.less(b, 0.0) & bits.at_most(0.0, c) & bits.at_most(part, 1.0)
+            outside = bits.at_most(-(self.radius * (slack + slack)), c)  # or on the sphere, but for rounding
+            hits = bits.less(0.0, disc) & bits.less(b, 0.0) & outside & bits.at_most(part, 1.0)
         where = [bits.where(hits, f0 + part * m, f1) for f0, m, f1 in zip(from0, move, from1, strict=True)]
         length = np.sqrt(dot(where, where))
         normal = self.outward([w / length for w in where])
         along = dot(from1, normal)
         distance = along + self.radius if self.is_inside else along - self.radius
-        slack = ROUNDING * (self.radius + magnitudes(self.centre, [1.0] * len(self.centre)))
         near = hits | bits.at_most(self.depth(np.sqrt(dot(from1, from1))), slack)
         return Place(near, normal, distance, self.depth(np.sqrt(square)), slack)
 
@@ -276,6 +277,8 @@ class Touching:
     def __init__(self, s: Any, h: Any, met: list[Surface]) -> None:
         self.s = s
         self.h = h
+        #: Points that surfaces act on: all but those that are led along.
+        self.free = getattr(s, "free", slice(None))
         self.springs = [each for each in met if each.way == "spring"]
         self.met = [each for each in met if each.way != "spring"]
         safe = [each for each in self.met if each.way == "safe"]
@@ -287,16 +290,25 @@ class Touching:
 
     def dv(self, t: Any, v: Any, y: Any) -> Any:
         """h·v̇ and the push of the springs."""
-        dv = self.s.dv(t, v, y)
+        dv, place = self.s.dv(t, v, y), y[self.free]
         for spring in self.springs:
-            push = spring.push([y[:, c] for c in range(y.shape[1])])
-            dv = np.stack([dv[:, c] - push[c] for c in range(y.shape[1])], axis=1)
+            push = spring.push([place[:, c] for c in range(y.shape[1])])
+            dv = self.among(dv, np.stack([dv[self.free, c] - push[c] for c in range(y.shape[1])], axis=1))
         return dv
 
+    def among(self, block: Any, of_free: Any) -> Any:
+        """A block with these numbers for the points that surfaces act on."""
+        whole = np.array(np.broadcast_to(block, (*block.shape[:2], *of_free.shape[2:])))
+        whole[self.free] = of_free
+        return whole
+
     def resolve(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
-        """Which points met a surface in a step, and the state after that, from the states before and after the step."""
+        """Which of the points that surfaces act on met one in a step, and the state of all after that.
+
+        From the states before and after the step.
+        """
         dim, h = before[1].shape[1], self.h
-        v0, y0, v1, y1 = ([block[:, c] for c in range(dim)] for block in (*before, *after))
+        v0, y0, v1, y1 = ([block[self.free, c] for c in range(dim)] for block in (*before, *after))
         kick = [b - a for a, b in zip(v0, v1, strict=True)]
         lag = [(y1[c] - y0[c]) / h - 0.5 * (v0[c] + v1[c]) for c in range(dim)]
         step, v, y, touched = Step(v0, y0, v1, y1, kick, lag), v1, y1, None
@@ -306,7 +318,7 @@ class Touching:
                 touched = touches if touched is None else touched | touches
             if self.is_limited:
                 v, y = self.limit(step, touched, v, y)
-        return touched, np.stack(v, axis=1), np.stack(y, axis=1)
+        return touched, *(self.among(old, np.stack(new, axis=1)) for old, new in zip(after, (v, y), strict=True))
 
     def limit(self, step: Step, touched: Any, v: Vector, y: Vector) -> tuple[Vector, Vector]:
         """No more energy than before the step, or after it without contact; the work is that of the mean acceleration."""
@@ -342,4 +354,5 @@ def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any
     v0, v1 = steps.finish(s, choice, t, *before), steps.finish(s, choice, end, slot, y1)
     touched, v, y = s.resolve((v0, before[1]), (v1, y1))
     anew = steps.start(s, choice, end, v, y)
-    return bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], y.shape), anew, slot), y
+    anew, kept = anew[s.free], slot[s.free]
+    return s.among(slot, bits.where(np.broadcast_to(np.asarray(touched)[:, np.newaxis], kept.shape), anew, kept)), y

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, contact
 from .._checks import Array, Shape
 from .._value import changed
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
@@ -40,7 +40,8 @@ class Springs(System):
         fixed: the particles that do not feel any force, or None.
         gravity: acceleration of all particles, shape (dim,) or (dim, *batch), such as (0, -9.81); none if None.
         drag: force per speed of a particle against its motion, zero or more, given like ``masses``; none if None.
-        dim: 1, 2 or 3; if None, that of ``layout`` or ``gravity``, or else taken from the shape of the state.
+        floor: a ``Floor`` or ``Sphere`` that particles meet, or a list of them; fixed particles pass through it.
+        dim: 1, 2 or 3; if None, that of ``layout``, ``gravity`` or ``floor``, or else taken from the shape of the state.
 
     How many particles there are follows from ``layout``, else from ``masses``, else from the largest number in ``pairs``. With
     damping or drag forces depend on the velocity, and Verlet, leapfrog and PEFRL refuse the system. ``safe_step`` tells which
@@ -72,6 +73,7 @@ class Springs(System):
         fixed: Any = None,
         gravity: Any = None,
         drag: Any = None,
+        floor: Any = None,
         dim: int | None = None,
     ) -> None:
         self.pairs = _pairs(pairs)
@@ -79,7 +81,8 @@ class Springs(System):
         self.masses = _per_row("masses", _checks.numbers("masses", masses, positive=True), None, "particles")
         self.n = self._count(placed)
         self.gravity = None if gravity is None else _gravity(gravity)
-        self.dim = _dimensions(dim, placed, self.gravity)
+        self.contacts = contact.surfaces("floor", floor)
+        self.dim = _dimensions(dim, placed, self.gravity, contact.dimensions(self.contacts))
         self.fixed = _particles("fixed", fixed, self.n)
         if len(self.fixed) == self.n:
             raise ArgumentError(f"fixed: expected at least one particle that is free, got all {self.n}")
@@ -99,7 +102,8 @@ class Springs(System):
         self.velocity_term = "damping" if self.damping is not None else "drag" if self.drag is not None else None
         self.v_shape = self.y_shape = (self.n, self.dim or 2)
         arrays = {name: getattr(self, name) for name in ("stiffness", "rest", "damping", "masses", "gravity", "drag")}
-        self.batch = _checks.batch_shape({name: each.shape[1:] for name, each in arrays.items() if each is not None})
+        shapes = {name: each.shape[1:] for name, each in arrays.items() if each is not None}
+        self.batch = _checks.batch_shape(shapes | contact.batches(self.contacts))
 
     def _count(self, placed: Array | None) -> int:
         """How many particles there are, if all that says so agrees."""
@@ -117,7 +121,7 @@ class Springs(System):
         optional = {"damping": self.damping, "gravity": self.gravity, "drag": self.drag}
         shorter = {name: each[0] if each is not None and each.shape == (1,) else each for name, each in optional.items()}
         fixed = [f"fixed={len(self.fixed)} particles"] * bool(len(self.fixed))
-        return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter)]
+        return [f"{len(self.pairs)} springs, {self.n} particles", *fixed, *shown(**shorter), *self.said_of_contacts()]
 
     def sized(self, *states: Any) -> Springs:
         """The same net in as many dimensions as the states, v and y, have."""
@@ -171,9 +175,10 @@ class Springs(System):
         stable. For one spring, and for lattices whose particles can swing against all of their neighbours, there is no longer
         safe step; elsewhere ``stability_limit(springs, method, v=v, y=y)`` is the exact limit of small nets at one state.
 
-        What grows by itself, such as a compressed spring that gives way sideways, is no matter of the step. Damping is part of
-        the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False Heun and Semi-False Heun with damping it is
-        an estimate, exact where all modes are damped in proportion.
+        Surfaces are not counted. A particle that rests on one is like a fixed one, which makes no mode faster; but one with
+        ``way="spring"`` is a further spring. What grows by itself, such as a compressed spring that gives way sideways, is no
+        matter of the step. Damping is part of the bound for False Euler and the Runge-Kutta methods; for Damped Euler, False
+        Heun and Semi-False Heun with damping it is an estimate, exact where all modes are damped in proportion.
 
         Args:
             method: its name, or what ``stepwell.method`` returns.
@@ -258,11 +263,12 @@ def _gravity(gravity: Any) -> Array:
     return array
 
 
-def _dimensions(dim: Any, placed: Array | None, gravity: Array | None) -> int | None:
+def _dimensions(dim: Any, placed: Array | None, gravity: Array | None, floors: dict[str, int]) -> int | None:
     """The number of dimensions, if anything says it and all that does agrees."""
     said = {} if dim is None else {"dim": _checks.count("dim", dim, 1, 3)}
     said |= {} if placed is None else {"layout": placed.shape[1]}
     said |= {} if gravity is None else {"gravity": gravity.shape[0]}
+    said |= floors
     if len(set(said.values())) > 1:
         told = ", ".join(f"{name} of {number}" for name, number in said.items())
         raise ShapeError(f"{' and '.join(said)}: expected as many dimensions in all, got {told}")

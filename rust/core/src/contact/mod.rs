@@ -4,7 +4,7 @@
 //! that the method made, knowing the one before. What is computed, and why no energy is added, is in `reference/contact.py` and
 //! docs/contact.md.
 //!
-//! Given: the whole number `contacts`; for surface i, with `contact_i` before each name, a word, `plane` or `sphere`, the word `_way`, and
+//! Given: the list `fixed` (maybe), points that no surface acts on; the whole number `contacts`; for surface i, with `contact_i` before each name, a word, `plane` or `sphere`, the word `_way`, and
 //! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word
 //! `_side`, `inside` or `outside`, the vector `_centre` and `_radius`.
 
@@ -53,10 +53,22 @@ pub fn dimensions(given: &Given) -> usize {
     given.count("contact_0_normal").max(given.count("contact_0_centre")).max(1)
 }
 
+/// Points that are led along, in ascending order: no surface acts on them.
+fn held(given: &Given) -> Vec<u32> {
+    let mut held = given.list("fixed").to_vec();
+    held.sort_unstable();
+    held
+}
+
+fn is_among(points: &[u32], point: usize) -> bool {
+    u32::try_from(point).is_ok_and(|point| points.binary_search(&point).is_ok())
+}
+
 /// The surfaces that act after a step.
 pub struct Contacts<N: Number> {
     h: N,
     dim: usize,
+    held: Vec<u32>,
     surfaces: Vec<Surface<N>>,
     /// Whether the energy is compared: along one plane without friction it is right by itself.
     is_limited: bool,
@@ -68,7 +80,7 @@ impl<N: Number> Contacts<N> {
         let surfaces = surface::all(p, |way| way != Way::Spring);
         let safe: Vec<_> = surfaces.iter().filter(|surface| surface.way == Way::Safe).collect();
         let is_limited = safe.len() > 1 || safe.iter().any(|surface| surface.is_curved() || surface.friction.is_some());
-        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim: dimensions(p.given), surfaces, is_limited })
+        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim: dimensions(p.given), held: held(p.given), surfaces, is_limited })
     }
 
     /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
@@ -85,13 +97,18 @@ impl<N: Number> Contacts<N> {
         touched
     }
 
-    /// Which points met a surface in a step, and the state after that.
-    fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<N::Truth>, [Block<N>; 2]) {
-        let mut touched = Vec::with_capacity(y.len() / self.dim);
-        for from in (0..y.len()).step_by(self.dim) {
-            let to = from + self.dim;
+    /// Whether surfaces act on a point: not if it is led along.
+    pub fn acts_on(&self, point: usize) -> bool {
+        !is_among(&self.held, point)
+    }
+
+    /// Which points met a surface in a step, None for those that no surface acts on, and the state after that.
+    fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<Option<N::Truth>>, [Block<N>; 2]) {
+        let mut touched = vec![None; y.len() / self.dim];
+        for (i, touched) in touched.iter_mut().enumerate().filter(|(i, _)| self.acts_on(*i)) {
+            let (from, to) = (self.dim * i, self.dim * (i + 1));
             let [v0, y0] = before.map(|block| &block.as_slice()[from..to]);
-            touched.extend(self.resolve_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]));
+            *touched = self.resolve_point([v0, y0], [&mut v.as_mut_slice()[from..to], &mut y.as_mut_slice()[from..to]]);
         }
         (touched, [v, y])
     }
@@ -113,7 +130,7 @@ impl<N: Number> Contacts<N> {
         let (v0, v1) = (first(finish, t, before[0], before[1]), first(finish, end, &slot, &y1));
         let (touched, [v, y]) = self.resolve([&v0, before[1]], [v1, y1]);
         let anew = first(start, end, &v, &y);
-        let slot = Block::from_fn(slot.len(), |i, _| N::choose(touched[i / self.dim], anew[i], slot[i]));
+        let slot = Block::from_fn(slot.len(), |i, _| touched[i / self.dim].map_or(slot[i], |it| N::choose(it, anew[i], slot[i])));
         [slot, y]
     }
 }
@@ -141,6 +158,7 @@ pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn
 /// Surfaces that push points back by springs.
 pub struct Springs<N: Number> {
     dim: usize,
+    held: Vec<u32>,
     surfaces: Vec<Surface<N>>,
 }
 
@@ -148,12 +166,13 @@ impl<N: Number> Springs<N> {
     /// Those that are given; None without any.
     pub fn new(p: &Parameters<N>) -> Option<Springs<N>> {
         let surfaces = surface::all(p, |way| way == Way::Spring);
-        (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.given), surfaces })
+        (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.given), held: held(p.given), surfaces })
     }
 
     /// Adds their pushes to increments of the velocities of points that are there.
     pub fn push(&self, y: &[N], dv: &mut [N]) {
-        for (y, dv) in y.chunks(self.dim).zip(dv.chunks_mut(self.dim)) {
+        let points = y.chunks(self.dim).zip(dv.chunks_mut(self.dim)).enumerate();
+        for (_, (y, dv)) in points.filter(|(i, _)| !is_among(&self.held, *i)) {
             for surface in &self.surfaces {
                 surface.push(y, dv);
             }

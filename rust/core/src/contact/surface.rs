@@ -147,6 +147,8 @@ impl<N: Number> Surface<N> {
                 let (zero, one) = (N::of(0.0), N::of(1.0));
                 let (a, b, square) = (dot(&along, &along), dot(&from0, &along), dot(&from0, &from0));
                 let c = square - *radius * *radius;
+                let sizes = centre.iter().map(|c| magnitude(*c)).reduce(|sum, next| sum + next);
+                let slack = N::of(ROUNDING) * (*radius + sizes.unwrap_or(zero));
                 let disc = b * b - a * c;
                 let root = N::choose(zero.below(disc), disc, zero).sqrt();
                 let (part, hits) = if *is_inside {
@@ -154,15 +156,15 @@ impl<N: Number> Surface<N> {
                     (part, c.at_most(zero) & part.at_most(one))
                 } else {
                     let part = c / (root - b);
-                    (part, zero.below(disc) & b.below(zero) & zero.at_most(c) & part.at_most(one))
+                    // Or on the sphere, but for rounding.
+                    let outside = (-(*radius * (slack + slack))).at_most(c);
+                    (part, zero.below(disc) & b.below(zero) & outside & part.at_most(one))
                 };
                 let met: Vec<N> = (0..y.len()).map(|i| N::choose(hits, from0[i] + part * along[i], from1[i])).collect();
                 let length = dot(&met, &met).sqrt();
                 let normal: Vec<N> = met.iter().map(|m| *m / length).map(|n| if *is_inside { -n } else { n }).collect();
                 let through = dot(&from1, &normal);
                 let distance = if *is_inside { through + *radius } else { through - *radius };
-                let sizes = centre.iter().map(|c| magnitude(*c)).reduce(|sum, next| sum + next);
-                let slack = N::of(ROUNDING) * (*radius + sizes.unwrap_or(zero));
                 let near = hits | self.depth(dot(&from1, &from1).sqrt()).at_most(slack);
                 Place { near, normal, distance, before: self.depth(square.sqrt()), slack }
             }

@@ -66,7 +66,7 @@ impl RowContacts {
         let (dim, lanes) = (self.dim, self.lanes.len());
         self.points().any(|at| {
             let [y0, y1] = point([&self.before[1], y], dim, lanes, at);
-            self.lanes[at.1].is_near(&y0[..dim], &y1[..dim])
+            self.lanes[at.1].acts_on(at.0) && self.lanes[at.1].is_near(&y0[..dim], &y1[..dim])
         })
     }
 
@@ -78,7 +78,7 @@ impl RowContacts {
         for at in self.points() {
             let [v0, y0, mut v1, mut y1] = point([v0, &self.before[1], v, y], dim, lanes, at);
             let contacts = &self.lanes[at.1];
-            if !contacts.is_near(&y0[..dim], &y1[..dim]) {
+            if !contacts.acts_on(at.0) || !contacts.is_near(&y0[..dim], &y1[..dim]) {
                 continue;
             }
             let touched = contacts.resolve_point([&v0[..dim], &y0[..dim]], [&mut v1[..dim], &mut y1[..dim]]);

@@ -1,0 +1,227 @@
+"""Nets of springs on floors and spheres: energy, rest, fixed particles, and bits of small and large nets.
+
+A step of False Euler of an undamped net is v₁ = v₀ + h·F(y₀)/m, y₁ = y₀ + h·v₁: to each particle by itself, a step in the uniform
+field Fᵢ(y₀)/mᵢ. In such a field no contact "safe" leaves a particle with more energy than before the step, and False Euler loses
+½·m·(h·F/m)² in a step without contact. Summed over the particles, with Δ = y' − y₀ of the state after contact,
+K' − K₀ ≤ F(y₀)·Δ = −∇V(y₀)·Δ. A spring's ½k(ℓ − ℓ₀)² = ½k|d|² − kℓ₀|d| + ½kℓ₀² is ½k|d|² and a concave function of d, so
+V(y₀ + Δ) − V(y₀) − ∇V(y₀)·Δ ≤ ½ Σ k·|Δⱼ − Δᵢ|², for Δ of any size. So in every step, with contacts or without,
+
+E' ≤ E₀ + ½ Σ k·|Δⱼ − Δᵢ|².
+
+The right side is of order h². Gravity is uniform and adds nothing to it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import assert_same
+from stepwell import engine
+from stepwell.errors import DTypeError, ShapeError, UnsupportedError
+from stepwell.reference import contact
+from stepwell.systems import base
+from test_contact_mutants import changed
+
+G = 9.81
+
+#: Energies are sums of some hundred terms, each with some roundings.
+ROUNDING = 1000 * 2.0**-53
+
+
+def jelly(damping: float | None = None, floor: Any = None) -> tuple[sw.Springs, Any]:
+    """A cube of 3 × 3 × 3 particles, 0.2 wide, its lowest corner at height 0, turned so that no face is level."""
+    at = np.stack(np.meshgrid(range(3), range(3), range(3), indexing="ij"), axis=-1).reshape(-1, 3)
+    pairs = [(i, j) for i, j in itertools.combinations(range(27), 2) if np.abs(at[i] - at[j]).max() == 1]
+    turn, _ = np.linalg.qr(np.array([[1.0, 0.4, 0.2], [0.3, 1.0, -0.5], [-0.1, 0.6, 1.0]]))
+    y = 0.1 * (at @ turn)
+    y[:, 2] -= y[:, 2].min()
+    given: dict[str, Any] = {"stiffness": 100.0, "layout": y, "damping": damping, "masses": 0.02}
+    return sw.Springs(pairs, **given, gravity=(0.0, 0.0, -G), floor=floor), y
+
+
+def cloth(n: int, **given: Any) -> tuple[sw.Springs, Any]:
+    """n × n particles, level, 1 wide."""
+    at = np.arange(n * n).reshape(n, n)
+    ends = [(at[:, :-1], at[:, 1:]), (at[:-1], at[1:]), (at[:-1, :-1], at[1:, 1:]), (at[:-1, 1:], at[1:, :-1])]
+    pairs = np.concatenate([np.stack([i.ravel(), j.ravel()], axis=1) for i, j in ends])
+    y = np.stack([(at % n) / (n - 1) - 0.5, (at // n) / (n - 1) - 0.5, 0.0 * at], axis=-1).reshape(-1, 3)
+    return sw.Springs(pairs, layout=y, masses=0.25 / n**2, gravity=(0.0, 0.0, -G), **given), y
+
+
+FLOORS = {
+    "elastic": sw.Floor(),
+    "e = 0.5": sw.Floor(0.5),
+    "e = 0, rough": sw.Floor(0.0, 0.5),
+    "a ball": sw.Sphere((0.1, 0.1, -0.3), 0.3, restitution=0.7, friction=0.2),
+    "a trough": [sw.Floor(0.8, normal=(0.5, 0.0, 1.0)), sw.Floor(0.8, 0.3, normal=(-0.5, 0.2, 1.0), offset=-0.1)],
+}
+
+
+def no_energy_beyond_the_bound(floor: Any, backend: str = "rust", heights: Any = (0.02, 0.3, 1.1)) -> None:
+    """In each step, of drops from several heights with steps of up to the safe one."""
+    net, layout = jelly(floor=floor)
+    spring = net.pairs.T
+    for share, height in itertools.product((0.1, 0.37, 0.7, 0.99), heights):
+        h = share * float(net.safe_step("false_euler"))
+        steps = int(np.ceil((np.sqrt(2.0 * height / G) + 0.2) / h))
+        start: dict[str, Any] = {"v": 0.0, "y": np.add(layout, [0.0, 0.0, height])}
+        run = sw.integrate(net, "false_euler", **start, dt=h, steps=steps, every=1, backend=backend)
+        energy = run.energy
+        moved = np.diff(run.y, axis=0)
+        apart = moved[:, spring[1]] - moved[:, spring[0]]
+        bound = 0.5 * 100.0 * (apart * apart).sum(axis=(1, 2))
+        kinetic = 0.5 * 0.02 * (run.v * run.v).sum(axis=(1, 2))
+        scale = kinetic.max() + 27 * 0.02 * G * np.abs(run.y).max()
+        assert (np.diff(energy) <= bound + ROUNDING * scale).all()
+        free = sw.integrate(jelly()[0], "false_euler", **start, dt=h, steps=steps)
+        assert (run.y[-1] != free.y[-1]).any()  # it met the floor
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_no_step_adds_more_energy_than_springs_can_take(floor: str) -> None:
+    no_energy_beyond_the_bound(FLOORS[floor])
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("leaving = self.restitution * impact", "leaving = 1.1 * impact"),
+        ("rising = (leaving - pull * since) - ahead", "rising = leaving - ahead"),
+        ("square = (w * w + (pull + pull) * place.distance)", "square = (w * w - (pull + pull) * place.distance)"),
+    ],
+)
+def test_a_mistake_in_a_net_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
+    wrong = changed(old, new)
+    monkeypatch.setattr(base, "contact", wrong)
+    monkeypatch.setattr(engine, "contact", wrong)
+    with pytest.raises(AssertionError):
+        no_energy_beyond_the_bound(sw.Floor(), backend="numpy", heights=(0.3,))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("height", [0.05, 0.6])
+def test_damped_jelly_comes_to_rest_on_the_floor(share: float, height: float) -> None:
+    """At rest the floor carries it: no particle is below it, three or more are on it, and the springs carry the others."""
+    net, layout = jelly(damping=0.5, floor=sw.Floor(0.0, 0.5))
+    h = share * float(net.safe_step("false_euler"))
+    y = np.add(layout, [0.0, 0.0, height])
+    run = sw.integrate(net, "false_euler", v=0.0, y=y, dt=h, steps=int(8.0 / h), every=int(0.5 / h))
+    assert run.energy.max() <= run.energy[0] * (1.0 + ROUNDING)  # once a picture of a game
+    assert np.abs(run.v[-1]).max() < 1e-6
+    assert run.y[..., 2].min() >= 0.0  # at rest they lie at 0 exactly, and none of them starts behind the floor
+    assert (run.y[-1, :, 2] == 0.0).sum() >= 3
+    loose = sw.Springs(net.pairs, stiffness=100.0, rest=net.rest, masses=0.02, gravity=(0.0, 0.0, -G))
+    force = 0.02 * loose.alone(1.0, ()).dv(0.0, run.v[-1], run.y[-1])
+    lies = run.y[-1, :, 2] == 0.0
+    assert np.abs(force[~lies]).max() < 1e-4 * 0.02 * G
+    assert -force[lies, 2].sum() == pytest.approx(27 * 0.02 * G, rel=1e-4)  # its weight
+
+
+def test_a_cloth_falls_on_a_ball_and_lies_on_it() -> None:
+    ball = sw.Sphere((0.0, 0.0, -0.5), 0.4, restitution=0.0, friction=0.8)
+    net, y = cloth(16, stiffness=40.0, damping=0.02, drag=2e-4, floor=ball)
+    h = 0.5 * float(net.safe_step("false_euler"))
+    run = sw.integrate(net, "false_euler", v=0.0, y=np.add(y, [0.02, 0.01, 0.0]), dt=h, steps=int(6.0 / h), every=int(0.5 / h))
+    energy = run.energy
+    away = np.sqrt(((run.y - [0.0, 0.0, -0.5]) ** 2).sum(axis=-1))
+    assert away.min() >= 0.4 * (1.0 - 4 * 2.0**-53)
+    assert ((away[-1] - 0.4) < 1e-12).sum() > 30  # it lies on the ball
+    assert run.y[-1, :, 2].max() < -0.05
+    assert np.abs(run.v[-1]).max() < 0.05
+    assert (energy[1:] < energy[0]).all()
+    smooth, _ = cloth(16, stiffness=40.0, damping=0.02, drag=2e-4, floor=sw.Sphere((0.0, 0.0, -0.5), 0.4, restitution=0.0))
+    slides = sw.integrate(smooth, "false_euler", v=0.0, y=np.add(y, [0.1, 0.05, 0.0]), dt=h, steps=int(6.0 / h))
+    assert slides.y[-1, :, 2].max() < -1.0  # without friction it slides off
+
+
+WAYS: list[dict[str, Any]] = [{}, {"way": "restitution"}, {"way": "flip"}, {"way": "spring", "omega": 9.0}]
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("n", [2, 12])
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_fixed_particles_pass_through_surfaces(way: dict[str, Any], n: int, backend: str) -> None:
+    """Led along at its velocity through a floor, a fixed particle is where it would be without; the others are not."""
+    fixed = [0, n * n - 1]
+    net, y = cloth(n, stiffness=5.0, fixed=fixed, floor=sw.Floor(offset=-0.05, **way))
+    v = np.zeros_like(y)
+    v[fixed] = (0.1, 0.0, -1.0)
+    for method in ("false_euler", "leapfrog", "rk4"):
+        dt = 0.3 * float(net.safe_step(method))
+        run = sw.integrate(net, method, v=v, y=y, dt=dt, steps=60, every=1, backend=backend)
+        free = sw.integrate(cloth(n, stiffness=5.0, fixed=fixed)[0], method, v=v, y=y, dt=dt, steps=60, every=1)
+        assert run.y[-1, 0, 2] < -0.05
+        assert np.array_equal(run.v[:, fixed], free.v[:, fixed])
+        assert np.array_equal(run.y[:, fixed], free.y[:, fixed])
+        assert (run.y[-1, 1] != free.y[-1, 1]).any()
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('self.free = getattr(s, "free", slice(None))', "self.free = slice(None)"),
+        ("whole[self.free] = of_free", "whole[: len(of_free)] = of_free"),
+    ],
+)
+def test_a_mistake_about_fixed_particles_is_noticed(way: dict[str, Any], old: str, new: str, monkeypatch: Any) -> None:
+    wrong = changed(old, new)
+    monkeypatch.setattr(base, "contact", wrong)
+    monkeypatch.setattr(engine, "contact", wrong)
+    with pytest.raises(AssertionError):
+        test_fixed_particles_pass_through_surfaces(way, 2, "numpy")
+
+
+@pytest.mark.parametrize("n", [3, 16])
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "leapfrog", "rk4"])
+def test_small_and_large_nets_have_the_bits_of_the_reference(n: int, method: str) -> None:
+    """A large net is stepped in rows, a small one by a tape; also in batches, with threads, in pieces and in a World."""
+    floor = [
+        sw.Sphere((0.0, 0.0, -0.2), 0.15, friction=0.3),
+        sw.Floor(0.5, offset=-0.3),
+        sw.Floor(offset=-0.25, way="spring", omega=9.0),
+    ]
+    net, y = cloth(n, stiffness=10.0, fixed=[0], floor=floor)
+    start: dict[str, Any] = {"v": np.random.default_rng(n).normal(0.0, 0.1, y.shape), "y": y, "dt": 0.004}
+    whole = sw.integrate(net, method, **start, steps=120, every=30)
+    assert_same(whole, sw.integrate(net, method, **start, steps=120, every=30, backend="numpy"))
+    half = sw.integrate(net, method, **start, steps=60)
+    assert np.array_equal(sw.integrate(net, method, **half.resume, steps=60).y[-1], whole.y[-1])
+    world = sw.World(net, method, v=start["v"].copy(), y=y.copy(), dt=0.004)
+    for _ in range(4):
+        world.step(30)
+    assert np.array_equal(world.y, whole.y[-1])
+    many, _ = cloth(n, stiffness=10.0, fixed=[0], floor=[sw.Floor(np.array([0.5, 0.0, 1.0]), offset=-0.1)])
+    batch: dict[str, Any] = {"v": start["v"][..., np.newaxis], "y": y[..., np.newaxis], "dt": 0.004, "steps": 60}
+    runs = [
+        sw.integrate(many, method, **batch, threads=threads, backend=by)
+        for threads, by in ((1, "rust"), (2, "rust"), (None, "numpy"))
+    ]
+    assert_same(runs[0], runs[1])
+    assert_same(runs[0], runs[2])
+    one = sw.integrate(cloth(n, stiffness=10.0, fixed=[0], floor=sw.Floor(0.5, offset=-0.1))[0], method, **start, steps=60)
+    assert np.array_equal(one.y, runs[0].y[..., 0])
+
+
+def test_the_safe_step_is_that_without_the_floor() -> None:
+    assert jelly(floor=sw.Floor())[0].safe_step("rk4") == jelly()[0].safe_step("rk4")
+
+
+def test_what_does_not_go_together_is_refused() -> None:
+    with pytest.raises(DTypeError, match="floor: expected a Floor, a Sphere, a list of them or None, got int"):
+        sw.Springs([(0, 1)], rest=1.0, floor=1)
+    with pytest.raises(ShapeError, match="gravity and floor 0: expected as many dimensions in all"):
+        sw.Springs([(0, 1)], rest=1.0, gravity=(0.0, -1.0), floor=sw.Sphere((0.0, 0.0, 0.0), 1.0))
+    net = sw.Springs([(0, 1)], rest=1.0, floor=sw.Floor())
+    assert "floor=Floor(offset=0.0" in repr(net)
+    with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
+        sw.integrate(net, "rk4", v=0.0, y=np.eye(2), dt=0.1, steps=1, control=sw.Projection())
+    assert sw.Springs([(0, 1)], rest=1.0, floor=sw.Sphere((0.0, 0.0, 0.0), 1.0)).dim == 3
+
+
+def test_the_module_that_is_changed_is_the_one_that_runs() -> None:
+    assert base.contact is engine.contact is contact
