@@ -382,6 +382,13 @@ def test_the_path_of_a_top_has_the_vertical_up(pictures):
     np.testing.assert_array_equal(body_picture.upright(chart), np.eye(3))
     assert "up is the third axis of space" in said(chart.plot())
     assert "up is the angular momentum" in said(pictures["body"].plot())
+    # A centre of mass on the other side of the axis hangs, and so does the disc.
+    for centre, side in (([0.0, 0.0, 1.0], 1.0), ([0.0, 0.0, -1.0], -1.0)):
+        top = sw.Scene(
+            sw.RigidBody([1.0, 1.0, 0.5], weight=4.0, centre=centre), v=[0.3, 0.0, 0.0], y=[1.0, 0.0, 0.0, 0.0], horizon=1.0
+        )
+        disc = looked_at(top, "rk4").plot().axes[1].patches[0].get_xy()
+        assert np.sign(disc[:, 1].mean()) == side
     upside_down = sw.Scene(sw.RigidBody([1.0, 1.0, 0.5]), v=[0.0, 0.0, -1.0], y=[1.0, 0.0, 0.0, 0.0], horizon=3.0)
     found = body_picture.upright(looked_at(upside_down, "rk4"))
     assert (found @ [0.0, 0.0, -1.0]).tolist() == [0.0, 0.0, 1.0]

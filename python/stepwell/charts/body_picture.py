@@ -40,17 +40,18 @@ def draw_panels(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     """All panels of the picture."""
     up, axis, screen = upright(chart), main_axis(chart), viewed(elevation=ELEVATION)
     matrices = np.einsum("ij,jkn->ikn", up, rotation(chart))
+    make, reach = parts(chart.run.system, axis)
+    side = np.copysign(1.0, reach)
     ball = figure.add_axes((0.012, 0.315, 0.3, 0.53))
     sphere(ball, screen)
     if chart.exact is not None:
-        _path(ball, screen, np.einsum("ij,jn->ni", up, turns(chart.exact[2])[:, axis]), None)
-    path = matrices[:, axis, chart.finite].T
+        _path(ball, screen, side * np.einsum("ij,jn->ni", up, turns(chart.exact[2])[:, axis]), None)
+    path = side * matrices[:, axis, chart.finite].T
     _path(ball, screen, path, "#000000", long=len(path) > LONG_CURVE)
     for point, face in ((path[0], "white"), (path[-1], "black")):
         ball.plot(*screen.flat(point), marker="o", markersize=9, markerfacecolor=face, markeredgecolor="black", zorder=6)
-    ball.set_title(f"path of the tip of axis {axis + 1}", size=13.5, pad=4)
+    ball.set_title(f"path of the tip of axis {'−' if side < 0.0 else ''}{axis + 1}", size=13.5, pad=4)
     width = (RIGHT - 0.012) / ATTITUDES
-    make, reach = parts(chart.run.system, axis)
     for i, frame in enumerate(chosen(chart, ATTITUDES)):
         axes = figure.add_axes((0.012 + i * width, 0.105, width, 0.175))
         _panel(axes)
@@ -74,8 +75,9 @@ def told(chart: RunPicture, axis: int) -> str:
     free = _system(chart).centre is None
     drawn = "A box with the body's moments of inertia" if free else "A top, not to scale"
     where = "the angular momentum at the start" if _by_momentum(chart) else "the third axis of space"
-    marks = "dark at the tip of axis" if free else "its rod is axis"
-    return f"{drawn}, {marks} {axis + 1}; up is {where}. Circle: start; dot: end; dashed: behind the sphere."
+    marks = "dark at the tip of axis" if free else "whose rod is axis"
+    exact = "" if chart.exact is None else " Broad grey: exact."
+    return f"{drawn}, {marks} {axis + 1}; up is {where}. Circle: start. Dot: end. Dashed: behind the sphere.{exact}"
 
 
 def momentum(chart: RunPicture) -> Array:
@@ -85,11 +87,9 @@ def momentum(chart: RunPicture) -> Array:
 
 
 def main_axis(chart: RunPicture) -> int:
-    """The axis that is shown: that of most of the angular momentum at the start; of a body at rest that nearest to ``centre``."""
-    if momentum(chart).any():
-        return int(np.argmax(np.abs(momentum(chart))))
+    """The axis that is shown: of a top that nearest to ``centre``, else that of most of the angular momentum at the start."""
     centre = _system(chart).centre
-    return 2 if centre is None else int(np.argmax(np.abs(centre)))
+    return int(np.argmax(np.abs(momentum(chart) if centre is None else centre)))
 
 
 def _by_momentum(chart: RunPicture) -> bool:
@@ -115,11 +115,12 @@ def upright(chart: RunPicture) -> Array:
 
 
 def parts(system: Any, axis: int) -> tuple[Parts, float]:
-    """The body's parts, and where its surface ends along the axis: a box, or the disc of a top."""
+    """The body's parts, and where it meets the axis: a box, or the disc of a top, on the side of ``centre``."""
     if system.centre is None:
         half = half_sides(system.inertia)
         return box(half, axis), float(half[axis])
-    return disc(axis), HEIGHT
+    side = 1.0 if system.centre[axis] >= 0.0 else -1.0
+    return disc(axis, side * HEIGHT), side * HEIGHT
 
 
 def half_sides(inertia: Array) -> Array:
@@ -147,7 +148,7 @@ def _points(corners: Array) -> tuple[tuple[float, float, float], ...]:
     return tuple((x, y, z) for x, y, z in corners.tolist())
 
 
-def disc(axis: int) -> Parts:
+def disc(axis: int, height: float) -> Parts:
     """A disc across the axis, of two halves of different fill so that its spin is seen."""
     a, b = (axis + 1) % 3, (axis + 2) % 3
     around = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)
@@ -155,7 +156,7 @@ def disc(axis: int) -> Parts:
     for half in (0, 1):
         some = around[half * CORNERS // 2 : (half + 1) * CORNERS // 2 + 1]
         rim = np.zeros((len(some), 3))
-        rim[:, a], rim[:, b], rim[:, axis] = RADIUS * np.cos(some), RADIUS * np.sin(some), HEIGHT
+        rim[:, a], rim[:, b], rim[:, axis] = RADIUS * np.cos(some), RADIUS * np.sin(some), height
         faces[f"half {half + 1}"] = (_points(rim), (SIDES[0], FRONT)[half])
     return faces
 
@@ -171,13 +172,14 @@ def figure_of(axes: Axes, shape: Parts, axis: int, reach: float, screen: Seen) -
 
     def show(matrix: Array) -> None:
         turn(matrix)
-        tip = matrix[:, axis]
-        near = float(tip @ screen.near)
-        rod.set_data(*screen.flat(np.stack([reach * tip, REACH * tip])).T)
-        rod.set_zorder(5.0 if near > 0.0 else 2.0)
+        # The rod ends at the body, whichever end that is, and is before or behind it.
+        tip = np.copysign(1.0, reach) * matrix[:, axis]
+        near = float(tip @ screen.near) > 0.0
+        rod.set_data(*screen.flat(np.stack([abs(reach) * tip, REACH * tip])).T)
+        rod.set_zorder(5.0 if near else 2.0)
         if top:
-            foot.set_data(*screen.flat(np.stack([0.0 * tip, HEIGHT * tip])).T)
-            foot.set_zorder(2.0 if near > 0.0 else 5.0)
+            foot.set_data(*screen.flat(np.stack([0.0 * tip, abs(reach) * tip])).T)
+            foot.set_zorder(2.0 if near else 5.0)
 
     return show
 
@@ -232,7 +234,7 @@ def animated(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], None], 
     make, reach = parts(chart.run.system, axis)
     turn = figure_of(axes, make, axis, reach, screen)
     trail = axes.plot([], [], color="#7a7a7a", linewidth=1.6, zorder=1)[0]
-    path = screen.flat(REACH * matrices[:, axis].T)
+    path = screen.flat(np.copysign(REACH, reach) * matrices[:, axis].T)
     length = TRAIL * float(chart.run.t[-1] - chart.run.t[0])
     omega = figure.add_axes((0.57, 0.64, 0.36, 0.22))
     energy = figure.add_axes((0.57, 0.37, 0.36, 0.17))

@@ -15,7 +15,7 @@ from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, RigidBody, Rods, Springs
+from ..systems import NBody, Particles, RigidBody, Rods, Springs
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -48,7 +48,7 @@ class RunPicture(Drawn, Value):
     @property
     def kind(self) -> str:
         """``"orbits"`` of bodies, an aircraft's ``"attitude"``, a rigid ``"body"``, a ``"swing"``, ``"rows"``."""
-        if isinstance(self.run.system, (NBody, Rods, Springs)) and self.run.system.y_shape[-1] > 1:
+        if isinstance(self.run.system, (NBody, Particles, Rods, Springs)) and self.run.system.y_shape[-1] > 1:
             return "orbits"
         if hasattr(self.run.system, "commanded"):
             return "attitude"
