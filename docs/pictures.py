@@ -9,6 +9,7 @@ import io
 import re
 import runpy
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ IMAGES = DOCS / "images"
 ERRORS = (0.1, 1e-2, 1e-4, 1e-6, 1e-9)
 PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL)
 
-#: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades want more.
+#: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades and many methods want more.
 COLOURS, SHADES = 64, 256
 #: The picture of an example has as many colours as fit into so many bytes.
 MOST_BYTES = 60 * 1024
@@ -46,11 +47,29 @@ def write(name: str, figure: Figure, colours: int = COLOURS) -> None:
     print(f"docs/images/{name}")
 
 
-def write_best(panel: sw.charts.Panel) -> None:
+#: The scenes of each picture of errors against cost: all in one would be too small to read. No fixed step of the chart is short
+#: enough for the cloth.
+FAMILIES: dict[str, tuple[str, ...]] = {
+    "work-precision.png": (
+        *("oscillator", "forced_oscillator", "chain", "pendulum", "clover", "figure_eight"),
+        *("kepler", "arenstorf", "pythagorean", "energy_control", "plummer"),
+    ),
+    "work-precision-bodies.png": (
+        *("conical_pendulum", "double_pendulum", "triple_pendulum", "dzhanibekov", "symmetric_top", "heavy_top"),
+        *("aircraft", "gimbal_trap"),
+    ),
+    "work-precision-springs.png": ("rope_bridge", "jelly_cube"),
+    "work-precision-contact.png": ("bouncing_ball", "sliding_block", "sticking_block"),
+}
+#: Where the error of one step says nothing of the next, a table of the cheapest would list lucky ones.
+NO_ROWS = ("work-precision-contact.png",)
+
+
+def write_best(charts: Iterable[sw.charts.WorkPrecision]) -> None:
     """Write the table of the cheapest on each scene: steps, or with a tolerance attempts, repeat to the last."""
     head = ["scene", *(f"{error:g}" for error in ERRORS)]
     lines = [head, ["---"] * len(head)]
-    for chart in panel.charts:
+    for chart in charts:
         found = [chart.best(error) for error in ERRORS]
         lines.append([f"`{chart.scene.name}`", *(f"{row['method']}: {row['cost']:.3g}" if row else "—" for row in found)])
     made = "".join(f"| {' | '.join(line)} |\n" for line in lines)
@@ -234,11 +253,14 @@ if __name__ == "__main__":
     turns = sw.scenes.aircraft()
     write("aircraft.png", sw.charts.run_picture(turns, turns.run("false_euler", every=1)).plot())
     wing_nut()
+    top = sw.scenes.heavy_top()
+    write("heavy-top.png", sw.charts.run_picture(top, top.run("rk4", every=1)).plot())
     for scene in ("oscillator", "clover"):
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
-    panel = sw.charts.panel(each.name for each in sw.scenes.scenes())
-    write("work-precision.png", panel.plot())
-    write_best(panel)
+    panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
+    for name, panel in panels.items():
+        write(name, panel.plot(), SHADES)
+    write_best(chart for name, panel in panels.items() if name not in NO_ROWS for chart in panel.charts)
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))

@@ -4,12 +4,14 @@ import contextlib
 import importlib.util
 import io
 import re
+import runpy
 import sys
 import types
 import warnings
 from pathlib import Path
 
 import pytest
+import stepwell as sw
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted((ROOT / "docs").glob("*.md"))
@@ -106,3 +108,16 @@ def test_named_files_exist(page):
 def test_no_page_names_a_place_of_one_machine(page):
     # Written in two parts, so that this file does not name one either.
     assert not re.search(r"(?<![\w.])/(?:tmp" + r"|work|root|home)/", text(page))
+
+
+def test_every_scene_is_in_a_picture_of_errors_against_cost() -> None:
+    """In one, and in the table unless luck decides there; the cloth is in none, and the page says why."""
+    drawn = runpy.run_path(str(ROOT / "docs" / "pictures.py"))
+    names = [name for scenes in drawn["FAMILIES"].values() for name in scenes]
+    assert sorted([*names, "cloth"]) == [scene.name for scene in sw.scenes.scenes()]
+    page = (ROOT / "docs" / "work-precision.md").read_text(encoding="utf-8")
+    assert "The scene `cloth` is missing" in page
+    for picture, scenes in drawn["FAMILIES"].items():
+        assert f"](images/{picture})" in page
+        for scene in scenes:
+            assert (f"| `{scene}` |" in page) is (picture not in drawn["NO_ROWS"])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from PIL import Image
-from stepwell.charts import attitude_picture, runs_animation, runs_picture
+from stepwell.charts import attitude_picture, body_picture, runs_animation, runs_picture
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 
 
@@ -31,6 +31,8 @@ def pictures():
         long = looked_at(scenes.energy_control(), "standard_euler", steps=5000)
     return {
         "attitude": looked_at(scenes.aircraft()),
+        "body": looked_at(scenes.dzhanibekov(), "rk4"),
+        "top": looked_at(scenes.heavy_top(), "rk4"),
         "trapped": looked_at(scenes.gimbal_trap()),
         "orbits": looked_at(scenes.figure_eight(), "leapfrog"),
         "long": long,
@@ -46,11 +48,11 @@ def pictures():
     }
 
 
-KINDS = ("orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")
+KINDS = ("body", "top", "orbits", "long", "space", "two", "gone", "swing", "steady", "grown", "crash", "rows", "many rows")
 #: Of an aircraft, whose pictures show angles in place of errors.
 ATTITUDES = ("attitude", "trapped")
 #: By default one of each way to lay out, and one that ends in what cannot be drawn.
-SHOWN = ("attitude", "orbits", "space", "swing", "rows", "crash")
+SHOWN = ("attitude", "body", "orbits", "space", "swing", "rows", "crash")
 
 
 def each_of(kinds):
@@ -317,6 +319,109 @@ def test_a_diverged_aircraft_is_drawn_as_far_as_it_is_finite():
     with pytest.warns(sw.DivergenceWarning):
         chart = looked_at(sw.scenes.aircraft(), "standard_euler", 2.0, steps=900)
     assert "Diverged at step" in said(chart.plot())
+
+
+def turned_up(chart):
+    """Axis and tip, from Rodrigues' formula: the momentum at the start is turned to the third axis, everything else with it."""
+    matrices = np.moveaxis(sw.quaternion.matrix(chart.run.y.T), -1, 0)
+    momentum = matrices[0] @ (chart.run.system.inertia * chart.run.v[0])
+    x, y, z = momentum / np.linalg.norm(momentum)
+    across, sine = np.array([y, -x, 0.0]), math.hypot(x, y)
+    n = across / sine
+    cross = np.array([[0.0, -n[2], n[1]], [n[2], 0.0, -n[0]], [-n[1], n[0], 0.0]])
+    return (np.eye(3) + sine * cross + (1.0 - z) * cross @ cross) @ matrices
+
+
+def test_a_rigid_body_is_drawn_by_the_path_of_its_axis_and_as_a_box(pictures):
+    chart = pictures["body"]
+    assert (chart.kind, body_picture.main_axis(chart)) == ("body", 1)
+    # Two ways to the same turn: some thirty roundings of numbers up to 1, 2⁻⁵³ each, are below 1e-14.
+    figure = chart.plot()
+    ball, *small, omega, _, _ = figure.axes
+    assert len(small) == body_picture.ATTITUDES
+    screen, matrices = attitude_picture.viewed(elevation=body_picture.ELEVATION), turned_up(chart)
+    tips = matrices[:, :, 1]
+    drawn = [line for line in ball.lines if len(line.get_xdata()) == len(chart.run.t) and line.get_color() == "#000000"]
+    seen = np.stack([tips @ screen.right, tips @ screen.up], axis=-1)
+    fore, behind = (np.ma.masked_invalid(line.get_xydata()) for line in drawn)
+    assert not (np.ma.getmaskarray(fore) & np.ma.getmaskarray(behind)).any()  # in front or behind, and nowhere left out
+    for line in (fore, behind):
+        assert 10 < line[:, 0].count() < len(seen)
+        assert np.abs(line - seen).max() < 1e-14
+    assert (~np.ma.getmaskarray(fore)[:, 0])[tips @ screen.near >= 0.0].all()
+    np.testing.assert_array_equal([line.get_ydata() for line in omega.lines[3:]], chart.run.v.T)
+    np.testing.assert_array_equal([line.get_ydata() for line in omega.lines[:3]], chart.exact[1].T)
+    # The dark face of the box is where the axis points: up at the start, down after it has turned over.
+    half = body_picture.half_sides(chart.run.system.inertia)
+    heights = []
+    for axes, frame in zip(small, attitude_picture.chosen(chart, body_picture.ATTITUDES), strict=True):
+        names = body_picture.box(half, 1)
+        dark = dict(zip(names, axes.patches, strict=True))["+2"]
+        middle = half[1] * matrices[frame, :, 1]
+        assert np.abs(dark.get_xy()[:4].mean(axis=0) - [middle @ screen.right, middle @ screen.up]).max() < 1e-14
+        heights.append(matrices[frame, 2, 1])
+    assert heights[0] > 0.99
+    assert min(heights) < -0.9
+
+
+@pytest.mark.parametrize("inertia", [[2.0, 3.0, 4.0], [1.0, 1.0, 1.6], [5.0, 4.0, 2.0]])
+def test_a_box_has_the_moments_of_the_body(inertia):
+    a, b, c = body_picture.half_sides(np.array(inertia))
+    moments = np.array([b * b + c * c, c * c + a * a, a * a + b * b])  # of a box: m/3 of these
+    np.testing.assert_allclose(moments / moments[0], np.array(inertia) / inertia[0], rtol=1e-14)
+    for axis in range(3):
+        faces = body_picture.box(np.array([a, b, c]), axis)
+        assert {fill for _, fill in faces.values()} == {body_picture.FRONT, body_picture.BACK, *body_picture.SIDES}
+        for name, (corners, _) in faces.items():
+            i = int(name[1]) - 1
+            assert {corner[i] for corner in corners} == {(a, b, c)[i] * (1.0 if name[0] == "+" else -1.0)}
+
+
+def test_the_path_of_a_top_has_the_vertical_up(pictures):
+    chart = pictures["top"]
+    np.testing.assert_array_equal(body_picture.upright(chart), np.eye(3))
+    assert "up is the third axis of space" in said(chart.plot())
+    assert "up is the angular momentum" in said(pictures["body"].plot())
+    # A centre of mass on the other side of the axis hangs, and so does the disc.
+    for centre, side in (([0.0, 0.0, 1.0], 1.0), ([0.0, 0.0, -1.0], -1.0)):
+        top = sw.Scene(
+            sw.RigidBody([1.0, 1.0, 0.5], weight=4.0, centre=centre), v=[0.3, 0.0, 0.0], y=[1.0, 0.0, 0.0, 0.0], horizon=1.0
+        )
+        disc = looked_at(top, "rk4").plot().axes[1].patches[0].get_xy()
+        assert np.sign(disc[:, 1].mean()) == side
+    upside_down = sw.Scene(sw.RigidBody([1.0, 1.0, 0.5]), v=[0.0, 0.0, -1.0], y=[1.0, 0.0, 0.0, 0.0], horizon=3.0)
+    found = body_picture.upright(looked_at(upside_down, "rk4"))
+    assert (found @ [0.0, 0.0, -1.0]).tolist() == [0.0, 0.0, 1.0]
+    assert np.linalg.det(found) == 1.0
+
+
+def test_the_energy_of_a_body_is_judged_as_far_as_it_is_constant():
+    start = {"v": [0.1, 1.0, 0.1], "y": [1.0, 0.0, 0.0, 0.0], "horizon": 3.0}
+    free = looked_at(sw.Scene(sw.RigidBody([1.0, 2.0, 2.5], damping=0.0), **start), "rk4")
+    assert free.energy_error.max() < 1e-6
+    for given in ({"damping": 0.1}, {"torque": [0.1, None, None]}, {"space_torque": [None, 0.1, None]}):
+        chart = looked_at(sw.Scene(sw.RigidBody([1.0, 2.0, 2.5], **given), **start), "rk4")
+        assert chart.energy_error is None
+        assert "its energy is not constant" in [text.get_text() for text in chart.plot().axes[-2].texts]
+
+
+def test_a_diverged_body_is_drawn_as_far_as_it_is_finite(tmp_path):
+    with pytest.warns(sw.DivergenceWarning):
+        chart = looked_at(sw.scenes.dzhanibekov(), "standard_euler", 4.0, steps=300)
+    assert "Diverged at step" in said(chart.plot(tmp_path / "run.png"))
+
+
+def test_a_frame_is_the_attitude_of_its_time(pictures):
+    chart = pictures["body"]
+    figure, show = runs_animation.stage(chart)
+    show(90)
+    show(60)
+    screen, matrices = attitude_picture.viewed(elevation=body_picture.ELEVATION), turned_up(chart)
+    tip = matrices[60, :, 1]
+    rod = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 2 and line.get_color() == "black")
+    assert np.abs(rod.get_xydata()[1] - body_picture.REACH * np.array([tip @ screen.right, tip @ screen.up])).max() < 1e-14
+    trail = next(line for line in figure.axes[0].lines if line.get_color() == "#7a7a7a")
+    assert np.abs(trail.get_xydata()[-1] - rod.get_xydata()[1]).max() < 1e-14
 
 
 @pytest.mark.parametrize("ending", ["svg", "pdf"])

@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
+from ..systems.attitude import rotation_of_quaternion
 from .runs import RunPicture
-from .runs_picture import over_time
+from .runs_picture import EXACT, over_time
 from .style import GREY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: The parts of the aircraft: corners in its own axes (forward, left, up), and how they are filled.
-PARTS: dict[str, tuple[tuple[tuple[float, float, float], ...], str]] = {
+#: Parts of a body by name: their corners along its axes, and how they are filled.
+Parts = dict[str, tuple[tuple[tuple[float, float, float], ...], str]]
+
+#: The parts of the aircraft, in its own axes (forward, left, up).
+PARTS: Parts = {
     "fuselage": (((1.0, 0.0, 0.0), (0.55, 0.1, 0.0), (-0.9, 0.07, 0.0), (-0.9, -0.07, 0.0), (0.55, -0.1, 0.0)), "#4a4a4a"),
     "left wing": (((0.35, 0.08, 0.0), (-0.15, 0.95, 0.0), (-0.35, 0.95, 0.0), (-0.2, 0.08, 0.0)), "#f0f0f0"),
     "right wing": (((0.35, -0.08, 0.0), (-0.15, -0.95, 0.0), (-0.35, -0.95, 0.0), (-0.2, -0.08, 0.0)), "#8a8a8a"),
@@ -82,23 +86,31 @@ def draw_panels(figure: Figure, chart: RunPicture, bottom: float, top: float, ri
         row, column = divmod(i, COLUMNS)
         axes = figure.add_axes((left + column * width, top - (row + 1) * ROW + 0.01, width, ROW - 0.035))
         space(axes)
-        aircraft(axes)(rotation(chart)[..., frame])
+        solid(axes, PARTS)(rotation(chart)[..., frame])
         axes.set_title(f"t = {chart.run.t[frame]:.4g}", size=12, pad=2)
     below = top - ATTITUDES // COLUMNS * ROW - 0.065
-    _rates(figure.add_axes((left + 0.025, bottom, right - left - 0.05, below - bottom)), chart)
+    angular_velocity(figure.add_axes((left + 0.025, bottom, right - left - 0.05, below - bottom)), chart)
 
 
-def chosen(chart: RunPicture) -> list[int]:
+def chosen(chart: RunPicture, count: int = ATTITUDES) -> list[int]:
     """The saved states whose attitudes are shown: evenly from the first to the last finite one."""
     good = np.flatnonzero(chart.finite)
-    return [int(each) for each in good[np.round(np.linspace(0, len(good) - 1, ATTITUDES)).astype(int)]]
+    return [int(each) for each in good[np.round(np.linspace(0, len(good) - 1, count)).astype(int)]]
 
 
 def rotation(chart: RunPicture) -> Array:
     """The rotation matrices of the saved states, shape (3, 3, saved)."""
     system: Any = chart.run.system
+    if chart.kind == "body":
+        return turns(chart.run.y)
     matrices: Array = system.rotation(np.clip(chart.run.y, -LARGEST, LARGEST), axis=1)
     return matrices
+
+
+def turns(y: Array) -> Array:
+    """The rotation matrices of quaternions, shape (n, 4), of any length; shape (3, 3, n)."""
+    with np.errstate(all="ignore"):
+        return rotation_of_quaternion((y / np.abs(y).max(axis=1, keepdims=True)).T)
 
 
 # ---- angles and angular velocity over time
@@ -133,11 +145,15 @@ def angle_panels(figure: Figure, chart: RunPicture, place: tuple[float, float, f
     return panels
 
 
-def _rates(axes: Axes, chart: RunPicture) -> None:
+def angular_velocity(axes: Axes, chart: RunPicture) -> None:
+    """The three angular velocities over time, above the exact ones if they are known."""
+    if chart.exact is not None:
+        for each in chart.exact[1].T:
+            axes.plot(chart.exact[0], each, **EXACT)
     v = np.where(chart.finite[:, np.newaxis], np.clip(chart.run.v, -LARGEST, LARGEST), np.nan)
     labels = []
     for i, (name, colour, line) in enumerate(RATES):
-        axes.plot(chart.run.t, v[:, i], color=colour, linestyle=line, linewidth=1.5)
+        axes.plot(chart.run.t, v[:, i], color=colour, linestyle=line, linewidth=1.5, zorder=3)
         labels.append((name, v[:, i], colour))
     axes.set_title("angular velocity, rad per unit of time", loc="left", size=13.5)
     over_time(axes, chart)
@@ -196,14 +212,14 @@ def space(axes: Axes) -> None:
     axes.axis("off")
 
 
-def aircraft(axes: Axes) -> Callable[[Array], None]:
-    """An aircraft on a panel, and what turns it by a rotation matrix: parts that are nearer cover the others."""
+def solid(axes: Axes, parts: Parts, screen: Seen | None = None) -> Callable[[Array], None]:
+    """A body of flat parts on a panel, and what turns it by a rotation matrix: parts that are nearer cover the others."""
     from matplotlib.patches import Polygon
 
-    screen = viewed()
-    corners = {name: np.array(points) for name, (points, _) in PARTS.items()}
+    screen = screen or viewed()
+    corners = {name: np.array(points) for name, (points, _) in parts.items()}
     look: dict[str, Any] = {"closed": True, "edgecolor": "black", "linewidth": 0.9}
-    drawn = {name: Polygon(np.zeros((3, 2)), facecolor=fill, **look) for name, (_, fill) in PARTS.items()}
+    drawn = {name: Polygon(np.zeros((3, 2)), facecolor=fill, **look) for name, (_, fill) in parts.items()}
     for part in drawn.values():
         axes.add_patch(part)
 
@@ -221,5 +237,5 @@ def animated(figure: Figure, chart: RunPicture) -> Callable[[int], None]:
     axes = figure.add_axes((0.012, 0.06, 0.5, 0.8))
     space(axes)
     axes.text(0.5, 0.02, "dark wing: the right one", transform=axes.transAxes, ha="center", color=GREY, size=13)
-    show, matrices = aircraft(axes), rotation(chart)
+    show, matrices = solid(axes, PARTS), rotation(chart)
     return lambda frame: show(matrices[..., frame])

@@ -15,7 +15,7 @@ from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, Particles, Rods, Springs
+from ..systems import NBody, Particles, RigidBody, Rods, Springs
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -47,11 +47,13 @@ class RunPicture(Drawn, Value):
 
     @property
     def kind(self) -> str:
-        """What is drawn: ``"orbits"`` of bodies and points, an ``"attitude"``, the ``"swing"`` of one number, or ``"rows"``."""
+        """``"orbits"`` of bodies and points, an aircraft's ``"attitude"``, a rigid ``"body"``, a ``"swing"`` or ``"rows"``."""
         if isinstance(self.run.system, (NBody, Particles, Rods, Springs)) and self.run.system.y_shape[-1] > 1:
             return "orbits"
         if hasattr(self.run.system, "commanded"):
             return "attitude"
+        if isinstance(self.run.system, RigidBody):
+            return "body"
         return "rows" if self.scene.system.y_shape else "swing"
 
     @property

@@ -10,9 +10,9 @@ import numpy as np
 
 from .. import _checks
 from ..errors import ArgumentError, UnsupportedError
-from . import attitude_picture
+from . import attitude_picture, body_picture
 from .runs import RunPicture
-from .runs_picture import BODIES, EXACT, body, curves, errors, exact, left_picture, square, view
+from .runs_picture import BODIES, EXACT, body, curves, errors, exact, greyed, left_picture, square, view
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
@@ -95,6 +95,8 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
             attitude_picture.animated(figure, chart),
             attitude_picture.angle_panels(figure, chart, (0.56, 0.1, 0.36, 0.76)),
         )
+    elif chart.kind == "body":
+        show_left, shown = body_picture.animated(figure, chart)
     else:
         show_left = {"orbits": _orbits, "swing": _swing, "rows": _rows}[chart.kind](figure, chart)
         shown = _errors(figure, chart, {"orbits": 0.56, "swing": 0.66, "rows": 0.66}[chart.kind])
@@ -118,10 +120,7 @@ def _errors(figure: Figure, chart: RunPicture, left: float) -> list[Axes]:
     state = figure.add_axes((left, 0.1, 0.978 - left, 0.33))
     errors(energy, state, chart)
     state.set_xlabel("time")
-    shown = [axes for axes, error in ((energy, chart.energy_error), (state, chart.state_error)) if error is not None]
-    for axes in shown:
-        axes.lines[0].set_color("#9a9a9a")
-    return shown
+    return greyed(energy, state, chart)
 
 
 def _orbits(figure: Figure, chart: RunPicture) -> Show:

@@ -52,6 +52,12 @@ def draw(chart: RunPicture) -> Figure:
             notes.append("The dark wing is the right one. A pitch angle above zero lowers the nose.")
             text(figure, chart, notes)
             return figure
+        if chart.kind == "body":
+            from .body_picture import draw_panels as draw_body
+
+            draw_body(figure, chart, notes)
+            text(figure, chart, notes)
+            return figure
         if chart.kind == "orbits":
             _orbits(figure, chart, notes)
             left = 0.55 if chart.run.y.shape[2] == 2 else 0.735
@@ -285,9 +291,9 @@ def errors(energy: Axes, state: Axes, chart: RunPicture) -> None:
         axes.set_title(f"{title} over time, relative", loc="left", size=13.5)
         if error is None:
             missing = (
-                "no energy of its own"
+                ("its energy is not constant" if getattr(chart.scene.system, "torques_act", False) else "no energy of its own")
                 if axes is energy
-                else "no exact solution, so no state error:\na correct energy alone does not\nmake an orbit correct"
+                else "no exact solution, so no state error:\na correct energy alone does not\nmake a motion correct"
             )
             axes.text(0.5, 0.5, missing, transform=axes.transAxes, ha="center", va="center", color=GREY, linespacing=1.4)
             axes.set(yticks=[])
@@ -309,6 +315,14 @@ def errors(energy: Axes, state: Axes, chart: RunPicture) -> None:
             place = {"transform": axes.transAxes, "ha": "right", "va": "bottom", "color": GREY, "size": 11.5}
             axes.text(0.98, 0.05, f"not known after t = {chart.scene.until:g}", **place)
         axes.minorticks_off()
+
+
+def greyed(energy: Axes, state: Axes, chart: RunPicture) -> list[Axes]:
+    """The panels of the errors that are known, whose curves are made grey: beside an animation they are not what is looked at."""
+    known = [axes for axes, error in ((energy, chart.energy_error), (state, chart.state_error)) if error is not None]
+    for axes in known:
+        axes.lines[0].set_color("#9a9a9a")
+    return known
 
 
 def text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:

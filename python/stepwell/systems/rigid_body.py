@@ -126,6 +126,11 @@ class RigidBody(System):
         """The quantities that can be recorded, with the shape of each; the reference defines them."""
         return {name: shape for name, (shape, _) in reference.QUANTITIES.items()}
 
+    @property
+    def torques_act(self) -> bool:
+        """Whether there are torques or damping, so that the energy need not be constant; a weight has its share in the energy."""
+        return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
+
     def doubt(self, y: Array) -> str | None:
         """A message if a quaternion is zero, which is no attitude."""
         return "a quaternion is zero, which is no attitude" if (y == 0.0).all(axis=1).any() else None
