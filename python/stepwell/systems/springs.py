@@ -152,7 +152,8 @@ class Springs(System):
 
     def named(self, name: str, index: Shape) -> str:
         """What serves for all has no index."""
-        alone = name != "gravity" and getattr(self, name).shape[:1] == (1,)
+        numbers = getattr(self, name, None)  # None: of what is around it
+        alone = name != "gravity" and numbers is not None and numbers.shape[:1] == (1,)
         return super().named(name, () if alone else index)
 
     @property
