@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -18,7 +19,7 @@ VECTORS = ("normal", "centre")
 WAYS = ("safe", "restitution", "flip", "spring")
 
 
-class Surface(Fixed, Value):
+class Surface(Fixed, Value, ABC):
     """A plane or a sphere that points meet; see ``Floor`` and ``Sphere``."""
 
     #: What kind of surface it is, and the names of its arguments besides those that all have.
@@ -51,18 +52,18 @@ class Surface(Fixed, Value):
         shapes = {name: each.shape for name, each in given.items() if each is not None}
         return _checks.batch_shape(shapes | self._shapes())
 
+    @abstractmethod
     def _shapes(self) -> dict[str, Shape]:
         """The batch shapes of its own arguments."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def dim(self) -> int | None:
         """In how many dimensions it is; None if in any."""
-        raise NotImplementedError
 
+    @abstractmethod
     def place(self, dim: int) -> dict[str, Any]:
         """Where it is, by name, in so many dimensions; vectors have their components along the first axis."""
-        raise NotImplementedError
 
     def given(self, dim: int) -> dict[str, Any]:
         """Its parameters by name."""

@@ -7,6 +7,7 @@ state after the step. It sees what the step did to v and y, whatever the method:
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,7 +78,7 @@ class Change(NamedTuple):
     low: Any
 
 
-class Surface:
+class Surface(ABC):
     """What planes and spheres have in common; ``friction`` None means that there is none."""
 
     is_curved = False
@@ -89,13 +90,13 @@ class Surface:
         self.friction = friction
         self.stiffness = None if omega is None else h * (omega * omega)
 
+    @abstractmethod
     def place(self, y0: Vector, y: Vector) -> Place:
         """Where points are that began the step at ``y0``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def push(self, y: Vector) -> Vector:
         """What a one-sided spring takes from an increment of v."""
-        raise NotImplementedError
 
     def back(self, y: Vector, distance: Any) -> Vector:
         """A point on the touching plane, put at that distance from the surface itself."""

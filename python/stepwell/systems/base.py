@@ -144,7 +144,12 @@ class System(Fixed, Value, ABC):
 
     def all_given(self, batch: Shape) -> dict[str, Any]:
         """The parameters of this system, of its surfaces, its control and its friction, by name."""
-        return self.given(batch) | self.given_contacts(batch) | self.given_around()
+        given = self.given(batch)
+        if self.contacts:
+            given |= self.given_contacts(batch)
+        if self.control is not None or self.rubbing is not None:
+            given |= self.given_around()
+        return given
 
     def parameters(self, batch: Shape) -> Given:
         """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes."""
