@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 use super::encode::{self as x, Form};
-use crate::tape::{Id, Op, split::Body};
+use crate::tape::{Counts, Id, Op, split::Body};
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -138,6 +138,7 @@ impl Plan {
         }
         let masks = masks(body);
         let fused = if evex { fused(body) } else { vec![false; body.ops.len()] };
+        let adds_doubles = has_more_products(body);
         let mut sign: Option<Id> = None;
         for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && !fused[*id]) {
             let ([a, b, c], n) = op.with(|operand| same[operand as usize]).operands();
@@ -158,6 +159,8 @@ impl Plan {
                     (Doing::Pick(predicate(comparison)), [p, q, b, c], 4)
                 }
                 Op::Select(m, ..) => (Doing::Select(masks[m as usize]), [a, b, c, 0], 3),
+                Op::Mul(..) if adds_doubles && is_two(body, a) => (Doing::Two(x::ADD, true), [b, b, 0, 0], 2),
+                Op::Mul(..) if adds_doubles && is_two(body, b) => (Doing::Two(x::ADD, true), [a, a, 0, 0], 2),
                 other => (Plan::doing(other), [a, b, c, 0], n as u8),
             };
             plan.steps.push(Step { doing, id: id as Id, of, n });
@@ -206,6 +209,17 @@ impl Plan {
         });
         Source::Pool((uniforms + at) as u32)
     }
+}
+
+fn is_two(body: &Body, id: Id) -> bool {
+    body.ops[id as usize] == Op::Const(2f64.to_bits())
+}
+
+/// Whether there are more products than sums. Some CPUs have units for sums beside those for products; 2·x is x + x in every bit.
+fn has_more_products(body: &Body) -> bool {
+    let mut counts = Counts::default();
+    body.ops.iter().for_each(|op| counts.note(*op));
+    counts.multiplications + counts.fused > counts.additions
 }
 
 fn predicate(comparison: Op) -> u8 {
