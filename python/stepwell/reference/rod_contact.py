@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import bits
-from .contact import Change, Place, Step, Surface, Vector, dot
+from .contact import ROUNDING, Change, Place, Step, Surface, Vector, dot, magnitudes
 from .elimination import Factors, factored, solved
 
 #: Points that surfaces have changed together are visited so many times. Two contacts with effective masses m and a coupling ρ/m
@@ -35,7 +35,7 @@ SWEEPS = 10
 ROUNDS, VISITS = 3, 3
 
 #: Below this share of 1/m of the point alone, 1/m at a contact is rounding: rods hold the point in that direction.
-HELD = 2.0**-30
+HELD = 2.0**-40
 
 #: Up to so many times the exactness of its distance, a point that begins behind a surface is lifted onto it: rounding, added up.
 SHALLOW = 2.0**20
@@ -104,9 +104,7 @@ class Joined:
     def __init__(self, rods: Any, y: list[Vector]) -> None:
         self.rods = rods
         n = len(y)
-        self.d = [
-            [to - at for to, at in zip(y[b], y[a] if a < n else rods.anchors[a - n], strict=True)] for a, b in rods.rods
-        ]
+        self.d = [[to - at for to, at in zip(y[b], y[a] if a < n else rods.anchors[a - n], strict=True)] for a, b in rods.rods]
 
     def factors(self) -> Factors:
         """Those of the rods' equations."""
@@ -136,9 +134,7 @@ class Joined:
                 sums[a] = [-x for x in along] if at is None else [s - x for s, x in zip(at, along, strict=True)]
             to = sums[b]
             sums[b] = along if to is None else [s + x for s, x in zip(to, along, strict=True)]
-        return [
-            None if each is None else [minus * x for x in each] for minus, each in zip(self.rods.minus, sums, strict=True)
-        ]
+        return [None if each is None else [minus * x for x in each] for minus, each in zip(self.rods.minus, sums, strict=True)]
 
     def column(self, factors: Factors, points: int, i: int, along: Vector) -> list[Vector | None]:
         """Velocities of the points by a unit impulse at point i."""
@@ -216,7 +212,7 @@ class RodContacts:
             lag = [(y1[i][c] - y0[i][c]) / self.h - 0.5 * (v0[i][c] + v1[i][c]) for c in range(len(kick))]
             step = Step(v0[i], y0[i], v1[i], y1[i], kick, lag)
             for surface in self.met:
-                place = surface.place(y0[i], y1[i])
+                place = self.place(surface, i, y0[i], y1[i])
                 speed = dot(v1[i], place.normal)
                 touches, change = surface.bounce(step, place, speed)
                 aim = bits.where(touches, change.speed, bits.where(bits.less(speed, 0.0), speed, 0.0))
@@ -233,10 +229,17 @@ class RodContacts:
                     for row in rows:
                         row[-1] = row[-1] + HELD * inverse[i]
                     grip = factored(rows)
-                found.append(
-                    Contact(i, surface, place, change, touches, aim, low, column, give, yields, along, slides, grip)
-                )
+                found.append(Contact(i, surface, place, change, touches, aim, low, column, give, yields, along, slides, grip))
         return found
+
+    def place(self, surface: Surface, i: int, y0: Vector, y1: Vector) -> Place:
+        """Where a point is to a surface, with distances as exact as those of points that rods have moved."""
+        place, size = surface.place(y0, y1), magnitudes(y1, [1.0] * len(y1))
+        for ends, length in zip(self.rods.rods, self.rods.lengths, strict=True):
+            if i in ends:
+                size = size + length
+        slack = place.slack + ROUNDING * size
+        return place._replace(slack=slack, near=place.near | bits.at_most(place.distance, slack))
 
     def struck(self, contacts: list[Contact], v: list[Vector]) -> tuple[list[Vector], list[Any], list[Any], list[Any]]:
         """The velocities after all impulses; these along the normals and the tangents; and which of the latter stick."""
@@ -284,8 +287,7 @@ class RodContacts:
                 y = list(y)
                 for i in points:
                     y[i] = [
-                        bits.where(held, at + half * (a + b), to)
-                        for at, a, b, to in zip(y0[i], v0[i], v1[i], y[i], strict=True)
+                        bits.where(held, at + half * (a + b), to) for at, a, b, to in zip(y0[i], v0[i], v1[i], y[i], strict=True)
                     ]
         for k, each in enumerate(contacts):
             since = bits.where(each.touches, bits.where(each.change.rests, half, each.change.since), 0.0)
@@ -316,8 +318,13 @@ class RodContacts:
         return y, Joined(self.rods, y)
 
     def settled(self, contacts: list[Contact], impulses: list[Any], joined: Joined, v: list[Vector]) -> list[Vector]:
-        """Velocities with none along the rods, and with none into the surfaces."""
+        """Velocities with none along the rods, and with none into the surfaces on which points rest.
+
+        A point that bounced turns with its rods since the impact, by which its velocity along the normal changes.
+        """
         factors = joined.factors()
+        bounced = [bits.where(each.touches, bits.where(each.change.rests, each.give, np.inf), each.give) for each in contacts]
+        contacts = [each._replace(give=give) for each, give in zip(contacts, bounced, strict=True)]
         for _ in range(ROUNDS - 1):
             v = joined.moved(factors, v, joined.closing(v))
             for _ in range(VISITS):
