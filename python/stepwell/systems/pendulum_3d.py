@@ -45,7 +45,7 @@ class Pendulum3D(RodSystem):
     def __init__(self, length: Any = 1.0, gravity: Any = 1.0, *, floor: Any = None) -> None:
         self.length = _checks.numbers("length", length, positive=True)
         self.gravity = _checks.numbers("gravity", gravity)
-        self.contacts = surfaces_for_rods(floor, 3)
+        self.contacts, _ = surfaces_for_rods(floor, {3})
         shapes = {"length": self.length.shape, "gravity": self.gravity.shape}
         self.batch = _checks.batch_shape(shapes | contact.batches(self.contacts))
 

@@ -63,22 +63,28 @@ class RodSystem(System):
         )
 
 
-def surfaces_for_rods(floor: Any, dim: int | None) -> tuple[contact.Surface, ...]:
-    """The argument ``floor`` of points on rods.
+def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[contact.Surface, ...], set[int]]:
+    """The argument ``floor`` of points on rods, and the numbers of dimensions in which these and what is given are.
 
     Raises:
-        UnsupportedError: for a way other than "safe", and for too many dimensions.
+        ShapeError: if a surface is in another number of dimensions.
+        UnsupportedError: for a way other than "safe".
     """
-    found = contact.surfaces("floor", floor)
+    found, given = contact.surfaces("floor", floor), set(given)
     for i, each in enumerate(found):
         if each.way != "safe":
             raise UnsupportedError(
-                f'floor {i}: expected way="safe", got {each.way!r}; pulls of rods and impulses of surfaces are found together, '
-                f"and no other way does so"
+                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found together, '
+                f"which no other way does"
             )
-        if each.dim not in (None, dim or each.dim, 2, 3) or (dim and each.dim not in (None, dim)):
-            raise ShapeError(f"floor {i}: expected a vector of {dim or '2 or 3'} components, got {each.dim}")
-    return found
+        if each.dim is not None:
+            expected = given or {2, 3}
+            if each.dim not in expected:
+                raise ShapeError(
+                    f"floor {i}: expected vectors of {' or '.join(map(str, sorted(expected)))} components, got {each.dim}"
+                )
+            given.add(each.dim)
+    return found, given
 
 
 class Rods(RodSystem):
@@ -124,8 +130,8 @@ class Rods(RodSystem):
         given = anchored | (set() if dim is None else {_checks.count("dim", dim, 2, 3)})
         if len(given) > 1:
             raise ShapeError(f"rods, dim: expected one number of dimensions, got {' and '.join(map(str, sorted(given)))}")
-        self.contacts = surfaces_for_rods(floor, next(iter(given), None))
-        self.dim = next(iter(given | set(contact.dimensions(self.contacts).values())), None)
+        self.contacts, given = surfaces_for_rods(floor, given)
+        self.dim = next(iter(given), None)
         if len(self.contacts) * len(self.masses) > MAX_CONTACTS:
             raise ArgumentError(
                 f"floor: expected at most {MAX_CONTACTS} pairs of a point and a surface, got {len(self.masses)} points and "

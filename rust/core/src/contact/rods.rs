@@ -189,7 +189,7 @@ impl<N: Number> RodContacts<N> {
         let mut place = surface.place(y0, y1);
         let size = y1.iter().map(|y| magnitude(*y)).reduce(|sum, next| sum + next).unwrap_or(N::of(0.0));
         let at_it = self.links.ends.iter().zip(&self.links.lengths).filter(|(ends, _)| ends.contains(&i));
-        place.slack = place.slack + N::of(ROUNDING) * at_it.fold(size, |size, (_, length)| size + *length);
+        place.slack += N::of(ROUNDING) * at_it.fold(size, |size, (_, length)| size + *length);
         place.near = place.near | place.distance.at_most(place.slack);
         place
     }
