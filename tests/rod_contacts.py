@@ -23,7 +23,6 @@ METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
 
 #: Methods whose velocity is not at the same time as y (tests/contacts.py).
 LAGGING = ("standard_euler", "damped_euler", "false_euler", "false_heun")
-PARABOLIC = [name for name in METHODS if name not in LAGGING]
 
 
 def dumb_bell(masses: Any = (1.0, 1.0), gravity: float = G, **given: Any) -> sw.Rods:
@@ -245,7 +244,9 @@ def topples(method: str, backend: str = "rust") -> None:
         falls = rod[:, 1] > 0.1
         assert falls.sum() > 200
         assert turning[falls][-1] > 2.0
-        assert np.abs(turning * turning - known)[falls].max() <= (first if method in LAGGING else first * first) * known[falls][-1]
+        assert (
+            np.abs(turning * turning - known)[falls].max() <= (first if method in LAGGING else first * first) * known[falls][-1]
+        )
         assert np.abs(run.y[falls, 0, 1]).max() <= (h * h * G if leaves else steps * ROUNDING)
         if slides:
             assert np.abs(run.y[:, :, 0].sum(axis=1) - run.y[0, :, 0].sum()).max() <= steps * ROUNDING
