@@ -1,4 +1,4 @@
-"""Rods on floors and spheres: closed forms, energy over a dense grid, rest, large systems; each line wrong in one way is noticed."""
+"""Rods on floors and spheres: closed forms, energy over a dense grid, rest, large systems, mistakes that are noticed."""
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ def test_bowls_and_balls_add_no_energy(method: str) -> None:
     """Over 300 steps in which points slide, stick and bounce, in a plane and in space; a contact of two points among them."""
     rng = np.random.default_rng(2)
     for dim, control in itertools.product((2, 3), KEPT.values()):
-        y = rng.normal(0.0, 0.2, (3, dim, 20))
+        y = rng.normal(0.0, 0.2, (3, dim, 40))
         apart = y[1:] - y[:-1]
         y[1] = y[0] + apart[0] / np.sqrt((apart[0] ** 2).sum(axis=0))
         y[2] = y[1] + 0.5 * apart[1] / np.sqrt((apart[1] ** 2).sum(axis=0))
         at = np.zeros(dim)
         floor = [sw.Sphere(at, 2.0, inside=True, restitution=0.6, friction=0.3), sw.Sphere(at - 1.2, 0.4, restitution=0.8)]
         given: dict[str, Any] = {"dt": 0.01, "control": control}
-        v = np.broadcast_to(rng.normal(0.0, 1.0, (1, dim, 20)), y.shape)  # as one body
+        v = np.broadcast_to(rng.normal(0.0, 1.0, (1, dim, 40)), y.shape)  # as one body
         make = [sw.Rods([1.0, 2.0, 0.5], [(0, 1), (1, 2)], [1.0, 0.5], gravity=G, dim=dim, floor=each) for each in (floor, None)]
-        run = sw.integrate(make[0], method, v=v, y=y, steps=150, every=1, **given)
+        run = sw.integrate(make[0], method, v=v, y=y, steps=300, every=1, **given)
         each = {"v": np.moveaxis(run.v[:-1], 0, -1), "y": np.moveaxis(run.y[:-1], 0, -1)}
         bare = sw.integrate(make[1], method, **each, steps=1, **given)
         touched = (np.moveaxis(bare.v[-1], -1, 0) != run.v[1:]).any(axis=(1, 2))
         most = np.maximum(run.energy[:-1], np.moveaxis(bare.energy[-1], -1, 0))
-        assert touched.sum() > 200
+        assert touched.sum() > 300
         assert np.where(touched, run.energy[1:] - most, -1.0).max() <= ROUNDING * (3.5 * G * 2.0 + (run.v**2).max())
 
 
 def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
-    """The rod turns by h·θ̇ at most between an impact and the end of its step; velocities along it, (h·θ̇)² of the energy, are lost."""
+    """The rod turns by at most h·θ̇ from an impact to the end of its step; the velocity along it, (h·θ̇)² of the energy, is lost."""
     for h in (1 / 60, 1 / 240, 1 / 960):
         phase = np.linspace(0.02, 1.0, 50)
         v = np.broadcast_to(np.array([[0.0], [-3.0]]), (2, 2, 50))
@@ -73,7 +73,7 @@ def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
 
 
 def test_newtons_law_with_friction_would_add_energy() -> None:
-    """Kane's paradox, here with e = 1 and a rod at 45° that sticks: without the limit the energy would grow; with it, it stays."""
+    """Kane's paradox, with e = 1 and a rod at 45° that sticks: without the limit the energy would grow; with it, it stays."""
     mu, h = 2.0, 1e-7
     v0 = np.array([[0.7, -1.0], [0.7, -1.0]])
     bell = dumb_bell((1.0, 2.0), gravity=0.0, floor=sw.Floor(1.0, mu))
@@ -83,7 +83,7 @@ def test_newtons_law_with_friction_would_add_energy() -> None:
 
 def test_rods_apart_do_not_share_energy() -> None:
     """Two dumb-bells in one system are those of two systems, to the last bit."""
-    y = np.concatenate([tilted(0.4, 0.1), tilted(1.1, 0.3) + [3.0, 0.0]])
+    y = np.concatenate([tilted(0.4, 0.1), tilted(1.1, 0.3) + np.array([3.0, 0.0])])
     given: dict[str, Any] = {"v": 0.0, "dt": 1 / 120, "steps": 150, "every": 1, "control": RESETTING}
     floor = sw.Floor(0.8, 0.3)
     both = sw.integrate(sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=floor), "rk4", y=y, **given)
@@ -173,12 +173,15 @@ def test_what_does_not_go_together_is_refused() -> None:
 
 # ---- mistakes that must be noticed
 
+#: Checks that are made by a method whose velocity is not at the same time as y, too.
+LAG_MATTERS = ("drops_as_a_ball", "adds_no_energy", "slides_to_rest")
+
 MISTAKES = [
     # the columns
     ("column[i] = own if felt is None else [x + y for x, y in zip(own, felt, strict=True)]", "column[i] = own"),
     ("column = self.pushed(solved(factors, right), points)", "column = [None] * points"),
     ("self.rods.inverse[i] if b == i else self.rods.minus[i]", "self.rods.inverse[i]"),
-    ("return [[-n[1], n[0]]]", "return [[n[1], n[0]]]"),
+    ("return [[-n[1], n[0]]]", "return [[n[0], n[1]]]"),
     ("of = [low if each == high else each for each in of]", "pass"),
     # where a point is, and what it aims at
     ("near=place.near | bits.at_most(place.distance, slack)", "near=place.near & bits.less(place.distance, -0.01)"),
@@ -222,17 +225,18 @@ def changed(old: str, new: str) -> ModuleType:
 
 
 def is_noticed() -> bool:
-    for check, method in itertools.product(rod_contacts.ALL.values(), ("rk4", "standard_euler")):
-        try:
-            check(method, backend="numpy")
-        except AssertionError:
-            return True
+    for name, check in rod_contacts.ALL.items():
+        for method in ("rk4", "standard_euler")[: 1 + (name in LAG_MATTERS)]:
+            try:
+                check(method, backend="numpy")
+            except AssertionError:
+                return True
     return not equal_to_the_core()
 
 
 def equal_to_the_core() -> bool:
     """Of two dumb-bells, one beside the other, whose energies must not be shared."""
-    y = np.concatenate([tilted(0.4, 0.01), tilted(1.1, 0.02) + [3.0, 0.0]])
+    y = np.concatenate([tilted(0.4, 0.01), tilted(1.1, 0.02) + np.array([3.0, 0.0])])
     pair = sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=sw.Floor(0.8, 0.3))
     runs = [
         sw.integrate(pair, "rk4", v=0.0, y=y, dt=1 / 60, steps=12, every=1, control=RESETTING, backend=backend)

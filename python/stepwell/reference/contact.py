@@ -307,11 +307,12 @@ class Touching:
         safe = [each for each in self.met if each.way == "safe"]
         #: Along one plane the energy is right by itself.
         self.is_limited = len(safe) > 1 or any(each.is_curved or each.friction is not None for each in safe)
-        self.on_rods = None
+        self.on_rods: Any = None
         if hasattr(s, "as_rods"):
             from .rod_contact import RodContacts  # which builds on this
 
-            self.on_rods = RodContacts(h, *s.as_rods(), self.met)
+            rods, axes = s.as_rods()
+            self.on_rods = RodContacts(h, rods, axes, self.met)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.s, name)

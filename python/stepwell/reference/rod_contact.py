@@ -1,15 +1,15 @@
 """Contact of points that are joined by rods: impulses of surfaces and pulls of rods are found together.
 
 An impulse at one end of a rod acts on the other end at the same instant. With J the gradients of the rods' lengths, an impulse p
-changes the velocities by P·M⁻¹·p, where P·M⁻¹ = M⁻¹ − M⁻¹Jᵀ(J·M⁻¹·Jᵀ)⁻¹J·M⁻¹: no velocity along a rod results. Its column for a unit
-impulse along the normal of a contact is the ``column`` of that contact, and normal·column is 1/m of the point as the surface
-feels it, its effective mass m being above that of the point alone.
+changes the velocities by P·M⁻¹·p, where P·M⁻¹ = M⁻¹ − M⁻¹Jᵀ(J·M⁻¹·Jᵀ)⁻¹J·M⁻¹: no velocity along a rod results. What a unit impulse
+along the normal of a contact does is the ``column`` of that contact, and normal·column is 1/m of the point as the surface feels
+it, its effective mass m being at least that of the point alone.
 
 After a step of the method each point is looked at as if it were free (contact.py): how fast it hit, how long ago, whether it
 rests. Then for the points of each connected group of rods:
 
-1. Impulses λ ≥ 0 along the normals, so that each point leaves with at least the velocity of its bounce: one contact after the other
-   in a fixed order, ``SWEEPS`` times (projected Gauss-Seidel). Friction in the tangent plane, |p| ≤ μ·λ, is found with them.
+1. Impulses λ ≥ 0 along the normals, so that each point leaves with at least the velocity of its bounce: one contact after the
+   other in a fixed order, ``SWEEPS`` times (projected Gauss-Seidel). Friction in the tangent plane, |p| ≤ μ·λ, is found with them.
 2. The points move as if each impulse had acted since the impact; where a point rests, during all of the step. Then, in
    ``ROUNDS``, they are put where their bounces end, and the rods are given the lengths that they had after the step.
 3. Velocities along the rods in their new directions are removed, and those into the surfaces.
@@ -30,8 +30,8 @@ from .elimination import Factors, factored, solved
 #: leave ρ^(2·SWEEPS) of an error: 10⁻¹⁷ for an equilateral triangle that stands on two of its points, where ρ is 1/7.
 SWEEPS = 10
 
-#: Rounds in which points are put on surfaces, and rods are given their lengths, and the visits of a round. A round leaves an error
-#: of about what a point was moved, over the length of a rod, of the one before.
+#: Rounds in which points are put on surfaces, and rods are given their lengths, and the visits of a round. Of an error a round
+#: leaves a share of about what a point was moved, over the length of a rod.
 ROUNDS, VISITS = 3, 3
 
 #: Below this share of 1/m of the point alone, 1/m at a contact is rounding: rods hold the point in that direction.
@@ -196,7 +196,7 @@ class RodContacts:
             v, impulses, shears, sticks = self.struck(contacts, v1)
             y = self.moved(contacts, impulses, shears, sticks, (v0, y0), (v1, y1))
             y, turned = self.placed(contacts, impulses, joined.squares(), y)
-            v = self.settled(contacts, impulses, turned, v)
+            v = self.consistent(contacts, impulses, turned, v)
             for points in self.groups:
                 self.limit(points, contacts, (v0, y0), (v1, y1), (v, y))
         made = ((np.stack([x for each in block for x in each]), old) for block, old in zip((v, y), after, strict=True))
@@ -317,7 +317,7 @@ class RodContacts:
             y = joined.moved(joined.factors(), y, off)
         return y, Joined(self.rods, y)
 
-    def settled(self, contacts: list[Contact], impulses: list[Any], joined: Joined, v: list[Vector]) -> list[Vector]:
+    def consistent(self, contacts: list[Contact], impulses: list[Any], joined: Joined, v: list[Vector]) -> list[Vector]:
         """Velocities with none along the rods, and with none into the surfaces on which points rest.
 
         A point that bounced turns with its rods since the impact, by which its velocity along the normal changes.

@@ -74,8 +74,8 @@ def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[contact.Surfac
     for i, each in enumerate(found):
         if each.way != "safe":
             raise UnsupportedError(
-                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found together, '
-                f"which no other way does"
+                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found '
+                f"together, which no other way does"
             )
         if each.dim is not None:
             expected = given or {2, 3}

@@ -178,7 +178,7 @@ impl<N: Number> RodContacts<N> {
         let mut impulses = strike(&contacts, v);
         self.shift(&contacts, &impulses, before, after[0], y);
         let turned = self.put(&contacts, &impulses, &joined.squares(), y);
-        settle(&contacts, &mut impulses, &turned, v);
+        make_consistent(&contacts, &mut impulses, &turned, v);
         for points in &self.groups {
             self.limit(points, &contacts, before, after, (v, y));
         }
@@ -375,7 +375,7 @@ fn strike<N: Number>(contacts: &[Contact<N>], v: &mut [N]) -> Impulses<N> {
 /// Velocities with none along the rods, and with none into the surfaces on which points rest, in place.
 ///
 /// A point that bounced turns with its rods since the impact, by which its velocity along the normal changes.
-fn settle<N: Number>(contacts: &[Contact<N>], impulses: &mut Impulses<N>, joined: &Joined<N>, v: &mut [N]) {
+fn make_consistent<N: Number>(contacts: &[Contact<N>], impulses: &mut Impulses<N>, joined: &Joined<N>, v: &mut [N]) {
     let factors = joined.factors();
     let resting =
         |each: &Contact<N>| N::choose(each.touches, N::choose(each.rest.rests, each.give, N::of(f64::INFINITY)), each.give);
