@@ -14,9 +14,8 @@ import stepwell as sw
 from cases import assert_same
 from rod_contacts import METHODS, RESETTING, ROUNDING, G, dumb_bell, tilted
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
-from stepwell.reference import rod_contact
+from stepwell.reference import joined, rod_contact
 
-SOURCE = Path(rod_contact.__file__).read_text(encoding="utf-8")
 KEPT = {"free": None, "control": sw.LengthControl(0.5), "resetting": RESETTING}
 
 
@@ -57,7 +56,7 @@ def test_bowls_and_balls_add_no_energy(method: str) -> None:
 
 
 def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
-    """The rod turns by at most h·θ̇ from an impact to the end of its step; the velocity along it, (h·θ̇)² of the energy, is lost."""
+    """The rod turns by at most h·θ̇ from an impact to the end of its step; velocity along it, (h·θ̇)² of the energy, is lost."""
     for h in (1 / 60, 1 / 240, 1 / 960):
         phase = np.linspace(0.02, 1.0, 50)
         v = np.broadcast_to(np.array([[0.0], [-3.0]]), (2, 2, 50))
@@ -174,7 +173,7 @@ def test_what_does_not_go_together_is_refused() -> None:
 # ---- mistakes that must be noticed
 
 #: Checks that are made by a method whose velocity is not at the same time as y, too.
-LAG_MATTERS = ("drops_as_a_ball", "adds_no_energy", "slides_to_rest")
+LAG_MATTERS = ("drops_as_a_ball", "adds_no_energy", "topples", "slides_to_rest")
 
 MISTAKES = [
     # the columns
@@ -202,10 +201,10 @@ MISTAKES = [
     ("y = added(y, slide, since * shear)", "pass"),
     ("for _ in range(ROUNDS):", "for _ in range(0):"),
     ("off = [0.5 * (now - square)", "off = [(now - square)"),
-    ("y = joined.moved(joined.factors(), y, off)", "pass"),
+    ("y = joined.corrected(joined.factors(), y, off)", "pass"),
     # velocities
     ("bits.where(each.touches, bits.where(each.change.rests, each.give, np.inf), each.give)", "each.give"),
-    ("return joined.moved(factors, v, joined.closing(v))", "return v"),
+    ("return joined.corrected(factors, v, joined.closing(v))", "return v"),
     ("for _ in range(ROUNDS - 1):", "for _ in range(0):"),
     # energy
     ("bits.where(bits.less(most, square), np.sqrt(most / square), 1.0)", "1.0"),
@@ -216,12 +215,16 @@ MISTAKES = [
 ]
 
 
-def changed(old: str, new: str) -> ModuleType:
-    assert SOURCE.count(old) == 1, f"the text is not there, or more than once: {old}"
-    module = ModuleType("stepwell.reference.rod_contact")
-    module.__package__ = "stepwell.reference"
-    exec(compile(SOURCE.replace(old, new), "contact of rods with a mistake", "exec"), vars(module))
-    return module
+def changed(old: str, new: str) -> dict[str, Any]:
+    """The names of the module in which this stands once, with a change in its text."""
+    for module in (rod_contact, joined):
+        source = Path(str(module.__file__)).read_text(encoding="utf-8")
+        if source.count(old) == 1:
+            wrong = ModuleType(module.__name__)
+            wrong.__package__ = "stepwell.reference"
+            exec(compile(source.replace(old, new), "contact of rods with a mistake", "exec"), vars(wrong))
+            return {name: vars(wrong)[name] for name in ("RodContacts", "Joined", "added", "groups") if name in vars(wrong)}
+    pytest.fail(f"the text is not there, or more than once: {old}")
 
 
 def is_noticed() -> bool:
@@ -248,7 +251,8 @@ def equal_to_the_core() -> bool:
 @pytest.mark.parametrize(("old", "new"), MISTAKES, ids=[str(i) for i in range(len(MISTAKES))])
 @pytest.mark.filterwarnings("ignore")
 def test_a_mistake_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
-    monkeypatch.setattr(rod_contact, "RodContacts", changed(old, new).RodContacts)
+    for name, wrong in changed(old, new).items():
+        monkeypatch.setattr(rod_contact, name, wrong)
     assert is_noticed()
 
 

@@ -1,15 +1,16 @@
 """Contact of points that are joined by rods: impulses of surfaces and pulls of rods are found together.
 
 An impulse at one end of a rod acts on the other end at the same instant. With J the gradients of the rods' lengths, an impulse p
-changes the velocities by P·M⁻¹·p, where P·M⁻¹ = M⁻¹ − M⁻¹Jᵀ(J·M⁻¹·Jᵀ)⁻¹J·M⁻¹: no velocity along a rod results. What a unit impulse
-along the normal of a contact does is the ``column`` of that contact, and normal·column is 1/m of the point as the surface feels
-it, its effective mass m being at least that of the point alone.
+changes the velocities by P·M⁻¹·p, where P·M⁻¹ = M⁻¹ − M⁻¹Jᵀ(J·M⁻¹·Jᵀ)⁻¹J·M⁻¹: no velocity along a rod results. What a unit
+impulse along the normal of a contact does is the ``column`` of that contact, and normal·column is 1/m of the point as the surface
+feels it, its effective mass m being at least that of the point alone.
 
 After a step of the method each point is looked at as if it were free (contact.py): how fast it hit, how long ago, whether it
 rests. Then for the points of each connected group of rods:
 
 1. Impulses λ ≥ 0 along the normals, so that each point leaves with at least the velocity of its bounce: one contact after the
-   other in a fixed order, ``SWEEPS`` times (projected Gauss-Seidel). Friction in the tangent plane, |p| ≤ μ·λ, is found with them.
+   other in a fixed order, ``SWEEPS`` times (projected Gauss-Seidel). Friction in the tangent plane, |p| ≤ μ·λ, is found with
+   them.
 2. The points move as if each impulse had acted since the impact; where a point rests, during all of the step. Then, in
    ``ROUNDS``, they are put where their bounces end, and the rods are given the lengths that they had after the step.
 3. Velocities along the rods in their new directions are removed, and those into the surfaces.
@@ -25,6 +26,7 @@ import numpy as np
 from . import bits
 from .contact import ROUNDING, Change, Place, Step, Surface, Vector, dot, magnitudes
 from .elimination import Factors, factored, solved
+from .joined import Column, Joined, added, groups
 
 #: Points that surfaces have changed together are visited so many times. Two contacts with effective masses m and a coupling ρ/m
 #: leave ρ^(2·SWEEPS) of an error: 10⁻¹⁷ for an equilateral triangle that stands on two of its points, where ρ is 1/7.
@@ -70,11 +72,11 @@ class Contact(NamedTuple):
     touches: Any
     aim: Any
     low: Any
-    column: list[Vector | None]
+    column: Column
     give: Any
     yields: Any
     tangents: list[Vector]
-    slides: list[list[Vector | None]]
+    slides: list[Column]
     grip: Factors | None
 
 
@@ -86,84 +88,6 @@ def tangents(n: Vector) -> list[Vector]:
     a = -1.0 / (sign + n[2])
     b = (n[0] * n[1]) * a
     return [[1.0 + (sign * (n[0] * n[0])) * a, sign * b, -(sign * n[0])], [b, sign + (n[1] * n[1]) * a, -n[1]]]
-
-
-def groups(rods: list[list[int]], points: int) -> list[list[int]]:
-    """Points that are joined, directly or by others, each group in ascending order; anchors join nothing."""
-    of = list(range(points))
-    for a, b in rods:
-        if a < points:
-            low, high = sorted((of[a], of[b]))
-            of = [low if each == high else each for each in of]
-    return [[i for i in range(points) if of[i] == group] for group in sorted(set(of))]
-
-
-class Joined:
-    """Points and rods at some places: the vectors of the rods, and how their pulls act on each other."""
-
-    def __init__(self, rods: Any, y: list[Vector]) -> None:
-        self.rods = rods
-        n = len(y)
-        self.d = [[to - at for to, at in zip(y[b], y[a] if a < n else rods.anchors[a - n], strict=True)] for a, b in rods.rods]
-
-    def factors(self) -> Factors:
-        """Those of the rods' equations."""
-        return factored(self.rods.matrix(self.d))
-
-    def squares(self) -> list[Any]:
-        """The squares of the lengths."""
-        return [dot(d, d) for d in self.d]
-
-    def closing(self, v: list[Vector]) -> list[Any]:
-        """Half the rates of these squares."""
-        n, rates = len(v), []
-        for (a, b), d in zip(self.rods.rods, self.d, strict=True):
-            u = [to - at for to, at in zip(v[b], v[a], strict=True)] if a < n else v[b]
-            rates.append(dot(d, u))
-        return rates
-
-    def pushed(self, pulls: list[Any], points: int) -> list[Vector | None]:
-        """What pulls of the rods do to each point; None for those that do not feel any."""
-        sums: list[Vector | None] = [None] * points
-        for (a, b), d, pull in zip(self.rods.rods, self.d, pulls, strict=True):
-            if pull is None:
-                continue
-            along = [pull * each for each in d]
-            if a < points:
-                at = sums[a]
-                sums[a] = [-x for x in along] if at is None else [s - x for s, x in zip(at, along, strict=True)]
-            to = sums[b]
-            sums[b] = along if to is None else [s + x for s, x in zip(to, along, strict=True)]
-        return [None if each is None else [minus * x for x in each] for minus, each in zip(self.rods.minus, sums, strict=True)]
-
-    def column(self, factors: Factors, points: int, i: int, along: Vector) -> list[Vector | None]:
-        """Velocities of the points by a unit impulse at point i."""
-        right: list[Any] = [None] * len(self.d)
-        for k, (a, b) in enumerate(self.rods.rods):
-            if i in (a, b):
-                right[k] = (self.rods.inverse[i] if b == i else self.rods.minus[i]) * dot(self.d[k], along)
-        column = self.pushed(solved(factors, right), points)
-        felt = column[i]
-        own = [self.rods.inverse[i] * each for each in along]
-        column[i] = own if felt is None else [x + y for x, y in zip(own, felt, strict=True)]
-        return column
-
-    def moved(self, factors: Factors, block: list[Vector], off: list[Any]) -> list[Vector]:
-        """A block, changed along the rods by what takes these errors away."""
-        return added(block, self.pushed(solved(factors, off), len(block)))
-
-
-def added(block: list[Vector], changes: list[Vector | None], factor: Any = None) -> list[Vector]:
-    """A block and a change of it, times a factor."""
-    new = []
-    for each, change in zip(block, changes, strict=True):
-        if change is None:
-            new.append(each)
-        elif factor is None:
-            new.append([x + c for x, c in zip(each, change, strict=True)])
-        else:
-            new.append([x + factor * c for x, c in zip(each, change, strict=True)])
-    return new
 
 
 def total(masses: Any, points: list[int], of: list[Any]) -> Any:
@@ -275,7 +199,8 @@ class RodContacts:
 
         Points that stick do not move by the lag of a method.
         """
-        (v0, y0), (v1, y) = before, after
+        (v0, y0), (v1, y1) = before, after
+        y: list[Vector] = list(y1)
         half = 0.5 * self.h
         for points in self.groups:
             held = None
@@ -284,7 +209,6 @@ class RodContacts:
                     stays = each.touches & each.change.rests & stuck
                     held = stays if held is None else held | stays
             if held is not None:
-                y = list(y)
                 for i in points:
                     y[i] = [
                         bits.where(held, at + half * (a + b), to) for at, a, b, to in zip(y0[i], v0[i], v1[i], y[i], strict=True)
@@ -314,7 +238,7 @@ class RodContacts:
                     y, pushes[k] = added(y, each.column, more), pushes[k] + more
             joined = Joined(self.rods, y)
             off = [0.5 * (now - square) for now, square in zip(joined.squares(), squares, strict=True)]
-            y = joined.moved(joined.factors(), y, off)
+            y = joined.corrected(joined.factors(), y, off)
         return y, Joined(self.rods, y)
 
     def consistent(self, contacts: list[Contact], impulses: list[Any], joined: Joined, v: list[Vector]) -> list[Vector]:
@@ -326,11 +250,11 @@ class RodContacts:
         bounced = [bits.where(each.touches, bits.where(each.change.rests, each.give, np.inf), each.give) for each in contacts]
         contacts = [each._replace(give=give) for each, give in zip(contacts, bounced, strict=True)]
         for _ in range(ROUNDS - 1):
-            v = joined.moved(factors, v, joined.closing(v))
+            v = joined.corrected(factors, v, joined.closing(v))
             for _ in range(VISITS):
                 for k, each in enumerate(contacts):
                     v, impulses[k] = self.visit(each, impulses[k], v)
-        return joined.moved(factors, v, joined.closing(v))
+        return joined.corrected(factors, v, joined.closing(v))
 
     def limit(self, points: list[int], contacts: list[Contact], before: Any, after: Any, made: Any) -> None:
         """No more energy of joined points than before the step, or after it without contact.

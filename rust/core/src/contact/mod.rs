@@ -8,6 +8,7 @@
 //! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word
 //! `_side`, `inside` or `outside`, the vector `_centre` and `_radius`.
 
+mod joined;
 mod meet;
 mod rods;
 mod surface;

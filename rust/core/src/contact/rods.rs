@@ -3,6 +3,7 @@
 //! What is computed, and why, is in `reference/rod_contact.py` and docs/contact.md.
 
 use super::{
+    joined::{Column, Joined, add},
     meet::{Change, Rest, Step, bounce},
     surface::{Place, ROUNDING, Surface, dot, magnitude},
 };
@@ -10,7 +11,7 @@ use crate::{
     elimination::Factors,
     number::Number,
     spec::{Given, Parameters},
-    systems::rods::{Links, Vectors},
+    systems::rods::Links,
 };
 
 /// Points that surfaces have changed together are visited so many times.
@@ -38,9 +39,6 @@ pub fn operations(given: &Given, points: usize, dim: usize) -> usize {
     let (visit, rub) = (2 * dim + 6 + 2 * points * dim, (dim - 1) * (2 * points * dim + 2 * dim + 10));
     points * (super::OPERATIONS * surfaces + columns * column + visits * surfaces * visit + SWEEPS * rough * rub)
 }
-
-/// Velocities of the points by a unit impulse; None for points that do not feel it.
-type Column<N> = Vec<Option<Vec<N>>>;
 
 /// A point and a surface, where it met it, and what an impulse there does.
 struct Contact<'a, N: Number> {
@@ -75,66 +73,6 @@ fn tangents<N: Number>(n: &[N]) -> Vec<Vec<N>> {
     let a = -one / (sign + n[2]);
     let b = (n[0] * n[1]) * a;
     vec![vec![one + (sign * (n[0] * n[0])) * a, sign * b, -(sign * n[0])], vec![b, sign + (n[1] * n[1]) * a, -n[1]]]
-}
-
-/// Adds a change of a block to it, times a factor.
-fn add<N: Number>(block: &mut [N], column: &Column<N>, factor: Option<N>) {
-    let dim = block.len() / column.len();
-    for (x, change) in block.chunks_mut(dim).zip(column) {
-        for (x, change) in x.iter_mut().zip(change.iter().flatten()) {
-            *x += factor.map_or(*change, |factor| factor * *change);
-        }
-    }
-}
-
-/// Points and rods at some places.
-struct Joined<'a, N: Number> {
-    links: &'a Links<N>,
-    /// The vector of each rod.
-    d: Vectors<N>,
-}
-
-impl<'a, N: Number> Joined<'a, N> {
-    fn new(links: &'a Links<N>, y: &[N]) -> Self {
-        Joined { links, d: links.spans(y) }
-    }
-
-    fn factors(&self) -> Factors<N> {
-        self.links.factors(&self.d)
-    }
-
-    /// The squares of the lengths.
-    fn squares(&self) -> Vec<N> {
-        self.d.iter().map(|d| dot(d, d)).collect()
-    }
-
-    /// Half the rates of these squares.
-    fn closing(&self, v: &[N]) -> Vec<N> {
-        self.d.iter().zip(self.links.closing(v)).map(|(d, u)| dot(d, &u)).collect()
-    }
-
-    /// Velocities of the points by a unit impulse at point i.
-    fn column(&self, factors: &Factors<N>, i: usize, along: &[N]) -> Column<N> {
-        let mut right = vec![None; self.d.len()];
-        for ((right, [a, b]), d) in right.iter_mut().zip(&self.links.ends).zip(&self.d) {
-            if *a == i || *b == i {
-                *right = Some(if *b == i { self.links.inverse[i] } else { self.links.minus[i] } * dot(d, along));
-            }
-        }
-        let mut column = self.links.pushed_by_some(&self.d, &factors.solve_some(right));
-        let own = along.iter().map(|along| self.links.inverse[i] * *along);
-        column[i] = Some(match &column[i] {
-            None => own.collect(),
-            Some(felt) => own.zip(felt).map(|(own, felt)| own + *felt).collect(),
-        });
-        column
-    }
-
-    /// Changes a block along the rods by what takes these errors away.
-    fn correct(&self, factors: &Factors<N>, block: &mut [N], off: Vec<N>) {
-        let pulls: Vec<_> = factors.solve(off).into_iter().map(Some).collect();
-        add(block, &self.links.pushed_by_some(&self.d, &pulls), None);
-    }
 }
 
 /// The impulses of contacts: along the normals, along the tangents, and whether these hold the point.
