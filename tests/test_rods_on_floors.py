@@ -71,6 +71,20 @@ def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
         assert lost.max() <= (h * turning) ** 2 * run.energy.max()
 
 
+@pytest.mark.parametrize(("method", "order"), [("false_euler", 1), ("standard_heun", 3), ("rk4", 4), ("dop853", 4)])
+def test_an_end_that_slides_on_a_smooth_floor_leaves_the_order(method: str, order: int) -> None:
+    """Up to 4: the energy that a toppling dumb-bell loses; Heun's is wrong by one order less than its places.
+
+    Higher terms are smaller by h·θ̇, below 2 % here, and bend the exponent by less than twice that.
+    """
+    lost = []
+    for h in (1 / 240, 1 / 480):
+        start: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": round(0.5 / h), "every": 1}
+        run = sw.integrate(dumb_bell(floor=sw.Floor(0.0)), method, **start, control=RESETTING)
+        lost.append(np.ptp(run.energy))
+    assert np.log2(lost[0] / lost[1]) == pytest.approx(order, rel=0.05)
+
+
 def test_newtons_law_with_friction_would_add_energy() -> None:
     """Kane's paradox, with e = 1 and a rod at 45° that sticks: without the limit the energy would grow; with it, it stays."""
     mu, h = 2.0, 1e-7
