@@ -176,7 +176,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Aircraft.rotation": (sw.Aircraft().rotation, {"y": np.ones((3, 2)), "axis": 0}),
     "Aircraft.commanded": (sw.Aircraft(roll=3.0).commanded, {"name": "roll", "t": [0.0, 1.0]}),
     "Pendulum": (sw.Pendulum, {"omega": 1.0, "damping": 0.1, "a": 0.0}),
-    "Pendulum3D": (sw.Pendulum3D, {"length": 1.0, "gravity": 1.0}),
+    "Pendulum3D": (sw.Pendulum3D, {"length": 1.0, "gravity": 1.0, "floor": sw.Floor()}),
     "RestrictedThreeBody": (sw.RestrictedThreeBody, {"mu": 0.1}),
     "RigidBody": (
         sw.RigidBody,
@@ -185,7 +185,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "Rods": (
         sw.Rods,
-        {"masses": [1.0, 1.0], "rods": [((0.0, 0.0), 0), (0, 1)], "lengths": [1.0, 1.0], "gravity": 1.0, "dim": 2},
+        {"masses": [1.0, 1.0], "rods": [((0.0, 0.0), 0), (0, 1)], "lengths": [1.0, 1.0], "gravity": 1.0, "floor": [sw.Floor()]}
+        | {"dim": 2},
     ),
     "Chain": (sw.Chain, {"n": 3, "stiffness": 1.0, "mass": 1.0}),
     "LinearSystem": (
