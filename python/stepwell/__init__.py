@@ -83,6 +83,7 @@ __all__ = [
     "System",
     "ToleranceWarning",
     "World",
+    "__version__",
     "advice",
     "advise",
     "analyse",
@@ -156,6 +157,10 @@ _LATER = {
     "stability_along": "stability.stability_along",
     "stability_limit": "stability.stability_limit",
 }
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> Any:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from . import _checks
+from ._brief import brief
 from ._checks import Array, Shape
 from ._value import Fixed, Value, changed
 from .errors import ArgumentError, DTypeError, ShapeError
@@ -83,7 +84,7 @@ class Surface(Fixed, Value, ABC):
         names = (*self.own, "restitution", "friction", "way", "omega")
         values = {name: getattr(self, name) for name in names}
         said = (
-            f"{name}={value.tolist() if isinstance(value, np.ndarray) and value.size < 4 else value!r}"
+            f"{name}={brief(value)}"
             for name, value in values.items()
             if value is not None and not (name == "restitution" and value.ndim == 0 and value == 1.0)
         )

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _checks
+from ._brief import MAX_LINE, facts, shortened
 from ._checks import Array
 from ._encounters import Encounter
 from ._value import Value, by_value
@@ -259,14 +260,37 @@ class Run(Value):
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
 
     def __repr__(self) -> str:
-        bad = int(np.count_nonzero(self.status))
-        if self.paces is not None:
-            steps, rejected = int(self.paces.accepted.sum()), int(self.paces.rejected.sum())
-            return (
-                f"<run of {self.system!r} by {self.method.name} with a tolerance: {len(self.t)} saved from t = {self.t[0]:g} to "
-                f"{self.t[-1]:g}, {self.status.size} member(s), {steps} steps, {rejected} rejected, {bad} stopped early>"
-            )
-        return (
-            f"<run of {self.system!r} by {self.method.name}: {self.steps} steps of {self.dt:g} from t = {self.t[0]:g}, "
-            f"{len(self.t)} saved, {self.status.size} member(s), {bad} diverged>"
-        )
+        told = dict(self._told())
+        steps = f"{told['steps']}, t = {told['time']}"
+        end = f"{told['saved states']} saved, {told['members']}: {told['verdict']}"
+        return shortened(f"<run of {self.system!r} by {self.method.name}: {steps}, {end}>", MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(f"{type(self.system).__name__} by {self.method.title}", [("system", repr(self.system)), *self._told()])
+
+    def _told(self) -> list[tuple[str, str]]:
+        """What it is, by name: steps, time, saved states, members, and how they ended."""
+        members, bad = self.status.size, int(np.count_nonzero(self.status))
+        if self.paces is None:
+            steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
+            first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
+            how, number = "diverged", int(self.first_bad_step[self.status != 0].min()) if bad else None
+        else:
+            rejected = int(self.paces.rejected.sum())
+            steps = f"{_counted(int(self.paces.accepted.sum()), 'adaptive step')}, {rejected} rejected"
+            first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
+        at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
+        verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        return [
+            ("steps", steps + (", fused" if self.fused else "")),
+            ("time", f"{first:g} to {last:g}"),
+            ("saved states", str(len(self.t))),
+            ("members", _counted(members, "member")),
+            ("verdict", verdict),
+        ]
+
+
+def _counted(number: int, what: str) -> str:
+    """A number and what is counted."""
+    return f"{number} {what}{'s' * (number != 1)}"

@@ -36,7 +36,7 @@ PARTS = {
 
 
 @dataclass(frozen=True)
-class MachineCode:
+class MachineCode(Value):
     """The machine code of a step.
 
     Attributes:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import brief
 from .._checks import Shape
 from .._value import Fixed, Value
 from ..errors import ArgumentError, ShapeError
@@ -34,7 +35,7 @@ class Sinusoid(Fixed, Value):
         )
 
     def __repr__(self) -> str:
-        return f"Sinusoid(amplitude={self.amplitude}, omega={self.omega}, phase={self.phase})"
+        return f"Sinusoid(amplitude={brief(self.amplitude)}, omega={brief(self.omega)}, phase={brief(self.phase)})"
 
     def check(self, last: float) -> None:
         """Raise if the angle leaves the range of the sine by a time."""
@@ -70,6 +71,8 @@ class Sampled(Fixed, Value):
         self.batch: Shape = self.values.shape[1:]
 
     def __repr__(self) -> str:
+        if len(self.values) == 1:
+            return f"constant({brief(self.values[0])})"
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
 
     @property
