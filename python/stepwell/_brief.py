@@ -37,7 +37,7 @@ def brief(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return (
             str(value.tolist())
-            if 0 < value.ndim and value.size <= MAX_NUMBERS
+            if value.ndim > 0 and value.size <= MAX_NUMBERS
             else brief(value.item())
             if value.size == 1
             else f"array{value.shape}".replace(",)", ")")

@@ -186,7 +186,9 @@ def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors
     """Candidates in the order of their costs; of those that cost the same but for the noise, the smaller error first.
 
     The first group is the cheapest and all that cost at most that share more; the next begins with the cheapest of the others.
+    Errors that are equal in two digits are taken to be equal: those of one motion in two ways differ by roundings.
     """
+    errors = [float(f"{error:.1e}") for error in errors]
     order = sorted(range(len(candidates)), key=lambda i: (costs[i], errors[i]))
     ranked: list[int] = []
     while order:
