@@ -123,7 +123,7 @@ def integrate(
             same on every machine and with either backend. For steps of up to some 4000 operations.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
-        progress: show a progress bar (needs rich).
+        progress: show a progress bar, in a terminal or in a notebook.
 
     Returns:
         A ``Run``.
@@ -591,10 +591,8 @@ def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Arr
 
 
 def _bar(title: str) -> Any:
-    try:
-        from ._progress import bar
-    except ImportError:
-        raise UnsupportedError("progress: a progress bar needs rich; pip install 'stepwell[progress]'") from None
+    from ._progress import bar
+
     return bar(title)
 
 

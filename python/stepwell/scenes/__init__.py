@@ -57,6 +57,11 @@ def scene(name: str | Scene) -> Scene:
     return make(**_arguments(name, make, arguments)) if arguments else make()
 
 
+def arguments_of(name: str) -> tuple[str, ...]:
+    """The arguments that a scene of the package takes, by its name; none if there is no such scene."""
+    return tuple(inspect.signature(_makers()[name]).parameters) if name in _makers() else ()
+
+
 def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:
     """What ``pair=printed,eps=0`` says: numbers where they are, else words."""
     found: dict[str, Any] = {}
