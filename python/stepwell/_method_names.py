@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
+from ._checks import short
 from .errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ AS_NEAR = 0.2
 
 #: The name by which a method is chosen is suggested, and not another of its names that is nearer by no more than this.
 OWN_NAME_FIRST = 0.1
+
+#: Of a longer text only so many characters are compared.
+MAX_LENGTH = 200
 
 #: Words that a name may have or lack.
 OPTIONAL_WORDS = ("the", "method", "rule", "scheme", "integrator")
@@ -87,18 +91,20 @@ def resolved(name: str, methods: dict[str, Method]) -> Method:
     Raises:
         UnknownNameError: if several methods have that name; if it is the name of a method that is not here; if there is none.
     """
-    names, key = _names(tuple(methods.values())), spelling(name)
+    names, key = _names(tuple(methods.values())), spelling(name[:MAX_LENGTH])
+    shown = short(name)
     holders = names.methods.get(key, [])
     if len(holders) == 1:
         return methods[holders[0]]
     if holders:
-        raise UnknownNameError(f"method: {name!r} is the name of several methods: {', '.join(holders)}; give one of these.")
+        raise UnknownNameError(f"method: {shown} is the name of several methods: {', '.join(holders)}; give one of these.")
     if key in names.qualified:
         told = "; ".join(f"{full} is {holder!r}" for holder, full in names.qualified[key])
-        raise UnknownNameError(f"method: {name!r} does not say which: {told}. Known: {', '.join(methods)}.")
+        raise UnknownNameError(f"method: {shown} does not say which: {told}. Known: {', '.join(methods)}.")
     if key in names.friends:
-        raise UnknownNameError(f"method: {_explained(name, key, names)} Known: {', '.join(methods)}.")
-    raise UnknownNameError(f"method: there is no {name!r}{_hint(key, names)} Known: {', '.join(methods)}.")
+        told = _explained(shown.strip("'"), key, names)
+        raise UnknownNameError(f"method: {told} Known: {', '.join(methods)}.")
+    raise UnknownNameError(f"method: there is no {shown}{_hint(key, names)} Known: {', '.join(methods)}.")
 
 
 def _hint(key: str, names: Names) -> str:

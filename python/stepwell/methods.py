@@ -28,7 +28,15 @@ class Steps(Protocol):
 
 
 class Method(Fixed):
-    """A method with its metadata, read from its record in the core."""
+    """A method with its metadata, read from its record in the core.
+
+    Example:
+        >>> rk4 = sw.method("rk4")
+        >>> rk4
+        <method rk4: Runge-Kutta 4, order 4, 4 function evaluations per step>
+        >>> rk4.order, rk4.evaluations, round(rk4.limit, 4)
+        (4, 4, 2.8284)
+    """
 
     #: The name by which it is chosen.
     name: str
@@ -145,7 +153,12 @@ def _catalogue() -> dict[str, Method]:
 
 
 def methods() -> tuple[Method, ...]:
-    """Every method, in the order of the document."""
+    """Every method, in the order of the document.
+
+    Example:
+        >>> [method.name for method in sw.methods() if method.error_order is not None]
+        ['fehlberg', 'merson', 'fehlberg_5', 'dop853']
+    """
     return tuple(_catalogue().values())
 
 

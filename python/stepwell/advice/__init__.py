@@ -11,7 +11,7 @@ import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from .. import _checks
 from ..charts.measure import TIMED_STEP
@@ -28,11 +28,14 @@ from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
 from .trials import Times, Trial, Trials, step_times, tried_times
 
+if TYPE_CHECKING:
+    from .._words import Cost
+
 Kind = TypeVar("Kind")
 
 __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
 
-COSTS = ("time", "evaluations")
+COSTS: tuple[Cost, ...] = ("time", "evaluations")
 
 #: A larger budget in seconds is refused: the age of the universe is half of it.
 MOST_SECONDS = 1e18
@@ -54,7 +57,7 @@ def advise(
     budget: float | None = None,
     methods: Iterable[Method | str] | None = None,
     *,
-    cost: str = "time",
+    cost: Cost = "time",
     fixed: bool = False,
 ) -> Advice:
     """Find the cheapest method and step that are accurate enough for a scene.
@@ -81,6 +84,11 @@ def advise(
 
     Raises:
         ArgumentError: what was given and what was expected, or that the true motion of the scene is not known for any time.
+
+    Example:
+        >>> advice = sw.advise("figure_eight", methods=["leapfrog", "rk4"], cost="evaluations")
+        >>> advice
+        <advice for figure_eight: leapfrog, dt = 0.00833333, error 0.0039>
     """
     scene, chosen = _named(scene) if isinstance(scene, str) else find_scene(scene), choice(methods)
     tolerance = _checks.number("tolerance", tolerance, positive=True)

@@ -9,7 +9,7 @@ import argparse
 import sys
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -175,7 +175,7 @@ def _control(given: str) -> AnyControl | None:
         raise ArgumentError(
             f"--control: expected a gain and a form, such as 0.3:printed, {', '.join(WAYS)} or off, got {given!r}"
         ) from None
-    return EnergyControl(strength, form) if form else EnergyControl(strength)
+    return EnergyControl(strength, cast(Any, form)) if form else EnergyControl(strength)
 
 
 def _report(picture: RunPicture, columns: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import _checks
 from ..errors import ArgumentError
-from ..scenes import FILE, Scene, arguments_of, scene
+from ..scenes import FILE, Scene, _arguments_of, scene
 from ..systems import System
 
 #: The start of a scene.
@@ -28,7 +28,7 @@ def scene_with(name: str, settings: Sequence[str]) -> Scene:
         ArgumentError: if it is no setting, or the scene and the system have nothing of that name.
     """
     pairs = [_pair(text) for text in settings]
-    known = () if FILE.fullmatch(name) else arguments_of(name.partition(":")[0])
+    known = () if FILE.fullmatch(name) else _arguments_of(name.partition(":")[0])
     own = [f"{key}={value}" for key, value in pairs if key in known]
     found = scene(name + ("," if ":" in name else ":") * bool(own) + ",".join(own))
     for key, value in pairs:

@@ -61,7 +61,8 @@ class Scene(Value):
 
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
-        >>> sw.advise(scene, frame=None, tolerance=1e-3).best
+        >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")
+        <advice for unnamed: rk4, dt = 0.30303, error 0.00089>
     """
 
     system: System

@@ -235,6 +235,11 @@ def analyse(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> step = sw.analyse(sw.Oscillator(), "rk4", dt=0.1)
+        >>> bool(step.stable), step.kind
+        (True, 'damped oscillation')
     """
     how = find_method(method)
     at = given_state(at, v, y)

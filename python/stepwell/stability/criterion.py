@@ -163,6 +163,12 @@ def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -
 
     Raises:
         ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> for answer in sw.criteria(["false_euler", "rk4"]):
+        ...     print(answer)
+        <criterion of false_euler: stable for Φ < 2, r₁² − 1 = 0, Ψ/Φ − 1 = Φ²/24 + 3Φ⁴/640>
+        <criterion of rk4: stable for Φ < 2.828427, r₁² − 1 = −Φ⁶/72 + Φ⁸/576, Ψ/Φ − 1 = −Φ⁴/120 + Φ⁶/336>
     """
     chosen = choice(methods)
     angles = np.atleast_1d(_checks.numbers("phi", phi, positive=True, unit="rad"))

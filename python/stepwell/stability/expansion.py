@@ -55,6 +55,10 @@ def series(method: str | Method) -> Series:
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
+
+    Example:
+        >>> sw.stability.series("rk4")
+        <series in Φ: r₁² − 1 = −Φ⁶/72 + Φ⁸/576, Ψ/Φ − 1 = −Φ⁴/120 + Φ⁶/336>
     """
     return _series(find_method(method))
 

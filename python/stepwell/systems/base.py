@@ -56,6 +56,11 @@ class System(Fixed, Value, ABC):
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
         contacts: surfaces that its points meet, if the rows of its blocks are points.
+
+    Example:
+        >>> system = sw.Oscillator(omega=[1.0, 2.0, 3.0])
+        >>> isinstance(system, sw.System), system.batch, system.linear
+        (True, (3,), True)
     """
 
     kernel: ClassVar[str]

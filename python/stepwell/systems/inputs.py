@@ -24,6 +24,12 @@ class Sinusoid(Fixed, Value):
         amplitude: in the unit of the input; broadcasts over the batch.
         omega: in radians per unit of time; broadcasts.
         phase: in radians; broadcasts.
+
+    Example:
+        >>> drive = sw.Sinusoid(amplitude=0.1, omega=2.0)
+        >>> run = sw.integrate(sw.Oscillator(damping=0.05, a=drive), "rk4", v=0.0, y=0.0, dt=0.05, steps=2000, every=1)
+        >>> float(abs(run.y[-400:]).max().round(3))
+        0.034
     """
 
     def __init__(self, amplitude: Any, omega: Any, phase: Any = 0.0) -> None:
@@ -60,6 +66,12 @@ class Sampled(Fixed, Value):
 
     A time that falls short of a sample's time by less than a millionth of the interval, as t = t0 + k·dt may by rounding, already
     gets that sample.
+
+    Example:
+        >>> steps = sw.Sampled([0.0, 1.0, 0.5], interval=2.0)  # 0 until t = 2, 1 until 4, then 0.5
+        >>> run = sw.integrate(sw.Oscillator(damping=1.0, x=steps), "rk4", v=0.0, y=0.0, dt=0.05, steps=600)
+        >>> float(run.y[-1].round(4))
+        0.5
     """
 
     def __init__(self, values: Any, interval: Any, start: Any = 0.0) -> None:
