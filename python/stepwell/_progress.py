@@ -1,6 +1,6 @@
 """The progress of a long run: a bar of rich in a terminal, or one line of text without rich; an element of a page in a notebook.
 
-Where nobody watches, as in a pipe, nothing is shown.
+In a pipe nothing is shown.
 """
 
 from __future__ import annotations
