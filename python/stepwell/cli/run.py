@@ -34,7 +34,7 @@ KEPT, KEPT_TO_DRAW = 1000, 20_000
 ADAPTIVE, ADAPTIVE_TO_DRAW = 100, 2000
 
 #: Digits of a number on the screen, and the most numbers of a block there.
-DIGITS, MOST_SHOWN = 8, 12
+DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
 
 NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
@@ -115,7 +115,7 @@ def command(args: argparse.Namespace) -> None:
     else:
         for name, value in report.items():
             if value is not None:
-                print(f"{name.replace('_', ' '):21} {_said(value)}")
+                print(f"{name.replace('_', ' '):21} {_said(name, value)}")
     written.close()
 
 
@@ -137,10 +137,10 @@ def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dic
     return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **given)
 
 
-def _said(value: Any) -> str:
+def _said(name: str, value: Any) -> str:
     """A value in the digits that are looked at; --json and files have all."""
     if isinstance(value, float):
-        return f"{value:.{DIGITS}g}"
+        return f"{value:.{DIGITS_OF_AN_ERROR if name.endswith('error') else DIGITS}g}"
     if isinstance(value, list):
         array = np.array(value)
         if array.size > MOST_SHOWN:
