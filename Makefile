@@ -13,7 +13,7 @@ SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o
 LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs")
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long wheel dev bench lint rust-test python-test format clean
+.PHONY: help demo test test-long wheel release dev bench lint rust-test python-test format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +25,14 @@ test: lint rust-test python-test ## set up, and run the tests: Rust, Python, exa
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
+
+release: .venv/release ## build wheel and sdist into dist/, check both, install and try each in an environment of its own
+	rm -rf dist
+	$(BIN)/maturin build --release --quiet --out dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/twine check --strict dist/*
+	@for file in dist/*; do $(BIN)/python tests/installed.py $$file || exit 1; done
+	@echo "ready: $(BIN)/twine upload dist/*"
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet
@@ -79,6 +87,10 @@ clean: ## remove everything that was built
 .venv/wheel: .venv/maturin $(SOURCES)
 	rm -rf dist
 	$(BIN)/maturin build --release --quiet --out dist
+	@touch $@
+
+.venv/release: .venv/maturin
+	$(BIN)/pip install --quiet --disable-pip-version-check 'twine>=6'
 	@touch $@
 
 # The wheel with the extra that a target asks for.

@@ -502,5 +502,8 @@ def test_every_public_function_is_here() -> None:
         and inspect.signature(each).parameters
     }
     here = {call for call, _ in CALLS.values()}
-    assert {name for name in wanted if every[name] not in here} <= {"known", "count", "numbers", "short", "same"}, "imported"
+    assert {name for name in wanted if every[name] not in here} <= {
+        *("known", "count", "numbers", "short", "same"),  # imported
+        "system",  # a decorator, whose wrong calls are in test_equations.py
+    }
     assert len(wanted) > 30

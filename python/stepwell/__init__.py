@@ -83,6 +83,7 @@ __all__ = [
     "System",
     "ToleranceWarning",
     "World",
+    "__version__",
     "advice",
     "advise",
     "analyse",
@@ -118,12 +119,21 @@ def isa() -> str:
     """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
 
     At ``baseline`` steps are interpreted (``STEPWELL_KERNELS=interpret``); at the others they become machine code.
+
+    Example:
+        >>> sw.isa() in sw.isa_levels()
+        True
     """
     return _core.isa()
 
 
 def isa_levels() -> list[str]:
-    """The CPU levels that this machine has."""
+    """The CPU levels that this machine has.
+
+    Example:
+        >>> "baseline" in sw.isa_levels()
+        True
+    """
     return _core.isa_levels()
 
 
@@ -158,11 +168,17 @@ _LATER = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _LATER:
-        raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
-    import importlib
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
-    module, _, attribute = _LATER[name].partition(".")
-    found = importlib.import_module(f"stepwell.{module}")
-    return getattr(found, attribute) if attribute else found
+
+if not TYPE_CHECKING:  # to which any name would else be one of the package
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LATER:
+            raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+        import importlib
+
+        module, _, attribute = _LATER[name].partition(".")
+        found = importlib.import_module(f"stepwell.{module}")
+        return getattr(found, attribute) if attribute else found

@@ -162,6 +162,12 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
 
     Raises:
         ArgumentError: if the run is not of that scene, or keeps too little.
+
+    Example:
+        >>> clover = sw.scenes.clover()
+        >>> picture = sw.charts.run_picture(clover, clover.run("leapfrog", every=1))
+        >>> float(picture.state_error.max().round(3))
+        0.243
     """
     scene = find_scene(scene)
     if not isinstance(run, Run):

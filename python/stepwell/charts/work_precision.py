@@ -74,6 +74,11 @@ def work_precision(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if a peer is not installed.
+
+    Example:
+        >>> chart = sw.charts.work_precision("oscillator", ["leapfrog", "rk4"], [500, 1000, 2000], tolerances=[])
+        >>> [curve.method.name for curve in chart.curves]
+        ['leapfrog', 'rk4']
     """
     whole, chosen = find_scene(scene), choice(methods)
     numbers = None

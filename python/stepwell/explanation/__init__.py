@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _checks, _core, engine
 from ..control import AnyControl, a_control
@@ -24,6 +24,9 @@ from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of, written
 from .result import Explanation, MachineCode
 
+if TYPE_CHECKING:
+    from .._words import StepForm
+
 __all__ = ["Explanation", "Line", "MachineCode", "Section", "explain"]
 
 
@@ -35,7 +38,7 @@ def explain(
     control: AnyControl | None = None,
     fused: bool = False,
     attempt: bool = False,
-    form: str = "direct",
+    form: StepForm = "direct",
     start: str | None = None,
     record: str | Sequence[str] | None = (),
 ) -> Explanation:
@@ -44,15 +47,6 @@ def explain(
     ``print`` the result for a listing: each value with its formula, grouped by how often it is computed; the numbers of
     operations; the machine code, or why the step is interpreted. In a notebook it is a table. The values of parameters and the
     length of the step do not matter, only which parameters all members share: those are used once a run instead of once a member.
-
-    ::
-
-        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
-        once a run
-          Φ = h·omega
-        in each step
-          v' = v − Φ·y
-          y' = y + Φ·v'
 
     Args:
         system: the system to step. Arguments that are arrays over its batch differ from member to member.
@@ -75,6 +69,14 @@ def explain(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
+        once a run
+          Φ = h·omega
+        in each step
+          v' = v − Φ·y
+          y' = y + Φ·v'
     """
     how, system = find_method(method), a_system(system).sized()
     fits_together(system, how)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
 from ..control import AnyControl, a_control
@@ -60,7 +61,8 @@ class Scene(Value):
 
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
-        >>> sw.advise(scene, frame=None, tolerance=1e-3).best
+        >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")
+        <advice for unnamed: rk4, dt = 0.30303, error 0.00089>
     """
 
     system: System
@@ -245,6 +247,21 @@ class Scene(Value):
 
     def _energy(self, v: Array, y: Array) -> Array:
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(
+            f"{self.title} ({self.name})",
+            [
+                ("system", repr(self.system)),
+                ("usual step dt", f"{self.dt:g}"),
+                ("horizon", f"{self.horizon:g}"),
+                ("exact solution", "no" if self.exact is None else "yes"),
+                ("control", None if self.control is None else repr(self.control)),
+                ("section", self.section),
+            ],
+            self.description,
+        )
 
     def __repr__(self) -> str:
         return f"<scene {self.name}: {self.title}, dt = {self.dt:g}, horizon {self.horizon:g}>"

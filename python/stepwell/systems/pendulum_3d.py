@@ -34,7 +34,7 @@ class Pendulum3D(RodSystem):
 
     Example:
         >>> start = {"v": [0.0, 0.3, 0.0], "y": [1.0, 0.0, 0.0]}
-        >>> sw.integrate(sw.Pendulum3D(), "rk4", **start, dt=0.01, steps=1000, control=sw.LengthControl(0.5))
+        >>> run = sw.integrate(sw.Pendulum3D(), "rk4", **start, dt=0.01, steps=1000, control=sw.LengthControl(0.5))
     """
 
     kernel = "pendulum_3d"

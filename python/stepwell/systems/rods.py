@@ -112,7 +112,7 @@ class Rods(RodSystem):
 
     Example:
         >>> pendulum = sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0)
-        >>> sw.integrate(pendulum, "rk4", v=0.0, y=[[1.0, 0.0], [2.0, 0.0]], dt=0.01, steps=1000)
+        >>> run = sw.integrate(pendulum, "rk4", v=0.0, y=[[1.0, 0.0], [2.0, 0.0]], dt=0.01, steps=1000)
     """
 
     kernel = "rods"
