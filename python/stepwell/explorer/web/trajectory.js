@@ -1,0 +1,158 @@
+// Steps of a scene by a method: the exported code, its parameters, and states that are no longer finite.
+
+import { ENERGIES } from "./energies.js";
+import { eigenvalues } from "./roots.js";
+
+// The class of an exported module, made once.
+const classes = new Map();
+
+export function classOf(source) {
+  if (!classes.has(source)) classes.set(source, new Function(source.replace("export class Step", "return class Step"))());
+  return classes.get(source);
+}
+
+// The sources of a scene: JSON, deflated, in base 64.
+export async function unpack(packed) {
+  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return JSON.parse(await new Response(stream).text());
+}
+
+// Parameters and start of a scene with the values of its sliders: m of the steps, e of the energy, v and y.
+export function settings(scene, values) {
+  const Step = classOf(scene.sources[Object.values(scene.steps)[0]]);
+  const m = new Step();
+  const found = { m: structuredClone({ ...m }), e: structuredClone(scene.energy ?? {}), v: [...scene.v], y: [...scene.y] };
+  for (const slider of scene.sliders) {
+    const value = values[slider.name] ?? slider.value;
+    if (value === slider.value) continue; // the scene's own number, to the last bit
+    for (const [path, factor] of Object.entries(slider.targets)) put(found, path, value * factor, slider.relative);
+  }
+  return found;
+}
+
+// Set the number at a path such as m.Gm[1], or all of a list at m.mass[*]; what is not there is left out.
+export function put(root, path, value, relative) {
+  const [, names, index] = /^([\w.]+)(?:\[(\d+|\*)\])?$/.exec(path);
+  const parts = names.split(".");
+  const last = parts.pop();
+  const holder = parts.reduce((object, name) => object?.[name], root);
+  if (holder === undefined || holder[last] === undefined) return;
+  if (index === undefined || !Array.isArray(holder[last])) {
+    holder[last] = relative ? holder[last] * value : value;
+    return;
+  }
+  const list = holder[last];
+  for (const i of index === "*" ? list.keys() : [Number(index)]) {
+    if (i < list.length) list[i] = relative ? list[i] * value : value;
+  }
+}
+
+// A state that is this many times as large as at the start counts as blowing up, though it is still finite.
+const BLOWN_UP = 1e6;
+
+export class Trajectory {
+  // key is the name of a method, or "truth".
+  constructor(scene, key, dt, set) {
+    const Step = classOf(scene.sources[scene.steps[key]]);
+    this.scene = scene;
+    this.dt = dt;
+    const m = new Step();
+    for (const name of Object.keys(m)) if (name in set.m) m[name] = structuredClone(set.m[name]);
+    m.dt = dt;
+    m.prepare();
+    this.m = m;
+    this.energyOf = scene.energy ? ENERGIES[scene.energy.kind] : null;
+    this.e = set.e;
+    this.starts = [set.v, set.y].filter((block) => block.length);
+    this.s = m.start(...this.starts);
+    this.slot = Object.keys(this.s).find((name) => name !== "step" && name !== "tally" && name !== "y");
+    this.started = Math.max(1e-300, this.size());
+    this.lost = null; // the first step after which the state is not finite
+    this.large = null; // the first after which it is a million times as large as at the start
+  }
+
+  get t() {
+    return this.m.t0 + this.s.step * this.dt;
+  }
+
+  get y() {
+    return this.s.y ?? EMPTY;
+  }
+
+  get v() {
+    if (this.m.finish) return this.m.finish(this.s);
+    return this.s.v ?? EMPTY;
+  }
+
+  energy() {
+    return this.energyOf ? this.energyOf(this.e, this.v, this.y) : NaN;
+  }
+
+  // The largest number of the state; NaN if one is.
+  size() {
+    let most = 0;
+    for (const block of [this.y, this.m.finish ? this.v : (this.s[this.slot] ?? EMPTY)]) {
+      for (let i = 0; i < block.length; i++) {
+        const x = Math.abs(block[i]);
+        if (!(x <= most)) most = x;
+        if (x !== x) return NaN;
+      }
+    }
+    return most;
+  }
+
+  // One step; false once the state is no longer finite.
+  step() {
+    if (this.lost !== null) return false;
+    this.m.step(this.s);
+    const size = this.size();
+    if (!(size < Infinity)) this.lost = this.s.step;
+    else if (this.large === null && size > BLOWN_UP * this.started) this.large = this.s.step;
+    return this.lost === null;
+  }
+
+  steps(n) {
+    for (let k = 0; k < n && this.step(); k++);
+    return this;
+  }
+
+  // The derivatives of the state after a step by that before it; blocks in the order of their names in the state.
+  jacobian() {
+    const { m, s, slot } = this;
+    const blocks = [slot, "y"].filter((name) => name && s[name]?.length);
+    const n = blocks.reduce((sum, name) => sum + s[name].length, 0);
+    const linear = this.scene.linear;
+    const columns = [];
+    const after = (name, i, x) => {
+      const copy = { ...s };
+      for (const each of blocks) copy[each] = linear ? new Float64Array(s[each].length) : Float64Array.from(s[each]);
+      if (name) copy[name][i] += x;
+      m.step(copy);
+      return blocks.flatMap((each) => Array.from(copy[each]));
+    };
+    const rest = linear ? after(null, 0, 0) : null;
+    for (const name of blocks) {
+      for (let i = 0; i < s[name].length; i++) {
+        if (linear) {
+          const one = after(name, i, 1);
+          columns.push(one.map((x, k) => x - rest[k]));
+        } else {
+          // The third derivative's part of a central difference and that of rounding are about equal here.
+          const by = 6e-6 * Math.max(1e-3, Math.abs(s[name][i]), scaleOf(s[name]));
+          const [up, down] = [after(name, i, by), after(name, i, -by)];
+          columns.push(up.map((x, k) => (x - down[k]) / (2 * by)));
+        }
+      }
+    }
+    return Array.from({ length: n }, (_, row) => columns.map((column) => column[row]));
+  }
+
+  roots() {
+    return this.lost === null ? eigenvalues(this.jacobian()) : [];
+  }
+}
+
+const EMPTY = new Float64Array(0);
+
+const scaleOf = (block) => Math.sqrt(block.reduce((sum, x) => sum + x * x, 0) / block.length);
