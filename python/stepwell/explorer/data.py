@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .._checks import Array
 from ..charts.style import look
 from ..errors import StepwellError, UnsupportedError
 from ..exports import export
@@ -25,6 +26,10 @@ TRUTH_METHODS = ("dop853", "rk4", "standard_heun")
 
 #: The class in an exported module; what the page needs from all of them.
 CLASS = "step"
+
+#: How many states give the size of a motion, the most steps of the run that finds them, and the share of extreme values to
+#: either side for which pictures have no room.
+SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 
 #: The longest step that goes into a page, in characters.
 MAX_SOURCE = 400_000
@@ -42,7 +47,7 @@ def of_scene(scene: Scene, methods: list[Method]) -> dict[str, Any]:
     Raises:
         UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
     """
-    sources, names, refused = _sources(scene, methods)
+    sources, names, refused, truth_by = _sources(scene, methods)
     parameters = parameters_of(sources[next(iter(names.values()))])
     offer = sliders.OFFERS.get(scene.name, sliders.Offer())
     known = built_in(scene)
@@ -68,9 +73,10 @@ def of_scene(scene: Scene, methods: list[Method]) -> dict[str, Any]:
         "linear": scene.system.linear,
         "limit": offer.limit if known else None,
         "truth": truth,
-        "scales": scales(scene),
+        **sizes(scene),
         "sliders": [told for each in own if (told := _slider(each, values)) is not None],
         "steps": names,
+        "truth_by": truth_by,
         "refused": refused,
         "packed": packed(sources),
     }
@@ -83,8 +89,8 @@ def built_in(scene: Scene) -> bool:
     return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))
 
 
-def _sources(scene: Scene, methods: list[Method]) -> tuple[list[str], dict[str, int], dict[str, str]]:
-    """The steps as JavaScript; the place of that of each method, and of the "truth"; and why others are missing."""
+def _sources(scene: Scene, methods: list[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
+    """The steps as JavaScript; the place of that of each method, and of the "truth"; why others are missing; what makes truth."""
     sources: list[str] = []
     places: dict[str, int] = {}
     refused: dict[str, str] = {}
@@ -103,19 +109,20 @@ def _sources(scene: Scene, methods: list[Method]) -> tuple[list[str], dict[str, 
     if not places:
         why = next(iter(refused.values()))
         raise UnsupportedError(f"scenes: no method steps {scene.name} in a page: {why}")
+    truth_by = None
     for name in TRUTH_METHODS:
         if scene.control is None and name in places:
-            places["truth"] = places[name]
+            truth_by, places["truth"] = name, places[name]
             break
         try:
             source = export(scene.system, name, "javascript", **given).source
         except StepwellError:
             continue
         if len(source) <= MAX_SOURCE:
-            places["truth"] = len(sources)
+            truth_by, places["truth"] = name, len(sources)
             sources.append(source)
             break
-    return sources, places, refused
+    return sources, places, refused, truth_by
 
 
 PARAMETER = re.compile(r"^    this\.(\w+) = (.*?);", re.MULTILINE | re.DOTALL)
@@ -134,16 +141,34 @@ def packed(sources: list[str]) -> str:
     return base64.b64encode(zlib.compress(text, 9)).decode()
 
 
-def scales(scene: Scene) -> list[float]:
-    """The largest lengths of v and y, in which errors are measured: of the exact solution, or of a run by Runge-Kutta."""
+def sizes(scene: Scene) -> dict[str, Any]:
+    """How large the motion is: of the exact solution where it is known, else of a run by Runge-Kutta.
+
+    ``scales`` are the largest lengths of v and y, in which errors are measured; ``ranges`` the least and largest value of each
+    number of a block, for the axes of pictures.
+    """
     if scene.exact is not None and scene.until >= scene.horizon:
-        return list(scene.scales)
-    steps = min(scene.steps_for(scene.dt), 20_000)
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a scale need not be exact
-        run = integrate(scene.system, "rk4", v=scene.v, y=scene.y, dt=scene.dt, steps=steps, every=max(1, steps // 500))
-        lengths = [np.sqrt((block.reshape(len(block), -1) ** 2).sum(axis=1)) for block in (run.v, run.y)]
-    return [float(np.max(each, where=np.isfinite(each), initial=0.0)) for each in lengths]
+        lengths = list(scene.scales)
+        blocks = scene.exact(np.linspace(0.0, scene.horizon, SAMPLES))
+    else:
+        steps = min(scene.steps_for(scene.dt), MAX_SIZE_STEPS)
+        given: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "control": scene.control}
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a size need not be exact
+            run = integrate(scene.system, "rk4", **given, every=max(1, steps // SAMPLES))
+        blocks = run.v, run.y
+        rows = (block.reshape(len(block), -1) for block in blocks)
+        lengths = [float(_finite(np.sqrt((row * row).sum(axis=1))).max(initial=0.0)) for row in rows]
+    ranges = {}
+    for name, block in zip("vy", blocks, strict=True):
+        columns = block.reshape(len(block), -1).T
+        ranges[name] = [np.quantile(_finite(each), [SHARE_LEFT_OUT, 1.0 - SHARE_LEFT_OUT]).tolist() for each in columns]
+    return {"scales": lengths, "ranges": ranges}
+
+
+def _finite(values: Array) -> Array:
+    found = values[np.isfinite(values)]
+    return found if len(found) else np.zeros(1)
 
 
 def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | None:

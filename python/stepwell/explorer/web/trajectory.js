@@ -18,11 +18,9 @@ export async function unpack(packed) {
   return JSON.parse(await new Response(stream).text());
 }
 
-// Parameters and start of a scene with the values of its sliders: m of the steps, e of the energy, v and y.
-export function settings(scene, values) {
-  const Step = classOf(scene.sources[Object.values(scene.steps)[0]]);
-  const m = new Step();
-  const found = { m: structuredClone({ ...m }), e: structuredClone(scene.energy ?? {}), v: [...scene.v], y: [...scene.y] };
+// Parameters of a step, of the energy, and the start, with the values of the sliders; m is what a step was made with.
+export function settings(scene, values, m) {
+  const found = { m, e: structuredClone(scene.energy ?? {}), v: [...scene.v], y: [...scene.y] };
   for (const slider of scene.sliders) {
     const value = values[slider.name] ?? slider.value;
     if (value === slider.value) continue; // the scene's own number, to the last bit
@@ -52,20 +50,19 @@ export function put(root, path, value, relative) {
 const BLOWN_UP = 1e6;
 
 export class Trajectory {
-  // key is the name of a method, or "truth".
-  constructor(scene, key, dt, set) {
+  // key is the name of a method, or "truth"; values are those of sliders, by name.
+  constructor(scene, key, dt, values) {
     const Step = classOf(scene.sources[scene.steps[key]]);
     this.scene = scene;
     this.dt = dt;
     const m = new Step();
-    for (const name of Object.keys(m)) if (name in set.m) m[name] = structuredClone(set.m[name]);
+    const set = settings(scene, values, m);
     m.dt = dt;
     m.prepare();
     this.m = m;
     this.energyOf = scene.energy ? ENERGIES[scene.energy.kind] : null;
-    this.e = set.e;
-    this.starts = [set.v, set.y].filter((block) => block.length);
-    this.s = m.start(...this.starts);
+    this.set = set;
+    this.s = m.start(...[set.v, set.y].filter((block) => block.length));
     this.slot = Object.keys(this.s).find((name) => name !== "step" && name !== "tally" && name !== "y");
     this.started = Math.max(1e-300, this.size());
     this.lost = null; // the first step after which the state is not finite
@@ -86,7 +83,7 @@ export class Trajectory {
   }
 
   energy() {
-    return this.energyOf ? this.energyOf(this.e, this.v, this.y) : NaN;
+    return this.energyOf ? this.energyOf(this.set.e, this.v, this.y) : NaN;
   }
 
   // The largest number of the state; NaN if one is.
