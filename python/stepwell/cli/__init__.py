@@ -16,7 +16,8 @@ from ..errors import StepwellError
 
 #: The commands, in the order of the help.
 COMMANDS = (
-    *("scenes", "methods", "run", "chart", "control", "criteria", "stability", "advise", "explain", "export", "figures", "paper"),
+    *("scenes", "methods", "run", "explore", "chart", "control", "criteria", "stability", "advise", "explain", "export"),
+    *("figures", "paper"),
 )
 
 #: Exit codes: what was asked for cannot be done; Ctrl-C, by the custom of shells.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 import warnings
 import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from ..integrate import integrate
 from ..methods import Method
 from ..scenes import Scene
 from ..scenes import scene as find_scene
+from ..scenes.taylor import Orbit
 from . import sliders, systems
 
 #: The methods that may make the run with small steps that errors are measured by, the first that can step the scene.
@@ -41,7 +44,7 @@ def of_method(method: Method) -> dict[str, Any]:
     return told | {"colour": look(method)["color"]}
 
 
-def of_scene(scene: Scene, methods: list[Method]) -> dict[str, Any]:
+def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
     """What the page has of a scene.
 
     Raises:
@@ -89,7 +92,7 @@ def built_in(scene: Scene) -> bool:
     return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))
 
 
-def _sources(scene: Scene, methods: list[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
+def _sources(scene: Scene, methods: Sequence[Method]) -> tuple[list[str], dict[str, int], dict[str, str], str | None]:
     """The steps as JavaScript; the place of that of each method, and of the "truth"; why others are missing; what makes truth."""
     sources: list[str] = []
     places: dict[str, int] = {}
@@ -142,12 +145,12 @@ def packed(sources: list[str]) -> str:
 
 
 def sizes(scene: Scene) -> dict[str, Any]:
-    """How large the motion is: of the exact solution where it is known, else of a run by Runge-Kutta.
+    """How large the motion is: of the exact solution where there is a formula, else of a run by Runge-Kutta.
 
     ``scales`` are the largest lengths of v and y, in which errors are measured; ``ranges`` the least and largest value of each
     number of a block, for the axes of pictures.
     """
-    if scene.exact is not None and scene.until >= scene.horizon:
+    if scene.exact is not None and scene.until >= scene.horizon and not isinstance(scene.exact, Orbit):
         lengths = list(scene.scales)
         blocks = scene.exact(np.linspace(0.0, scene.horizon, SAMPLES))
     else:
@@ -179,7 +182,7 @@ def _slider(slider: sliders.Slider, values: dict[str, Any]) -> dict[str, Any] | 
             if (found := _at(values, path)) is not None:
                 value = found / factor
                 break
-    if value is None:
+    if value is None or not math.isfinite(value):
         return None
     low, high = min(slider.low, value), max(slider.high, value)
     told = {"name": slider.name, "label": slider.label, "about": slider.about, "low": low, "high": high, "value": value}

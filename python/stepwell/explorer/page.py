@@ -8,6 +8,7 @@ import re
 import sys
 import tempfile
 import webbrowser
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -57,18 +58,24 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.
     """
-    found = _scenes(scenes)
-    return Explorer(found, chosen_methods(methods))
+    page = Explorer(tuple(_scenes(scenes)), tuple(chosen_methods(methods)))
+    _ = page.data  # so that what cannot be shown is an error here
+    return page
+
+
+def offered() -> list[Scene]:
+    """The scenes of a page for which none are named."""
+    known = {each.name: each for each in (*scenes(), sliders.rope())}
+    return [known[name] for name in sliders.OFFERS]
 
 
 def _scenes(given: Any) -> list[Scene]:
     if given is None:
-        known = {each.name: each for each in (*scenes(), sliders.rope())}
-        return [known[name] for name in sliders.OFFERS]
+        return offered()
     several = [given] if isinstance(given, (str, Scene)) else _checks.several("scenes", given, "scenes or their names")
     if not several:
         raise ArgumentError("scenes: expected at least one, got none")
-    found = [sliders.rope() if each == "rope" else find_scene(each) for each in several]
+    found = [sliders.rope() if isinstance(each, str) and each == "rope" else find_scene(each) for each in several]
     names = [each.name for each in found]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
@@ -76,6 +83,7 @@ def _scenes(given: Any) -> list[Scene]:
     return found
 
 
+@dataclass(frozen=True, eq=False)
 class Explorer(Value):
     """A page with scenes and methods. ``save`` it, ``open`` it, or let a notebook show it.
 
@@ -84,26 +92,29 @@ class Explorer(Value):
         methods: the methods that it offers.
     """
 
-    def __init__(self, scenes: list[Scene], methods: list[Method]) -> None:
-        self.scenes = tuple(scenes)
-        self.methods = tuple(methods)
-        self._scene_data = [of_scene(each, methods) for each in scenes]
+    scenes: tuple[Scene, ...]
+    methods: tuple[Method, ...]
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """What the page is filled with: its methods, and its scenes with their steps, as numbers and texts.
+
+        Raises:
+            UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.
+        """
+        return {
+            "version": _core.__version__,
+            "methods": [of_method(each) for each in self.methods],
+            "scenes": [of_scene(each, self.methods) for each in self.scenes],
+        }
 
     @cached_property
     def html(self) -> str:
         """The page: HTML with all that it needs."""
-        data = {
-            "version": _core.__version__,
-            "methods": [of_method(each) for each in self.methods],
-            "scenes": self._scene_data,
-        }
+        data = json.dumps(self.data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
         text = (WEB / "page.html").read_text(encoding="utf-8")
-        parts = {
-            "STYLE": (WEB / "page.css").read_text(encoding="utf-8"),
-            "DATA": json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/"),
-            "SCRIPT": script(),
-            "VERSION": _core.__version__,
-        }
+        style = (WEB / "page.css").read_text(encoding="utf-8")
+        parts = {"STYLE": style, "DATA": data, "SCRIPT": script(), "VERSION": _core.__version__}
         return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], text)
 
     def save(self, path: str | PathLike[str]) -> Path:

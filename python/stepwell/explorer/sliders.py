@@ -153,11 +153,13 @@ OFFERS: dict[str, Offer] = {
         (Slider("friction", "friction μN", 0.02, 0.6, {"m.friction_limit": 1.0}),), rate=2.0, truth="sticking_block"
     ),
     "dzhanibekov": Offer(
-        tuple(Slider(f"J{i + 1}", f"inertia {i + 1}", 0.3, 4.0, {f"m.inertia[{i}]": 1.0, f"e.inertia[{i}]": 1.0}) for i in range(3)),
+        tuple(
+            Slider(f"J{i + 1}", f"inertia {i + 1}", 0.3, 4.0, {f"m.inertia[{i}]": 1.0, f"e.inertia[{i}]": 1.0}) for i in range(3)
+        ),
         rate=3.0,
     ),
     "heavy_top": Offer((Slider("weight", "weight", 0.0, 12.0, {"m.weight": 1.0, "e.weight": 1.0}),), rate=1.0),
-}  # fmt: skip
+}
 
 
 def rope() -> Scene:

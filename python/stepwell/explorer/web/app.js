@@ -201,12 +201,13 @@ const stepOf = (slider) => 10 ** Math.floor(Math.log10((slider.high - slider.low
 function sliderOf(slider) {
   const label = document.createElement("label");
   label.className = "slide";
+  label.htmlFor = `p-${slider.name}`; // else it would be the label of the output in it
   if (slider.about) label.title = slider.about;
   const output = document.createElement("output");
   const span = document.createElement("span");
   span.append(slider.label, output);
   const input = document.createElement("input");
-  Object.assign(input, { type: "range", min: slider.low, max: slider.high, step: "any", value: page.values[slider.name] });
+  Object.assign(input, { id: label.htmlFor, type: "range", min: slider.low, max: slider.high, step: "any", value: page.values[slider.name] });
   input.dataset.name = slider.name;
   const step = stepOf(slider);
   output.textContent = short(page.values[slider.name]);

@@ -117,9 +117,9 @@ export class Trajectory {
   // The derivatives of the state after a step by that before it; blocks in the order of their names in the state.
   jacobian() {
     const { m, s, slot } = this;
+    const { scales, linear } = this.scene;
     const blocks = [slot, "y"].filter((name) => name && s[name]?.length);
     const n = blocks.reduce((sum, name) => sum + s[name].length, 0);
-    const linear = this.scene.linear;
     const columns = [];
     const after = (name, i, x) => {
       const copy = { ...s };
@@ -136,7 +136,7 @@ export class Trajectory {
           columns.push(one.map((x, k) => x - rest[k]));
         } else {
           // The third derivative's part of a central difference and that of rounding are about equal here.
-          const by = 6e-6 * Math.max(1e-3, Math.abs(s[name][i]), scaleOf(s[name]));
+          const by = 6e-6 * Math.max(1e-3, Math.abs(s[name][i]), scales[name.startsWith("v") ? 0 : 1]);
           const [up, down] = [after(name, i, by), after(name, i, -by)];
           columns.push(up.map((x, k) => (x - down[k]) / (2 * by)));
         }
@@ -151,5 +151,3 @@ export class Trajectory {
 }
 
 const EMPTY = new Float64Array(0);
-
-const scaleOf = (block) => Math.sqrt(block.reduce((sum, x) => sum + x * x, 0) / block.length);

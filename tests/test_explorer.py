@@ -1,0 +1,440 @@
+"""The explorer's page without a browser: its steps, roots, energies and exact solutions in Node, and how it is made."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import types
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from explored import CHANGED, STEPS, data_of, expected, in_node, no_node, page, races, scene_of
+from stepwell import cli
+from stepwell.explorer import sliders
+from stepwell.explorer.data import of_scene
+from stepwell.explorer.page import MODULES, WEB, script
+
+needs_node = pytest.mark.skipif(no_node(), reason="there is no Node here")
+
+
+# ---- steps
+
+
+RUN = """
+told = given.map(([name, key, values, steps]) => {
+  const run = new Trajectory(scene(name), key, scene(name).dt, values).steps(steps);
+  return [...run.v, ...run.y].map(bits);
+});
+"""
+
+
+@needs_node
+def test_every_step_has_the_bits_of_integrate(tmp_path: Path) -> None:
+    """Each scene by each method that can step it; and with sliders moved, against the scene made with these parameters."""
+    every = races()
+    assert {name for name, *_ in every} == set(sliders.OFFERS)
+    assert {key for _, key, *_ in every} == {m.name for m in sw.methods()}
+    told = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        wrong = [each[:3] for each, got in zip(every, told, strict=True) if got != expected(each[3], each[1])]
+    assert not wrong
+
+
+@needs_node
+def test_a_slider_that_is_not_heard_is_noticed(tmp_path: Path) -> None:
+    mistake = ("trajectory", "value * factor", "slider.value * factor")
+    every = [each for each in races() if each[2]]
+    told = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every], mistake)
+    assert not any(got == expected(each[3], each[1]) for each, got in zip(every, told, strict=True))
+
+
+def test_sliders_begin_where_the_scene_is() -> None:
+    """Each slider has its scene's own value, and each of its numbers is there: else it would move nothing."""
+    for each in page().data["scenes"]:
+        offered = sliders.OFFERS[each["name"]].sliders
+        assert [slider["name"] for slider in each["sliders"]] == [slider.name for slider in offered]
+        for slider in each["sliders"]:
+            assert slider["low"] <= slider["value"] <= slider["high"]
+    values = {slider["name"]: slider["value"] for slider in data_of("energy_control")["sliders"]}
+    assert values == {"gain": 0.3}
+    assert [slider["value"] for slider in data_of("pythagorean")["sliders"]] == [3.0, 4.0, 5.0, 0.0]
+    assert {name for name, *_ in CHANGED.values()} <= set(sliders.OFFERS)
+
+
+@needs_node
+def test_a_run_blows_up_where_integrate_says(tmp_path: Path) -> None:
+    """Past the limits of all of them: the first step after which the state is not finite, with v that is computed, too."""
+    keys = ["false_euler", "leapfrog", "verlet", "rk4", "pefrl", "standard_euler"]
+    told = in_node(
+        """
+told = given.map((key) => {
+  const run = new Trajectory(scene("oscillator"), key, 3.2, {}).steps(2000);
+  return [run.lost, run.large];
+});
+""",
+        tmp_path,
+        keys,
+    )
+    for key, (lost, large) in zip(keys, told, strict=True):
+        with pytest.warns(sw.DivergenceWarning):
+            run = sw.integrate(sw.Oscillator(), key, v=0.0, y=1.0, dt=3.2, steps=2000, every=1)
+        assert lost == run.first_bad_step
+        size = np.maximum(np.abs(run.v), np.abs(run.y))
+        assert large == int(np.argmax(size > 1e6))
+
+
+# ---- roots
+
+
+@needs_node
+def test_eigenvalues_are_those_of_numpy(tmp_path: Path) -> None:
+    """QR steps are backward stable: eigenvalues of a matrix that differs by some n·eps of its norm, times their condition."""
+    rng = np.random.default_rng(5)
+    matrices = [rng.normal(size=(n, n)) for n in (1, 2, 3, 5, 8, 12, 16) for _ in range(4)]
+    matrices += [np.triu(matrices[-1]), np.roll(np.eye(6), 1, axis=0), np.diag([1.0, 2.0, 3.0]), np.zeros((4, 4))]
+    told = in_node("told = given.map((each) => roots.eigenvalues(each));", tmp_path, [each.tolist() for each in matrices])
+    for matrix, got in zip(matrices, told, strict=True):
+        values, vectors = np.linalg.eig(matrix)
+        found = np.array([z["re"] + 1j * z["im"] for z in got])
+        assert len(found) == len(matrix)
+        error = 64 * len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix) * np.linalg.cond(vectors)
+        for z in found:  # each is nearest to another
+            nearest = np.abs(values - z).argmin()
+            assert np.abs(values[nearest] - z) <= error
+            values = np.delete(values, nearest)
+
+
+ROOTS = """
+told = given.map(([name, key, dt, values, steps]) => new Trajectory(scene(name), key, dt, values).steps(steps).roots());
+"""
+
+
+def nearest(found: list[dict[str, float]], wanted: Any) -> float:
+    """The largest distance of two sets of roots, each taken with its nearest."""
+    left, most = list(wanted), 0.0
+    assert len(found) == len(left)
+    for z in found:
+        i = int(np.abs(np.array(left) - (z["re"] + 1j * z["im"])).argmin())
+        most = max(most, abs(left.pop(i) - (z["re"] + 1j * z["im"])))
+    return most
+
+
+@needs_node
+def test_roots_of_linear_scenes_are_those_of_analyse(tmp_path: Path) -> None:
+    """Columns of P are steps of unit vectors, right to some roundings; a double root moves by the square root of these."""
+    oscillators = [("oscillator", m.name, dt, {}, 3) for m in sw.methods() for dt in (0.3, 1.9, 3.0)]
+    damped = [
+        ("forced_oscillator", key, 0.5, {"damping": 0.4}, 3) for key in data_of("forced_oscillator")["steps"] if key != "truth"
+    ]
+    chains = [("chain", key, 0.3, {}, 2) for key in ("false_euler", "rk4", "verlet", "standard_heun", "pefrl")]
+    every = oscillators + damped + chains
+    told = in_node(ROOTS, tmp_path, every)
+    systems = {"oscillator": sw.Oscillator(), "forced_oscillator": sw.Oscillator(1.0, 0.4, form="physical"), "chain": sw.Chain(8)}
+    for (name, key, dt, _, _), got in zip(every, told, strict=True):
+        wanted = sw.analyse(systems[name], key, dt=dt).eigenvalues
+        size = max(1.0, float(np.abs(wanted).max()))
+        assert nearest(got, wanted) < 2e-7 * size, (name, key, dt)
+        if name != "chain" and min(abs(np.subtract.outer(wanted, wanted))[0, 1:]) > 0.1:
+            assert nearest(got, wanted) < 1e-13 * size, (name, key, dt)
+
+
+@needs_node
+def test_roots_at_a_state_are_those_of_analyse(tmp_path: Path) -> None:
+    """Central differences by 6e-6 of the size: the third derivative's part and rounding are some 1e-10 of a derivative.
+
+    The roots of the clover come in multiples, which an error e moves by its square root, here 1e-5.
+    """
+    every = [("pendulum", key, 0.3, {"start": 1.0}, 0) for key in ("false_euler", "rk4", "standard_heun")]
+    every += [("clover", key, 0.1, {}, 0) for key in ("false_euler", "rk4")]
+    told = in_node(ROOTS, tmp_path, every)
+    for (name, key, dt, _, _), got in zip(every, told, strict=True):
+        scene = scene_of(name)
+        wanted = sw.analyse(scene.system, key, dt=dt, at=(scene.v, 1.0 if name == "pendulum" else scene.y)).eigenvalues
+        assert nearest(got, wanted) < (1e-9 if name == "pendulum" else 1e-4), (name, key)
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("module", "right", "mistake"),
+    [("roots", "larger === 0 ? 0 : q / larger", "p + larger"), ("roots", "(a + d) / 2", "a + d")],
+)
+def test_wrong_roots_are_noticed(module: str, right: str, mistake: str, tmp_path: Path) -> None:
+    every = [("oscillator", "false_euler", 3.0, {}, 3)]
+    (got,) = in_node(ROOTS, tmp_path, every, (module, right, mistake))
+    assert nearest(got, sw.analyse(sw.Oscillator(), "false_euler", dt=3.0).eigenvalues) > 1e-3
+
+
+# ---- energies and exact solutions
+
+
+ENERGY = "told = given.map(([name, v, y]) => ENERGIES[scene(name).energy.kind](scene(name).energy, v, y));"
+
+
+def energies(folder: Path, change: Any = None) -> list[tuple[str, float, float]]:
+    """For each scene at random states the energy in the page and in Python."""
+    rng = np.random.default_rng(9)
+    every = []
+    for name in sliders.OFFERS:
+        scene = scene_of(name)
+        for _ in range(3):
+            every.append((name, rng.normal(size=scene.system.v_shape), rng.normal(size=scene.system.y_shape)))
+    got = in_node(ENERGY, folder, [[name, np.ravel(v).tolist(), np.ravel(y).tolist()] for name, v, y in every], change)
+    return [(name, x, float(scene_of(name).system.energy(v, y))) for (name, v, y), x in zip(every, got, strict=True)]
+
+
+@needs_node
+def test_energies_are_those_of_the_systems(tmp_path: Path) -> None:
+    """Sums of fewer than a hundred products that differ in their order only: a hundred roundings of terms of some size 100."""
+    for name, got, wanted in energies(tmp_path):
+        assert got == pytest.approx(wanted, rel=1e-13, abs=100 * 100 * 2.0**-53), name
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("right", "mistake", "scenes"),
+    [
+        ("0.5 * Math.log(square)", "Math.log(square)", {"clover", "energy_control"}),
+        ("const stretch = Math.sqrt(square) - p.rest[k];", "const stretch = Math.sqrt(square);", {"rope"}),
+        ("p.gravity[i % dim] * y[i]", "p.gravity[0] * y[i]", {"bouncing_ball", "rope", "double_pendulum", "conical_pendulum"}),
+        ("a * a + d * d - b * b - c * c", "a * a + d * d - b * b", {"heavy_top"}),
+    ],
+)
+def test_wrong_energies_are_noticed(right: str, mistake: str, scenes: set[str], tmp_path: Path) -> None:
+    told = energies(tmp_path, ("energies", right, mistake))
+    assert {name for name, got, wanted in told if got != pytest.approx(wanted, rel=1e-9)} == scenes
+
+
+TRUTH = """
+told = given.map(([name, values, times]) => {
+  const set = settings(scene(name), values, new Trajectory(scene(name), "truth", 0.1, values).m);
+  return times.map((t) => { const { v, y } = TRUTHS[scene(name).truth](t, set); return [...v, ...y]; });
+});
+"""
+
+FORMULAS: list[tuple[str, dict[str, float], Any]] = [
+    ("oscillator", {"omega": 2.0}, lambda: sw.scenes.scene("oscillator:omega=2.0")),
+    ("forced_oscillator", {}, lambda: scene_of("forced_oscillator")),
+    (
+        "forced_oscillator",
+        {"omega": 2.0, "damping": 0.4, "amplitude": 0.5, "drive": 1.1},
+        lambda: sw.scenes.scene("forced_oscillator:omega=2.0,damping=0.4,amplitude=0.5,drive=1.1"),
+    ),
+    ("bouncing_ball", {}, lambda: scene_of("bouncing_ball")),
+    ("sliding_block", {"friction": 2.0, "start": 4.0}, lambda: sw.scenes.scene("sliding_block:friction=2.0,speed=4.0")),
+    ("sticking_block", {}, lambda: scene_of("sticking_block")),
+    ("sticking_block", {"friction": 0.31}, lambda: sw.scenes.scene("sticking_block:friction=0.31")),
+]
+
+
+def truths(folder: Path, change: Any = None) -> dict[str, float]:
+    """The largest difference between the page's exact solution and the scene's, by scene."""
+    times = [np.linspace(0.0, make().horizon, 200) for _, _, make in FORMULAS]
+    told = in_node(
+        TRUTH, folder, [[name, values, t.tolist()] for (name, values, _), t in zip(FORMULAS, times, strict=True)], change
+    )
+    most: dict[str, float] = {}
+    for (name, _, make), t, got in zip(FORMULAS, times, told, strict=True):
+        v, y = make().exact(t)
+        wanted = np.concatenate([v.reshape(len(t), -1), y.reshape(len(t), -1)], axis=1)
+        most[name] = max(most.get(name, 0.0), float(np.abs(np.array(got) - wanted).max()))
+    return most
+
+
+@needs_node
+def test_formulas_of_the_motion_are_those_of_the_scenes(tmp_path: Path) -> None:
+    """Values of some 5 at times of some 60: a rounding of the time alone is worth 60·5·2⁻⁵³, and there are some dozens."""
+    most = truths(tmp_path)
+    assert set(most) == {name for name, offer in sliders.OFFERS.items() if offer.truth}
+    assert max(most.values()) < 50 * 60 * 5 * 2.0**-53
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("right", "mistake", "scene"),
+    [
+        ("(v0 + d * w * y0) / free", "v0 / free", "forced_oscillator"),
+        ("const rest = swing < last ? friction", "const rest = swing < last ? 0", "sticking_block"),
+        ("let up = e * g * fall;", "let up = g * fall;", "bouncing_ball"),
+        ("0.5 * friction * moving", "friction * moving", "sliding_block"),
+    ],
+)
+def test_wrong_formulas_are_noticed(right: str, mistake: str, scene: str, tmp_path: Path) -> None:
+    most = truths(tmp_path, ("truths", right, mistake))
+    assert {name for name, error in most.items() if error > 1e-3} == {scene}
+
+
+@needs_node
+def test_a_run_with_small_steps_is_the_truth(tmp_path: Path) -> None:
+    """Where there is an exact solution the page's own is as near as it claims; in chaos it says until when it is known.
+
+    The two runs agree to 1e-6 in the scene's scales, so the finer one, of order 8, is nearer than that.
+    """
+    names = ["clover", "kepler", "chain", "pendulum", "conical_pendulum", "dzhanibekov", "figure_eight", "arenstorf"]
+    told = in_node(
+        """
+told = given.map((name) => {
+  const it = scene(name);
+  const truth = new Truth(it, it.dt, {}, new Trajectory(it, "rk4", it.dt, {}).set);
+  const steps = Math.min(Math.floor(it.horizon / it.dt), 2000);
+  const { v, y } = truth.go(steps);
+  return [steps, [...v], [...y], truth.until];
+});
+""",
+        tmp_path,
+        names,
+    )
+    for name, (steps, v, y, until) in zip(names, told, strict=True):
+        scene = scene_of(name)
+        assert until is None, name  # JSON has no infinity
+        assert scene.exact is not None
+        true = [np.ravel(block) for block in scene.exact(np.array([steps * scene.dt]))]
+        apart = max(np.linalg.norm(a - b) / s for a, b, s in zip((v, y), true, data_of(name)["scales"], strict=True))
+        assert apart < 1e-6, (name, apart)
+
+
+@needs_node
+def test_the_true_motion_is_known_for_a_time_only_in_chaos(tmp_path: Path) -> None:
+    """Two runs of the double pendulum with other steps part; the errors that are shown end there."""
+    untils = in_node(
+        """
+const it = scene("double_pendulum");
+const race = new Race(it, ["false_euler", "rk4"], it.dt, {}, 5);
+race.advance(20000, Infinity);
+told = [race.truth.until, race.errors[1].filter((x) => x === null || Number.isNaN(x)).length, race.errors[1].length];
+""",
+        tmp_path,
+    )
+    until, unknown, samples = untils
+    assert 20.0 < until < 200.0
+    assert unknown > 0.3 * samples
+
+
+@needs_node
+def test_links_hold_numbers_to_the_bit(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    numbers = [0.1 + 0.2, 1 / 3, 5e-324, 1.7e308, *rng.normal(size=50)]
+    told = in_node(
+        """
+told = given.map((x) => bits(number(parse(format({ dt: x, name: "a b&c=d" })).dt, -1e309, 1e309, 0)));
+told.push(parse(format({ name: "a b&c=d#é" })).name);
+told.push(number("x", 0, 1, 0.5), number("7", 0, 1, 0.5), number(undefined, 0, 1, 0.25));
+told.push(format({ a: undefined, b: 1 }));
+""",
+        tmp_path,
+        numbers,
+    )
+    assert told[: len(numbers)] == [np.float64(x).view(np.uint64).item().to_bytes(8, "big").hex().lstrip("0") for x in numbers]
+    assert told[len(numbers) :] == ["a b&c=d#é", 0.5, 1, 0.25, "#b=1"]
+
+
+# ---- how the page is made
+
+
+def test_one_file_without_a_network() -> None:
+    text = page().html
+    assert len(text.encode()) < 600_000
+    assert "{{" not in text
+    assert "default-src 'none'" in text
+    assert not re.search(r"""(src|href)=["']?(?!data:)\w""", text)
+    assert not re.search(r"\b(fetch|XMLHttpRequest|WebSocket|importScripts)\b", script())
+    assert {path.stem for path in WEB.glob("*.js")} == set(MODULES)
+    assert not re.search(r"^(import|export) ", script(), re.MULTILINE)
+
+
+def test_sources_are_what_export_prints() -> None:
+    """Unpacked, a step is the text of ``export``, all of it."""
+    import base64
+    import zlib
+
+    found = data_of("energy_control")
+    sources = json.loads(zlib.decompress(base64.b64decode(found["packed"])))
+    scene = scene_of("energy_control")
+    step = sw.export(scene.system, "merson", "javascript", dt=scene.dt, v=scene.v, y=scene.y, control=scene.control, name="step")
+    assert sources[found["steps"]["merson"]] == step.source
+    assert "control" not in sources[found["steps"]["truth"]]
+
+
+def test_methods_have_the_colours_of_the_charts() -> None:
+    from stepwell.charts.style import look
+
+    for told in page().data["methods"]:
+        assert told["colour"] == look(sw.method(told["name"]))["color"]
+        assert re.fullmatch(r"#[0-9a-f]{6}", told["colour"])  # what the page can lighten
+
+
+@sw.system
+def own(t, v, y, *, stiffness=2.0, drag=0.25):  # type: ignore[no-untyped-def]
+    return -stiffness * y - drag * v
+
+
+def test_a_scene_of_ones_own() -> None:
+    scene = sw.Scene(own(), v=0.0, y=1.0, horizon=20.0, name="mine", title="</script><b>")
+    page = sw.explore(scene, methods=["rk4", "verlet", "false_euler"])
+    (told,) = page.data["scenes"]
+    assert [(s["name"], s["value"], s["low"], s["high"]) for s in told["sliders"]] == [
+        ("stiffness", 2.0, 0.0, 4.0),
+        ("drag", 0.25, 0.0, 0.5),
+    ]
+    assert set(told["steps"]) == {"rk4", "false_euler", "truth"}
+    assert "verlet needs forces" in told["refused"]["verlet"]
+    assert "</script><b>" not in page.html
+
+
+def test_saving_showing_and_notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    scene = sw.scenes.oscillator()
+    page = scene.explore(methods=["rk4"])
+    assert opened == [next(tmp_path.glob("stepwell-*.html")).as_uri()]
+    assert page == sw.explore("oscillator", methods=["rk4"])
+    assert page.save(tmp_path / "x.html").read_text(encoding="utf-8") == page.html
+    assert repr(page) == "<explorer of oscillator; 1 methods>"
+    frame = page._repr_html_()
+    assert frame.startswith("<iframe ")
+    assert frame.count('"') == 6
+    assert scene.explore(show=False) is not None
+    shell = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=1))
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    scene.explore(methods=["rk4"])
+    assert len(opened) == 1
+
+
+def test_wrong_calls_say_what_is_wrong(tmp_path: Path) -> None:
+    big = sw.scenes.scene("cloth")
+    twice = [sw.Scene(sw.Oscillator(), v=0.0, y=1.0, horizon=1.0)] * 2
+    for call, error, text in (
+        (lambda: sw.explore("clowder"), sw.errors.UnknownNameError, "clowder"),
+        (lambda: sw.explore([]), sw.errors.ArgumentError, "scenes: expected at least one"),
+        (lambda: sw.explore(3), sw.errors.StepwellError, "scenes: "),
+        (lambda: sw.explore(twice), sw.errors.ArgumentError, "scenes: .* different names, got 'unnamed' twice"),
+        (lambda: sw.explore(big), sw.errors.UnsupportedError, "scenes: no method steps cloth in a page: "),
+        (lambda: sw.explore("clover", methods=["rk5"]), sw.errors.UnknownNameError, "rk5"),
+        (lambda: page().save(tmp_path / "x.txt"), sw.errors.ArgumentError, "path: expected a file ending in .html or .htm"),
+        (lambda: twice[0].explore(show=1), sw.errors.DTypeError, "show: expected True or False"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(error, match=text):
+            call()
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "page.html"
+    assert cli.main(["explore", "--scene", "pendulum", "--only", "-o", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"written": [str(path)], "scenes": ["pendulum"]}
+    assert "Pendulum, 90" in path.read_text(encoding="utf-8")
+    assert cli.main(["explore", "--scene", "nothing"]) == 2
+    assert "nothing" in capsys.readouterr().err
+
+
+def test_a_scene_with_other_parameters_has_sliders_of_its_step() -> None:
+    """What is offered for a built-in scene is meant for it as it is made without arguments."""
+    found = of_scene(sw.scenes.kepler(e=0.5), [sw.method("rk4")])
+    assert [each["name"] for each in found["sliders"]] == ["Gm_0", "Gm_1", "softening"]
+    assert found["truth"] is None
