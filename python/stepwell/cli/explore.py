@@ -37,8 +37,20 @@ def command(args: argparse.Namespace) -> None:
         written.write(args.output, page.save)
     else:
         written.files.append(str(page.open()))
+    told = [
+        {
+            "name": each["name"],
+            "title": each["title"],
+            "methods": [name for name in each["steps"] if name != "truth"],
+            "sliders": [slider["name"] for slider in each["sliders"]],
+        }
+        for each in page.data["scenes"]
+    ]
     if args.json:
-        show.print_json({"written": written.files, "scenes": [each.name for each in page.scenes]})
+        show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": told})
     else:
+        print(f"a page of {len(page.html.encode()) / 1000:.0f} kB with {len(told)} scene{'s' * (len(told) > 1)}:")
+        for each in told:
+            print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {', '.join(each['sliders']) or 'none'}")
         print("\n".join(written.notes()))
     written.close()

@@ -1,6 +1,6 @@
 // The page: its controls, the loop over frames, and the link that holds its state.
 
-import { drawMotion } from "./motion.js";
+import { drawMotion, widened, zoomFor } from "./motion.js";
 import { colourOf, palette, sheet } from "./palette.js";
 import { drawCurves, drawPhase, drawRoots, energyRange, errorRange } from "./plots.js";
 import { Race } from "./race.js";
@@ -116,18 +116,26 @@ function showLimits() {
   const box = byId("limits");
   box.replaceChildren();
   const never = [];
+  const marks = [];
   page.limits.forEach((limit, i) => {
     const lane = LANES[i].toUpperCase();
     if (limit === 0) never.push(`${lane} for no dt`);
     const at = limit ? place(limit) : NaN;
     if (!(at >= 0 && at <= 1)) return;
-    const mark = document.createElement("span");
-    mark.textContent = `${lane} ${short(limit)}`;
-    mark.title = `${methods.get(page.keys[i]).title} is stable up to dt = ${limit}`;
-    mark.style.left = `${100 * at}%`;
-    mark.style.color = colours()[i];
-    if (i && page.limits[0] && Math.abs(place(page.limits[0]) - at) < 0.16) mark.style.transform = place(page.limits[0]) <= at ? "translateX(8%)" : "translateX(-108%)";
-    box.append(mark);
+    const same = marks.find((mark) => Math.abs(mark.limit / limit - 1) < 1e-9);
+    if (same) same.lanes += `, ${lane}`;
+    else marks.push({ limit, at, lanes: lane, colour: colours()[i] });
+  });
+  marks.sort((a, b) => a.at - b.at);
+  marks.forEach((mark, i) => {
+    const node = document.createElement("span");
+    node.textContent = `${mark.lanes} ${short(mark.limit)}`;
+    node.title = `stable up to dt = ${mark.limit}`;
+    node.style.left = `${100 * mark.at}%`;
+    node.style.color = mark.colour;
+    if (marks.length === 2) node.className = i ? "east" : "west";
+    else if (mark.at > 0.9 || mark.at < 0.1) node.className = mark.at > 0.5 ? "west" : "east";
+    box.append(node);
   });
   if (never.length) {
     const note = document.createElement("span");
@@ -247,6 +255,7 @@ function restart() {
   const { scene } = page;
   page.race = new Race(scene, page.keys, page.dt, page.values, TRAIL * scene.rate * 2 ** page.speed);
   page.target = 0;
+  page.zoom = 1; // pictures zoom out while a run goes on, and in again with the next
   page.told = ["", ""];
   say("truth", page.race.truth.about);
   showLimits();
@@ -345,18 +354,36 @@ function announce(text) {
 
 // ---- frames
 
+// States as pictures show them: while it plays, on the way from the state before a step to that after it.
+function displayed() {
+  const { race } = page;
+  const now = [...race.runs, race.truth.go(race.k)];
+  const share = page.playing ? Math.min(Math.max(page.target / page.dt - race.k, 0), 1) : 1;
+  return now.map((state, i) => {
+    const before = race.before[i];
+    if (!state || !before || share === 1 || state.lost) return state;
+    const between = (name) => Float64Array.from(state[name], (x, j) => before[name][j] + share * (x - before[name][j]));
+    return { lost: null, v: between("v"), y: between("y") };
+  });
+}
+
 function draw() {
   const { race, scene } = page;
   const look = palette();
   const own = colours();
-  const truth = race.truth.go(race.k);
+  const shown = displayed();
+  const truth = shown[2];
   const pair = scene.phases[page.phase];
-  scene.sampled = page.dt * 8 > TRAIL * scene.rate * 2 ** page.speed / 8; // so few states that each gets a dot
+  const dots = page.dt * 64 > TRAIL * scene.rate * 2 ** page.speed; // so few states that each gets a dot
+  const seen = race.runs.flatMap((run, i) => (run.lost === null ? [race.trails[i][0], run] : [])).filter(Boolean);
+  page.zoom = Math.max(page.zoom, zoomFor(scene.ranges, seen));
+  const ranges = widened(scene.ranges, page.zoom);
   race.runs.forEach((run, i) => {
     const lane = LANES[i];
-    const mine = { ...look, colour: own[i] };
-    drawMotion(sheet(byId(`motion-${lane}`)), scene, run, truth, race.trails[i], mine);
-    drawPhase(sheet(byId(`phase-${lane}`)), scene, pair, run, truth, race.trails[i], mine);
+    const mine = { ...look, colour: own[i], dots };
+    const trail = shown[i] === run ? race.trails[i] : [...race.trails[i].slice(0, race.trailEvery === 1 ? -1 : undefined), shown[i]];
+    drawMotion(sheet(byId(`motion-${lane}`)), scene, ranges, shown[i], truth, trail, mine);
+    drawPhase(sheet(byId(`phase-${lane}`)), ranges, pair, shown[i], truth, trail, mine);
   });
   const dash = page.keys[0] === page.keys[1] ? [6, 5] : [];
   const lines = (of) => [

@@ -247,14 +247,50 @@ function turned([a, b, c, d], [x, y, z]) {
   ];
 }
 
+// Whether a number of a state is outside the picture.
+function outside(block, ranges) {
+  return ranges.some(([low, high], i) => Math.abs(block[i] - (low + high) / 2) > 0.75 * (high - low) && high > low);
+}
+
+// The most that pictures zoom out.
+const MAX_ZOOM = 4;
+
+// How far pictures zoom out to show states: 1, or more if numbers of one leave their ranges, in steps.
+export function zoomFor(ranges, states) {
+  let most = 1;
+  for (const name of ["v", "y"]) {
+    ranges[name].forEach(([low, high], i) => {
+      const half = (high - low) / 2;
+      if (!(half > 0)) return;
+      for (const state of states) {
+        const away = Math.abs(state[name][i] - (low + high) / 2) / half;
+        if (away > 1.1 * most && away < Infinity) most = away;
+      }
+    });
+  }
+  return most > 1.1 ? Math.min(MAX_ZOOM, Math.ceil(2 * most) / 2) : 1;
+}
+
+// Ranges that are this many times as wide, about the same middle.
+export function widened(ranges, zoom) {
+  const wide = ([low, high]) => [(low + high - zoom * (high - low)) / 2, (low + high + zoom * (high - low)) / 2];
+  return zoom === 1 ? ranges : { v: ranges.v.map(wide), y: ranges.y.map(wide) };
+}
+
 // Draw a run: its state, the true one if that is known, its trail; look has the colours.
-export function drawMotion(paper, scene, run, truth, trail, look) {
+export function drawMotion(paper, scene, allRanges, run, truth, trail, look) {
   const state = run.lost === null ? run : (trail.at(-1) ?? run);
   const block = state.y.length ? "y" : "v";
-  const ranges = scene.ranges[block];
+  const ranges = allRanges[block];
   const range = [Math.min(...ranges.map((each) => each[0])), Math.max(...ranges.map((each) => each[1]))];
   const { motion } = scene;
   if (run.lost !== null) paper.pen.globalAlpha = 0.35;
   KINDS[motion.kind](paper, { y: state[block], truth, trail, motion, range, ranges, block }, look);
   paper.pen.globalAlpha = 1;
+  if (motion.kind !== "pendulum" && motion.kind !== "body" && outside(state[block], ranges)) {
+    paper.pen.fillStyle = look.bad;
+    paper.pen.font = look.font;
+    paper.pen.textAlign = "center";
+    paper.pen.fillText("outside the picture", paper.width / 2, paper.height - 6);
+  }
 }

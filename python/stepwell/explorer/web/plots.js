@@ -34,8 +34,8 @@ const padded = ([low, high]) => {
   return [low - by, high + by];
 };
 
-export function drawPhase({ pen, width, height }, scene, pair, run, truth, trail, look) {
-  const [right, up] = [pair.right, pair.up].map(([block, i]) => padded(scene.ranges[block][i]));
+export function drawPhase({ pen, width, height }, ranges, pair, run, truth, trail, look) {
+  const [right, up] = [pair.right, pair.up].map(([block, i]) => padded(ranges[block][i]));
   const x = (z) => MARGIN + ((z - right[0]) / (right[1] - right[0])) * (width - 2 * MARGIN);
   const y = (z) => height - MARGIN - ((z - up[0]) / (up[1] - up[0])) * (height - 2 * MARGIN);
   const of = (state) => {
@@ -51,7 +51,7 @@ export function drawPhase({ pen, width, height }, scene, pair, run, truth, trail
   pen.globalAlpha = 0.7;
   const path = trail.map(of);
   curve(pen, path);
-  if (scene.sampled) {
+  if (look.dots) {
     pen.fillStyle = look.colour;
     for (const point of path) if (point) pen.fillRect(point[0] - 1.25, point[1] - 1.25, 2.5, 2.5);
   }
@@ -137,7 +137,7 @@ export function drawCurves({ pen, width, height }, t, curves, range, look, log) 
   pen.fillStyle = look.faint;
   pen.textAlign = "right";
   for (const tick of ticks(low, high, 5)) {
-    if (log && !Number.isInteger(tick)) continue;
+    if (log && !Number.isInteger(tick)) continue; // there is no room for parts of a decade
     pen.strokeStyle = look.line;
     curve(pen, [[left, y(tick)], [width - 8, y(tick)]]);
     pen.fillText(log ? power(tick) : written(tick), left - 6, y(tick) + 4);
@@ -184,7 +184,13 @@ export function energyRange(energies, most) {
 
 // The decades that errors of two runs go through.
 export function errorRange(errors) {
-  let low = 0;
-  for (const values of errors) for (const value of values) if (value > 0) low = Math.min(low, Math.floor(Math.log10(value)));
-  return [Math.max(Math.min(low, -2), -17) - 0.3, 1.3];
+  let [low, high] = [0, 0];
+  for (const values of errors) {
+    for (const value of values) {
+      if (!(value > 0 && value < Infinity)) continue;
+      low = Math.min(low, Math.floor(Math.log10(value)));
+      high = Math.max(high, Math.ceil(Math.log10(value)));
+    }
+  }
+  return [Math.max(Math.min(low, -2), -17) - 0.3, Math.min(high, 4) + 0.5];
 }

@@ -32,9 +32,9 @@ export class Truth {
 
   // What it is, in words.
   get about() {
-    if (this.formula) return "the formula of the motion";
+    if (this.formula) return "by its formula";
     if (!this.fine) return "not known";
-    return `a run with steps of ${Number(this.fine.dt.toPrecision(3))}`;
+    return `by a run with steps of ${Number(this.fine.dt.toPrecision(3))}`;
   }
 
   lose(t) {
@@ -68,6 +68,8 @@ export function apart(a, b, scales) {
   return Math.max(scales[0] > 0 ? v / scales[0] : v, scales[1] > 0 ? y / scales[1] : y);
 }
 
+const copied = ({ v, y }) => ({ v: Float64Array.from(v), y: Float64Array.from(y) });
+
 export class Race {
   // keys are the names of the two methods; trail is the time that a trail goes back.
   constructor(scene, keys, dt, values, trail) {
@@ -83,6 +85,7 @@ export class Race {
     this.errors = [[], []];
     this.trailEvery = Math.max(1, Math.round(trail / dt / MAX_TRAIL));
     this.trails = [[], []];
+    this.before = [null, null, null]; // both runs and the true motion before the last step
     this.record();
     this.leave();
   }
@@ -95,6 +98,7 @@ export class Race {
   // Steps of both, up to a step and until a time of the clock; returns whether the step was reached.
   advance(to, deadline) {
     while (this.k < to && !this.over) {
+      if (this.k === to - 1) this.before = [...this.runs, this.truth.go(this.k)].map((state) => (state && !state.lost ? copied(state) : null));
       this.k += 1;
       for (const run of this.runs) run.step();
       if (this.k % this.every === 0) this.record();
@@ -126,7 +130,7 @@ export class Race {
     this.runs.forEach((run, i) => {
       if (run.lost !== null) return;
       const trail = this.trails[i];
-      trail.push({ v: Float64Array.from(run.v), y: Float64Array.from(run.y) });
+      trail.push(copied(run));
       if (trail.length > MAX_TRAIL) trail.shift();
     });
   }
