@@ -389,7 +389,6 @@ def test_a_scene_of_ones_own() -> None:
 def test_saving_showing_and_notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     scene = sw.scenes.oscillator()
     page = scene.explore(methods=["rk4"])
@@ -424,7 +423,7 @@ def test_wrong_calls_say_what_is_wrong(tmp_path: Path) -> None:
             call()
 
 
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "page.html"
     assert cli.main(["explore", "--scene", "pendulum", "--only", "-o", str(path), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -433,6 +432,14 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert (scene["name"], scene["sliders"]) == ("pendulum", ["omega", "start", "push"])
     assert set(scene["methods"]) == {m.name for m in sw.methods()}
     assert "Pendulum, 90" in path.read_text(encoding="utf-8")
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert cli.main(["explore", "--scene", "oscillator", "--only"]) == 0
+    (file,) = tmp_path.glob("stepwell-*.html")
+    assert opened == [file.as_uri()]
+    assert "  oscillator: Undamped oscillator; 14 methods; sliders omega, start\n" in (out := capsys.readouterr().out)
+    assert str(file) in out
     assert cli.main(["explore", "--scene", "nothing"]) == 2
     assert "nothing" in capsys.readouterr().err
 

@@ -183,8 +183,7 @@ def test_a_blow_up_is_said_with_its_step(browser: Any, file: str) -> None:
         assert not shown.complaints
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 768, 1280])
+@pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (360, "dark"), (768, "light"), (1280, "dark")])
 def test_nothing_is_cut_off(browser: Any, file: str, width: int, scheme: str) -> None:
     window = {"viewport": {"width": width, "height": 780}, "color_scheme": scheme, "has_touch": width == 360}
     with Shown(browser, file, "#scene=forced_oscillator&play=0&at=50", **window) as shown:

@@ -51,6 +51,7 @@ def command(args: argparse.Namespace) -> None:
     else:
         print(f"a page of {len(page.html.encode()) / 1000:.0f} kB with {len(told)} scene{'s' * (len(told) > 1)}:")
         for each in told:
-            print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {', '.join(each['sliders']) or 'none'}")
+            sliders = ", ".join(each["sliders"]) or "none"
+            print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {sliders}")
         print("\n".join(written.notes()))
     written.close()

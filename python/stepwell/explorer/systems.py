@@ -96,28 +96,43 @@ def energy(system: Any) -> dict[str, Any] | None:
     return None
 
 
+#: What the points or numbers of a block are called, by the system's kernel.
+OWNERS = {"nbody": "body", "chain": "mass"}
+
+#: Systems of a single point whose blocks have no axis for points.
+SINGLE_POINTS = ("pendulum_3d", "restricted_three_body")
+
+
 def phase_planes(system: System) -> list[dict[str, Any]]:
-    """The pairs that a phase plane may have: a label, and block and index of what goes to the right and up."""
+    """The pairs that a phase plane may have: a label, and block, index and symbol of what goes to the right and up."""
     v_shape, y_shape = system.v_shape, system.y_shape
     if system.kernel == "rigid_body":
-        pairs = [(0, 1), (1, 2), (2, 0)]
-        return [{"label": f"ω{b + 1} over ω{a + 1}", "right": ["v", a], "up": ["v", b]} for a, b in pairs]
+        return [_plane(f"ω{a}", ("v", a - 1), f"ω{b}", ("v", b - 1)) for a, b in ((1, 2), (2, 3), (3, 1))]
     if v_shape == y_shape:
-        names = [_coordinate(i, y_shape) for i in range(min(prod(y_shape), MAX_PHASE_POINTS * max(1, *y_shape[1:], 1)))]
-        return [{"label": f"v over y{name}", "right": ["y", i], "up": ["v", i]} for i, name in enumerate(names)]
-    block = "y" if prod(y_shape) else "v"
-    last = min(1, prod(y_shape or v_shape) - 1)
-    return [{"label": f"{block}[{last}] over {block}[0]", "right": [block, 0], "up": [block, last]}]
+        most = MAX_PHASE_POINTS * (y_shape[1] if len(y_shape) == 2 else 1)
+        return [_own_plane(system, i) for i in range(min(prod(y_shape), most))]
+    block, shape = ("y", y_shape) if prod(y_shape) else ("v", v_shape)
+    last = min(1, prod(shape) - 1)
+    return [_plane(f"{block}[0]", (block, 0), f"{block}[{last}]", (block, last))]
 
 
-def _coordinate(i: int, shape: tuple[int, ...]) -> str:
-    if not shape:
-        return ""
-    if len(shape) == 1:
-        return f" of number {i + 1}"
-    point, axis = divmod(i, shape[1])
-    which = AXES[axis] if shape[1] <= len(AXES) else str(axis + 1)
-    return f", {which}" if shape[0] == 1 else f", {which} of number {point + 1}"
+def _own_plane(system: System, i: int) -> dict[str, Any]:
+    """The velocity of a coordinate over that coordinate."""
+    shape, axis = system.y_shape, None
+    if len(shape) == 2:
+        count, (which, axis) = shape[0], divmod(i, shape[1])
+    elif system.kernel in SINGLE_POINTS:
+        count, which, axis = 1, 0, i
+    else:
+        count, which = prod(shape), i
+    symbol = "y" if axis is None else AXES[axis] if axis < len(AXES) else f"y[{axis}]"
+    owner = OWNERS.get(system.kernel, "number" if axis is None else "point")
+    return _plane(symbol, ("y", i), "v", ("v", i), f", {owner} {which + 1}" if count > 1 else "")
+
+
+def _plane(right: str, of_right: tuple[str, int], up: str, of_up: tuple[str, int], whose: str = "") -> dict[str, Any]:
+    sides = {"right": [*of_right, right], "up": [*of_up, up]}
+    return {"label": f"{up} over {right}{whose}", **sides}
 
 
 def numbers(values: Any) -> list[float]:

@@ -157,9 +157,6 @@ async function load(name, words = {}) {
   const scene = data.scenes.find((each) => each.name === name) ?? data.scenes[0];
   scene.sources ??= await unpack(scene.packed);
   page.scene = scene;
-  scene.phases.forEach((pair) => {
-    for (const side of ["right", "up"]) pair[side].symbol = `${pair[side][0]}${scene.ranges[pair[side][0]].length > 1 ? ` ${pair[side][1] + 1}` : ""}`;
-  });
   const known = Object.keys(scene.steps).filter((key) => key !== "truth");
   const asked = [words.a ?? page.keys[0], words.b ?? page.keys[1]];
   page.keys = asked.map((key, i) => (known.includes(key) ? key : known.includes(["false_euler", "rk4"][i]) ? ["false_euler", "rk4"][i] : known[0]));
@@ -171,9 +168,15 @@ async function load(name, words = {}) {
   fillControls(known);
   restart();
   const at = Math.round(number(words.at, 0, MAX_RESTORED, 0));
-  page.target = at * page.dt;
-  if (at) page.race.advance(at, Infinity);
-  await frameOnce();
+  const { race } = page;
+  while (race === page.race && !race.over && !race.advance(at, performance.now() + 50)) {
+    say("clock", `step ${race.k} of ${at}`);
+    await new Promise((done) => setTimeout(done));
+  }
+  if (race !== page.race) return; // another scene was chosen meanwhile
+  page.target = race.k * page.dt;
+  draw();
+  tell();
 }
 
 function option(value, text, reason) {
@@ -280,6 +283,7 @@ function setDt(dt) {
 }
 
 function play(on) {
+  if (!page.race) return;
   page.playing = on && !page.race.over;
   say("play", page.playing ? "Pause" : "Play");
   byId("play").setAttribute("aria-pressed", String(page.playing));
@@ -330,7 +334,12 @@ function writeLink() {
 }
 
 async function readLink() {
+  if (typeof DecompressionStream === "undefined") {
+    say("about", "This browser is too old for this page: it cannot unpack the steps (DecompressionStream, in browsers since 2023).");
+    return;
+  }
   const given = parse(location.hash);
+  play(false);
   await load(given.scene ?? data.scenes[0].name, given);
   play(given.play === undefined ? !still.matches && given.at === undefined : given.play !== "0");
 }
@@ -466,17 +475,13 @@ function frame(now) {
   }
 }
 
-async function frameOnce() {
-  draw();
-  tell();
-}
-
 // ---- what users do
 
 function listen() {
   const on = (id, event, does) => byId(id).addEventListener(event, does);
   on("scene", "change", async (event) => {
     const going = page.playing;
+    play(false);
     await load(event.target.value, { a: page.keys[0], b: page.keys[1] });
     play(going);
   });

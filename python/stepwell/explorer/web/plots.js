@@ -73,9 +73,9 @@ export function drawPhase({ pen, width, height }, ranges, pair, run, truth, trai
   pen.fillStyle = look.faint;
   pen.font = look.font;
   pen.textAlign = "right";
-  pen.fillText(pair.right.symbol, width - 5, Math.min(Math.max(y(0) - 5, 14), height - 6));
+  pen.fillText(pair.right[2], width - 5, Math.min(Math.max(y(0) - 5, 14), height - 6));
   pen.textAlign = "left";
-  pen.fillText(pair.up.symbol, Math.min(Math.max(x(0) + 5, 4), width - 24), 13);
+  pen.fillText(pair.up[2], Math.min(Math.max(x(0) + 5, 4), width - 24), 13);
 }
 
 // The unit circle and roots, which may be far outside.
