@@ -195,6 +195,74 @@ def test_energies_are_those_of_the_systems(tmp_path: Path) -> None:
         assert got == pytest.approx(wanted, rel=1e-13, abs=100 * 100 * 2.0**-53), name
 
 
+#: Scenes that are no built-in ones, sliders of their steps' parameters, and the same system with these.
+SLID: list[tuple[sw.Scene, dict[str, float], sw.System]] = [
+    (sw.scenes.kepler(e=0.5), {"Gm_0": 0.75, "softening": 0.5}, sw.NBody([0.75, 0.5], force="newton", softening=0.5)),
+    (
+        sw.Scene(sw.NBody([1.0, 2.0], force="newton", G=4.0), v=0.0, y=[[0.0, 1.0], [1.0, 0.0]], horizon=1.0),
+        {"Gm_1": 12.0},
+        sw.NBody([1.0, 3.0], force="newton", G=4.0),
+    ),
+    (
+        sw.scenes.triple_pendulum(),
+        {"masses_2": 2.0, "gravity": 0.5},
+        sw.Rods([1.0, 1.0, 2.0], sw.scenes.triple_pendulum().system.rods, 1.0, gravity=0.5),  # type: ignore[attr-defined]
+    ),
+    (sw.Scene(sw.Oscillator(2.0), v=0.0, y=1.0, horizon=9.0), {"omega": 3.0}, sw.Oscillator(3.0)),
+    (
+        sw.Scene(sw.Oscillator(2.0, 0.1, form="physical"), v=0.0, y=1.0, horizon=9.0),
+        {"omega": 3.0, "damping": 0.2},
+        sw.Oscillator(3.0, 0.2, form="physical"),
+    ),
+    (
+        sw.Scene(
+            sw.Springs([(0, 1), (1, 2)], stiffness=9.0, rest=1.0, masses=2.0, fixed=[0], gravity=(0.0, -9.81)),
+            v=0.0,
+            y=[[0.0, 1.0], [1.0, 0.0], [2.0, 0.5]],
+            horizon=1.0,
+        ),
+        {"stiffness": 4.0, "masses": 3.0, "gravity_1": -2.0},
+        sw.Springs([(0, 1), (1, 2)], stiffness=4.0, rest=1.0, masses=3.0, fixed=[0], gravity=(0.0, -2.0)),
+    ),
+    (
+        sw.Scene(sw.Chain(8), v=0.0, y=np.arange(8.0), horizon=9.0),
+        {"stiffness": 2.0, "mass": 0.5},
+        sw.Chain(8, stiffness=2.0, mass=0.5),
+    ),
+    (sw.scenes.symmetric_top(), {"inertia_0": 1.5}, None),
+]
+
+
+@needs_node
+@pytest.mark.parametrize("forgotten", [pytest.param(False, id="as they are"), pytest.param(True, id="a mistake")])
+def test_sliders_of_any_step_move_its_energy_too(forgotten: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sums of a few products; with links forgotten, which is the mistake, not one energy is right but that of a canonical form."""
+    if forgotten:
+        monkeypatch.setattr(sliders, "_links", lambda system: {})
+    rng = np.random.default_rng(4)
+    asked, wanted = [], []
+    for scene, values, system in SLID:
+        found = of_scene(scene, [sw.method("rk4"), sw.method("standard_euler")])
+        assert set(values) <= {slider["name"] for slider in found["sliders"]}
+        if system is None:
+            inertia = np.array(found["energy"]["inertia"])
+            inertia[0] = values["inertia_0"]
+            system = sw.RigidBody(inertia)
+        v, y = rng.normal(size=scene.v.shape), rng.normal(size=scene.y.shape)
+        asked.append([found, values, np.ravel(v).tolist(), np.ravel(y).tolist()])
+        wanted.append(float(system.sized(v, y).energy(v, y)))
+    told = in_node(
+        """
+told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings(scene, values, {}).e, v, y));
+""",
+        tmp_path,
+        asked,
+    )
+    right = [got == pytest.approx(want, rel=1e-12) for got, want in zip(told, wanted, strict=True)]
+    canonical = [isinstance(system, sw.Oscillator) and system.form == "canonical" for _, _, system in SLID]
+    assert right == (canonical if forgotten else [True] * len(SLID))
+
+
 @needs_node
 @pytest.mark.parametrize(
     ("right", "mistake", "scenes"),
@@ -448,4 +516,5 @@ def test_a_scene_with_other_parameters_has_sliders_of_its_step() -> None:
     """What is offered for a built-in scene is meant for it as it is made without arguments."""
     found = of_scene(sw.scenes.kepler(e=0.5), [sw.method("rk4")])
     assert [each["name"] for each in found["sliders"]] == ["Gm_0", "Gm_1", "softening"]
+    assert found["sliders"][1]["targets"] == {"m.Gm[1]": 1.0, "e.Gm[1]": 1.0, "e.masses[1]": 1.0}
     assert found["truth"] is None

@@ -54,7 +54,7 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
     parameters = parameters_of(sources[next(iter(names.values()))])
     offer = sliders.OFFERS.get(scene.name, sliders.Offer())
     known = built_in(scene)
-    own = offer.sliders if known else sliders.generic(parameters, scene.control is not None)
+    own = offer.sliders if known else sliders.generic(scene.system, parameters, scene.control is not None)
     truth = offer.truth if known else None
     v, y = ([float(each) for each in block.reshape(-1)] for block in (scene.v, scene.y))
     energy = systems.energy(scene.system)

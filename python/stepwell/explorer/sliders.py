@@ -182,27 +182,64 @@ def rope() -> Scene:
     )
 
 
-def generic(parameters: Mapping[str, Any], controlled: bool) -> tuple[Slider, ...]:
-    """Sliders for the parameters of any step: numbers, and elements of short lists.
-
-    Under a control only its gain can be slid: the energy that it keeps is that of the start with the other parameters as they
-    are.
-    """
-    found: list[Slider] = []
-    for name, value in parameters.items():
-        if name in ("dt", "t0", "control_target") or (controlled and name != "control_gain"):
-            continue
-        if not isinstance(value, list):
-            found.append(_around(name, f"m.{name}", value))
-        elif len(value) <= MAX_ELEMENTS and not any(isinstance(each, list) for each in value):
-            found += [_around(f"{name}_{i}", f"m.{name}[{i}]", each) for i, each in enumerate(value)]
-    return tuple(found[:MAX_SLIDERS])
-
+#: Which numbers of the energy belong to a parameter of a step, by the system's kernel: path and factor; {} stands for an index.
+LINKS: dict[str, dict[str, tuple[tuple[str, float], ...]]] = {
+    "chain": {"stiffness": (("e.stiffness{}", 1.0),), "mass": (("e.mass{}", 1.0),)},
+    "nbody": {"Gm": (("e.Gm{}", 1.0), ("e.masses{}", 1.0)), "softening": (("e.softening", 1.0),)},
+    "oscillator": {"omega": (("e.omega", 1.0),)},
+    "particles": {"masses": (("e.masses{}", 1.0),), "gravity": (("e.gravity{}", 1.0),)},
+    "pendulum": {"omega": (("e.omega", 1.0),)},
+    "pendulum_3d": {"gravity": (("e.gravity[2]", -1.0),)},
+    "restricted_three_body": {"mu": (("e.mu", 1.0),)},
+    "rigid_body": {"inertia": (("e.inertia{}", 1.0),), "weight": (("e.weight", 1.0),), "centre": (("e.centre{}", 1.0),)},
+    "rods": {"masses": (("e.masses{}", 1.0),)},
+    "springs": {name: ((f"e.{name}{{}}", 1.0),) for name in ("stiffness", "rest", "masses", "gravity")},
+}
 
 #: The longest list of which each element has a slider, and the most sliders that are made without being asked for.
 MAX_ELEMENTS, MAX_SLIDERS = 4, 12
 
 
-def _around(name: str, path: str, value: float) -> Slider:
+def generic(system: Any, parameters: Mapping[str, Any], controlled: bool) -> tuple[Slider, ...]:
+    """Sliders for the parameters of any step: numbers, elements of short lists, and long lists as a whole.
+
+    Under a control only its gain can be slid: the energy that it keeps is that of the start with the other parameters as they
+    are.
+    """
+    links = _links(system)
+    found: list[Slider] = []
+    for name, value in parameters.items():
+        if name in ("dt", "t0", "control_target") or (controlled and name != "control_gain"):
+            continue
+        label = name.replace("_", " ")
+
+        def targets(index: str, scalar: bool = False, name: str = name) -> dict[str, float]:
+            others = {path.format("[*]" if scalar else index): factor for path, factor in links.get(name, ())}
+            return {f"m.{name}{index}": 1.0} | others
+
+        if not isinstance(value, list):
+            found.append(_around(name, label, value, targets("", scalar=True)))
+        elif any(isinstance(each, list) for each in value):
+            continue
+        elif len(value) <= MAX_ELEMENTS:
+            found += [_around(f"{name}_{i}", f"{label} {i + 1}", x, targets(f"[{i}]")) for i, x in enumerate(value)]
+        else:
+            found.append(Slider(name, f"{label}, ×", 0.0, 2.0, targets("[*]"), relative=True))
+    return tuple(found[:MAX_SLIDERS])
+
+
+def _links(system: Any) -> dict[str, tuple[tuple[str, float], ...]]:
+    """Those of a system; G·m is not a mass where G is not 1, and in canonical form ω₀ is not in the energy."""
+    own = LINKS.get(system.kernel, {})
+    if system.kernel == "nbody":
+        return own | {"Gm": (("e.Gm{}", 1.0), ("e.masses{}", 1.0 / float(system.G) if system.G else 0.0))}
+    if system.kernel == "oscillator" and system.form == "canonical":
+        return {}
+    if system.kernel == "rods":
+        return own | {"gravity": ((f"e.gravity[{system.y_shape[1] - 1}]", -1.0),)}
+    return own
+
+
+def _around(name: str, label: str, value: float, targets: dict[str, float]) -> Slider:
     low, high = (min(0.0, 2.0 * value), max(0.0, 2.0 * value)) if value else (-1.0, 1.0)
-    return Slider(name, name.replace("_", " "), low, high, {path: 1.0})
+    return Slider(name, label, low, high, targets)

@@ -81,11 +81,11 @@ def energy(system: Any) -> dict[str, Any] | None:
             free = [float(i not in set(np.asarray(system.fixed).tolist())) for i in range(system.n)]
             pull = {"gravity": np.zeros(system.y_shape[1]) if system.gravity is None else system.gravity}
             springs = {"stiffness": _each(system.stiffness, len(system.pairs)), "rest": _each(system.rest, len(system.pairs))}
-            masses = [m * moves for m, moves in zip(_each(system.masses, system.n), free, strict=True)]
             return {
                 "kind": "springs",
                 "pairs": np.asarray(system.pairs).tolist(),
-                "masses": masses,
+                "masses": _each(system.masses, system.n),
+                "free": free,
                 **springs,
                 **{name: numbers(each) for name, each in pull.items()},
             }

@@ -6,7 +6,7 @@ import { drawCurves, drawPhase, drawRoots, energyRange, errorRange } from "./plo
 import { Race } from "./race.js";
 import { radius, stableTwo } from "./roots.js";
 import { format, number, parse } from "./state.js";
-import { Trajectory, unpack } from "./trajectory.js";
+import { MAX_ROOTS, Trajectory, unpack } from "./trajectory.js";
 
 const LANES = ["a", "b"];
 // Milliseconds of a frame in which steps are made; the rest of its 16 is for drawing.
@@ -66,7 +66,8 @@ function tellRoots(i) {
   const run = page.race.runs[i];
   const most = radius(page.roots[i]);
   const lane = LANES[i].toUpperCase();
-  if (!Number.isFinite(most)) return `${lane}, z-plane: no roots`;
+  if (run.count > MAX_ROOTS) return `${lane}, z-plane: ${run.count} roots, too many to find in a frame`;
+  if (!Number.isFinite(most)) return `${lane}, z-plane: the state is not finite`;
   const size = most > 10 ? short(most, 3) : most.toFixed(5);
   if (!page.scene.linear) return `${lane}, z-plane, at this state: largest |z| = ${size}`;
   const growth = most - 1;

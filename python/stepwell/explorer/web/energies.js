@@ -47,10 +47,11 @@ export const ENERGIES = {
     return 0.5 * (v[0] * v[0] + v[1] * v[1]) - 0.5 * (y[0] * y[0] + across) - pull;
   },
 
-  // A fixed particle has the mass 0 here.
+  // A fixed particle has no part in kinetic energy and gravity: free is 0 for it, and 1 for others.
   springs(p, v, y) {
     const dim = p.gravity.length;
-    let sum = ENERGIES.falling(p, v, y);
+    const moved = p.masses.map((mass, i) => mass * p.free[i]);
+    let sum = ENERGIES.falling({ masses: moved, gravity: p.gravity }, v, y);
     p.pairs.forEach(([i, j], k) => {
       let square = 0;
       for (let c = 0; c < dim; c++) square += (y[dim * j + c] - y[dim * i + c]) ** 2;

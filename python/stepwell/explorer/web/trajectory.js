@@ -49,6 +49,9 @@ export function put(root, path, value, relative) {
 // A state that is this many times as large as at the start counts as blowing up, though it is still finite.
 const BLOWN_UP = 1e6;
 
+// The most eigenvalues that are found; their cost grows with the third power, and they are found some times a second.
+export const MAX_ROOTS = 40;
+
 export class Trajectory {
   // key is the name of a method, or "truth"; values are those of sliders, by name.
   constructor(scene, key, dt, values) {
@@ -145,8 +148,14 @@ export class Trajectory {
     return Array.from({ length: n }, (_, row) => columns.map((column) => column[row]));
   }
 
+  // The numbers of a state.
+  get count() {
+    return (this.s[this.slot]?.length ?? 0) + this.y.length;
+  }
+
+  // The eigenvalues of a step at this state; none once it is not finite, or of a state of more than MAX_ROOTS numbers.
   roots() {
-    return this.lost === null ? eigenvalues(this.jacobian()) : [];
+    return this.lost === null && this.count <= MAX_ROOTS ? eigenvalues(this.jacobian()) : [];
   }
 }
 
