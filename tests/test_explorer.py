@@ -236,7 +236,7 @@ SLID: list[tuple[sw.Scene, dict[str, float], sw.System]] = [
 @needs_node
 @pytest.mark.parametrize("forgotten", [pytest.param(False, id="as they are"), pytest.param(True, id="a mistake")])
 def test_sliders_of_any_step_move_its_energy_too(forgotten: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sums of a few products; with links forgotten, which is the mistake, not one energy is right but that of a canonical form."""
+    """Sums of a few products. With links forgotten, the mistake, no energy is right but that of a canonical form."""
     if forgotten:
         monkeypatch.setattr(sliders, "_links", lambda system: {})
     rng = np.random.default_rng(4)
