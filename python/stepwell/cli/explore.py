@@ -49,9 +49,11 @@ def command(args: argparse.Namespace) -> None:
     if args.json:
         show.print_json({"written": written.files, "bytes": len(page.html.encode()), "scenes": told})
     else:
-        print(f"a page of {len(page.html.encode()) / 1000:.0f} kB with {len(told)} scene{'s' * (len(told) > 1)}:")
+        size = f"{len(page.html.encode()) / 1000:.0f} kB"
+        print(f"a page of {size} for browsers since 2023, with {len(page.methods)} methods; scene{'s' * (len(told) > 1)}:")
         for each in told:
             sliders = ", ".join(each["sliders"]) or "none"
             print(f"  {each['name']}: {each['title']}; {len(each['methods'])} methods; sliders {sliders}")
-        print("\n".join(written.notes()))
+        for note in written.notes():
+            print(note)
     written.close()

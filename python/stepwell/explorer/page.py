@@ -27,7 +27,10 @@ from .data import of_method, of_scene
 WEB = Path(__file__).resolve().parent / "web"
 
 #: The modules of the page, each after those that it imports.
-MODULES = ("roots", "energies", "truths", "trajectory", "state", "palette", "motion", "plots", "race", "app")
+MODULES = (
+    *("roots", "energies", "truths", "trajectory", "state", "palette", "texts", "limits", "slider"),
+    *("motion", "plots", "race", "pictures", "app"),
+)
 
 #: Height of the page in a notebook, in pixels.
 NOTEBOOK_HEIGHT = 900

@@ -1,14 +1,14 @@
 // The page: its controls, the loop over frames, and the link that holds its state.
 
-import { drawMotion, widened, zoomFor } from "./motion.js";
-import { colourOf, palette, sheet } from "./palette.js";
-import { drawCurves, drawPhase, drawRoots, energyRange, errorRange } from "./plots.js";
+import { limitOf } from "./limits.js";
+import { colourOf, palette } from "./palette.js";
+import { draw, tell } from "./pictures.js";
 import { Race } from "./race.js";
-import { radius, stableTwo } from "./roots.js";
+import { sliderOf } from "./slider.js";
 import { format, number, parse } from "./state.js";
-import { MAX_ROOTS, Trajectory, unpack } from "./trajectory.js";
+import { LANES, byId, say, short } from "./texts.js";
+import { Trajectory, unpack } from "./trajectory.js";
 
-const LANES = ["a", "b"];
 // Milliseconds of a frame in which steps are made; the rest of its 16 is for drawing.
 const STEP_BUDGET = 8;
 // The longest time between two frames that counts, in seconds: a page in the background does not run on.
@@ -22,7 +22,6 @@ const DT_ENDS = [1 / 100, 20];
 // The most steps that a link restores.
 const MAX_RESTORED = 200_000;
 
-const byId = (id) => document.getElementById(id);
 const data = JSON.parse(byId("data").textContent);
 const methods = new Map(data.methods.map((each) => [each.name, each]));
 const still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -42,78 +41,13 @@ const page = {
   framesMs: [],
 };
 
-// ---- texts
-
-const short = (x, digits = 4) => {
-  if (!Number.isFinite(x)) return "–";
-  const size = Math.abs(x);
-  if (size !== 0 && (size >= 1e5 || size < 1e-3)) return x.toExponential(2).replace("e+", "e");
-  return String(Number(x.toPrecision(digits)));
-};
-
-function say(id, text) {
-  const node = byId(id);
-  if (node.textContent !== text) node.textContent = text;
-}
-
-function fate(run) {
-  if (run.lost !== null) return `Blew up: after step ${run.lost} (t = ${short(run.lost * run.dt)}) the state is no longer finite.`;
-  if (run.large !== null) return `Blowing up: since step ${run.large} (t = ${short(run.large * run.dt)}) the state is over a million times as large as at the start.`;
-  return "";
-}
-
-function tellRoots(i) {
-  const run = page.race.runs[i];
-  const most = radius(page.roots[i]);
-  const lane = LANES[i].toUpperCase();
-  if (run.count > MAX_ROOTS) return `${lane}, z-plane: ${run.count} roots, too many to find in a frame`;
-  if (!Number.isFinite(most)) return `${lane}, z-plane: the state is not finite`;
-  const size = most > 10 ? short(most, 3) : most.toFixed(5);
-  if (!page.scene.linear) return `${lane}, z-plane, at this state: largest |z| = ${size}`;
-  const growth = most - 1;
-  const word = growth > 1e-9 ? `unstable, grows by ${short(100 * growth, 2)} % a step` : growth < -1e-9 ? "stable, dies away" : "stable, neither grows nor dies";
-  return run.lost === null ? `${lane}, z-plane: largest |z| = ${size}, ${word}` : `${lane}, z-plane`;
-}
-
 // ---- stability limits on the slider of dt
-
-// The frequency of the fastest swing of an undamped scene, by which a method's own limit is divided.
-function fastest() {
-  const { m } = page.race.runs[0];
-  if (page.scene.limit === "oscillator") return m.omega;
-  const n = m.mass.length;
-  return 2 * Math.sqrt(m.stiffness[0] / m.mass[0]) * Math.sin((0.5 * Math.PI * n) / (n + 1));
-}
-
-// The step above which a method is unstable: 0 if it is for every step, null if the page does not know.
-function limitOf(key) {
-  const { scene, values } = page;
-  if (scene.limit === null) return null;
-  if (scene.limit !== "scan") return methods.get(key).limit / fastest();
-  const stable = (dt) => {
-    const [[a, b], [c, d]] = new Trajectory(scene, key, dt, values).jacobian();
-    return stableTwo((a + d) / 2, a * d - b * c);
-  };
-  let dt = scene.dt / 200;
-  if (!stable(dt)) return 0;
-  while (stable(dt * 1.05)) {
-    dt *= 1.05;
-    if (dt > 1000 * scene.dt) return null;
-  }
-  let [low, high] = [dt, dt * 1.05];
-  for (let i = 0; i < 40; i++) {
-    const middle = 0.5 * (low + high);
-    if (stable(middle)) low = middle;
-    else high = middle;
-  }
-  return low;
-}
 
 const ends = () => DT_ENDS.map((share) => share * page.scene.dt);
 const place = (dt) => Math.log(dt / ends()[0]) / Math.log(ends()[1] / ends()[0]);
 
 function showLimits() {
-  page.limits = page.keys.map(limitOf);
+  page.limits = page.keys.map((key) => limitOf(page.scene, methods.get(key), page.values, page.race.runs[0].m));
   const box = byId("limits");
   box.replaceChildren();
   const never = [];
@@ -176,8 +110,7 @@ async function load(name, words = {}) {
   }
   if (race !== page.race) return; // another scene was chosen meanwhile
   page.target = race.k * page.dt;
-  draw();
-  tell();
+  show();
 }
 
 function option(value, text, reason) {
@@ -203,47 +136,16 @@ function fillControls(known) {
   });
   byId("phase").replaceChildren(...scene.phases.map((pair, i) => option(i, pair.label)));
   byId("phase").value = page.phase;
-  byId("sliders").replaceChildren(...scene.sliders.map(sliderOf));
+  byId("sliders").replaceChildren(...scene.sliders.map(sliderFor));
   showNumbers();
 }
 
-// Decimals of a slider: some three hundred places from end to end.
-const stepOf = (slider) => 10 ** Math.floor(Math.log10((slider.high - slider.low) / 300));
-
-function sliderOf(slider) {
-  const label = document.createElement("label");
-  label.className = "slide";
-  label.htmlFor = `p-${slider.name}`; // else it would be the label of the output in it
-  if (slider.about) label.title = slider.about;
-  const output = document.createElement("output");
-  const span = document.createElement("span");
-  span.append(slider.label, output);
-  const input = document.createElement("input");
-  Object.assign(input, { id: label.htmlFor, type: "range", min: slider.low, max: slider.high, step: "any", value: page.values[slider.name] });
-  input.dataset.name = slider.name;
-  const step = stepOf(slider);
-  output.textContent = short(page.values[slider.name]);
-  const set = (value) => {
-    const near = Math.abs(value - slider.value) < 3 * step; // the scene's own value is easy to find again
-    page.values[slider.name] = near ? slider.value : Number((Math.round(value / step) * step).toPrecision(8));
-    output.textContent = short(page.values[slider.name]);
+function sliderFor(slider) {
+  return sliderOf(slider, page.values[slider.name], (value) => {
+    page.values[slider.name] = value;
     restart();
     wanted();
-  };
-  input.addEventListener("input", () => set(Number(input.value)));
-  // With step "any" arrow keys would move it by one unit of the parameter.
-  input.addEventListener("keydown", (event) => {
-    const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
-    if (!by) return;
-    event.preventDefault();
-    const from = page.values[slider.name];
-    const to = Math.min(Math.max(from + 4 * by * step, slider.low), slider.high);
-    input.value = to;
-    set(to);
-    input.value = page.values[slider.name];
   });
-  label.append(span, input);
-  return label;
 }
 
 function showNumbers() {
@@ -257,7 +159,7 @@ function showNumbers() {
 // Begin anew with the settings as they are.
 function restart() {
   const { scene } = page;
-  page.race = new Race(scene, page.keys, page.dt, page.values, TRAIL * scene.rate * 2 ** page.speed);
+  page.race = new Race(scene, page.keys, page.dt, page.values, trailTime());
   page.target = 0;
   page.zoom = 1; // pictures zoom out while a run goes on, and in again with the next
   page.told = ["", ""];
@@ -364,89 +266,12 @@ function announce(text) {
 
 // ---- frames
 
-// States as pictures show them: while it plays, on the way from the state before a step to that after it.
-function displayed() {
-  const { race } = page;
-  const now = [...race.runs, race.truth.go(race.k)];
-  const share = page.playing ? Math.min(Math.max(page.target / page.dt - race.k, 0), 1) : 1;
-  return now.map((state, i) => {
-    const before = race.before[i];
-    if (!state || !before || share === 1 || state.lost) return state;
-    const between = (name) => Float64Array.from(state[name], (x, j) => before[name][j] + share * (x - before[name][j]));
-    return { lost: null, v: between("v"), y: between("y") };
-  });
-}
+// The time that trails go back, which is longer at a higher speed.
+const trailTime = () => TRAIL * page.scene.rate * 2 ** page.speed;
 
-function draw() {
-  const { race, scene } = page;
-  const look = palette();
-  const own = colours();
-  const shown = displayed();
-  const truth = shown[2];
-  const pair = scene.phases[page.phase];
-  const dots = page.dt * 64 > TRAIL * scene.rate * 2 ** page.speed; // so few states that each gets a dot
-  const seen = race.runs.flatMap((run, i) => (run.lost === null ? [race.trails[i][0], run] : [])).filter(Boolean);
-  page.zoom = Math.max(page.zoom, zoomFor(scene.ranges, seen));
-  const ranges = widened(scene.ranges, page.zoom);
-  race.runs.forEach((run, i) => {
-    const lane = LANES[i];
-    const mine = { ...look, colour: own[i], dots };
-    const trail = shown[i] === run ? race.trails[i] : [...race.trails[i].slice(0, race.trailEvery === 1 ? -1 : undefined), shown[i]];
-    drawMotion(sheet(byId(`motion-${lane}`)), scene, ranges, shown[i], truth, trail, mine);
-    drawPhase(sheet(byId(`phase-${lane}`)), ranges, pair, shown[i], truth, trail, mine);
-  });
-  const dash = page.keys[0] === page.keys[1] ? [6, 5] : [];
-  const lines = (of) => [
-    { values: of[0], colour: own[0], dash: [] },
-    { values: of[1], colour: own[1], dash },
-  ];
-  const begin = Math.abs(race.energies[0][0]) || 1;
-  const energies = [{ values: race.energies[2], colour: look.truth, thick: 3 }, ...lines(race.energies)];
-  if (scene.energy) drawCurves(sheet(byId("energy")), race.t, energies, energyRange(race.energies, 2 * begin), look, false);
-  else blank("energy", "the page has no formula for the energy of this system", look);
-  if (race.truth.until > 0) drawCurves(sheet(byId("error")), race.t, lines(race.errors), errorRange(race.errors), look, true);
-  else blank("error", "the true motion is not known", look);
-}
-
-function blank(id, text, look) {
-  const { pen, width, height } = sheet(byId(id));
-  pen.fillStyle = look.faint;
-  pen.font = look.font;
-  pen.textAlign = "center";
-  pen.fillText(text, width / 2, height / 2);
-}
-
-function tell() {
-  const { race, scene } = page;
-  const look = palette();
-  const own = colours();
-  race.runs.forEach((run, i) => {
-    const lane = LANES[i];
-    const method = methods.get(page.keys[i]);
-    page.roots[i] = run.roots();
-    drawRoots(sheet(byId(`roots-${lane}`)), page.roots[i], { ...look, colour: own[i] });
-    say(`roots-told-${lane}`, tellRoots(i));
-    const error = race.errors[i].at(-1);
-    const parts = [`order ${method.order}`, `${method.evaluations} evaluation${method.evaluations > 1 ? "s" : ""} a step`];
-    if (Number.isFinite(error)) parts.push(`error ${short(error, 2)}`);
-    const energy = race.energies[i].at(-1);
-    if (Number.isFinite(energy)) parts.push(`energy ${short(energy, 5)}`);
-    say(`told-${lane}`, parts.join(" · "));
-    const ends = fate(run);
-    if (ends && ends !== page.told[i]) announce(`${method.title}: ${ends}`);
-    page.told[i] = ends;
-    say(`lost-${lane}`, ends);
-    byId(`motion-${lane}`).setAttribute("aria-label", `Motion of ${scene.title} by ${method.title} at t = ${short(run.t)}. ${ends}`);
-    byId(`phase-${lane}`).setAttribute("aria-label", `Phase plane, ${scene.phases[page.phase].label}, by ${method.title}`);
-    byId(`roots-${lane}`).setAttribute("aria-label", tellRoots(i));
-  });
-  const behind = page.playing && page.slow ? ", slowed" : "";
-  say("clock", `t = ${short(race.k * race.dt)}, step ${race.k}${behind}`);
-  byId("energy").setAttribute("aria-label", `Energy over time: A ${short(race.energies[0].at(-1))}, B ${short(race.energies[1].at(-1))}, true ${short(race.energies[2].at(-1))}`);
-  byId("error").setAttribute("aria-label", `Error over time: A ${short(race.errors[0].at(-1), 2)}, B ${short(race.errors[1].at(-1), 2)}`);
-  const until = race.truth.until;
-  const about = until < Infinity && until > 0 ? `, known up to t = ${short(until)}` : "";
-  say("truth", race.truth.about + about);
+function show() {
+  draw(page, colours(), trailTime());
+  tell(page, methods, colours(), announce);
 }
 
 function frame(now) {
@@ -463,10 +288,10 @@ function frame(now) {
     if (page.race.over) play(false);
   }
   if (page.playing || page.dirty) {
-    draw();
+    draw(page, colours(), trailTime());
     if (began - (page.seldom || 0) > SELDOM || page.dirty) {
       page.seldom = began;
-      tell();
+      tell(page, methods, colours(), announce);
     }
     page.dirty = false;
     if (page.playing) {
@@ -505,7 +330,7 @@ function listen() {
   on("speed", "input", (event) => {
     page.speed = Number(event.target.value);
     showNumbers();
-    page.race.trailEvery = Math.max(1, Math.round((TRAIL * page.scene.rate * 2 ** page.speed) / page.dt / 500));
+    page.race.trailBack(trailTime());
     wanted();
   });
   on("play", "click", () => {

@@ -83,11 +83,16 @@ export class Race {
     this.t = [];
     this.energies = [[], [], []]; // of both runs and of the true motion
     this.errors = [[], []];
-    this.trailEvery = Math.max(1, Math.round(trail / dt / MAX_TRAIL));
+    this.trailBack(trail);
     this.trails = [[], []];
     this.before = [null, null, null]; // both runs and the true motion before the last step
     this.record();
     this.leave();
+  }
+
+  // Let trails go back so long: a state is kept every so many steps.
+  trailBack(time) {
+    this.trailEvery = Math.max(1, Math.round(time / this.dt / MAX_TRAIL));
   }
 
   // Whether neither run goes on.

@@ -1,0 +1,35 @@
+// The step above which a method is unstable, for the marks on the slider of dt.
+
+import { stableTwo } from "./roots.js";
+import { Trajectory } from "./trajectory.js";
+
+// The frequency of the fastest swing of an undamped scene, by which a method's own limit is divided.
+function fastest(scene, m) {
+  if (scene.limit === "oscillator") return m.omega;
+  const n = m.mass.length;
+  return 2 * Math.sqrt(m.stiffness[0] / m.mass[0]) * Math.sin((0.5 * Math.PI * n) / (n + 1));
+}
+
+// The step above which a method is unstable: 0 if it is for every step, null if the page does not know.
+// Method is what the page knows of it, values are those of the sliders, m the parameters of a step.
+export function limitOf(scene, method, values, m) {
+  if (scene.limit === null) return null;
+  if (scene.limit !== "scan") return method.limit / fastest(scene, m);
+  const stable = (dt) => {
+    const [[a, b], [c, d]] = new Trajectory(scene, method.name, dt, values).jacobian();
+    return stableTwo((a + d) / 2, a * d - b * c);
+  };
+  let dt = scene.dt / 200;
+  if (!stable(dt)) return 0;
+  while (stable(dt * 1.05)) {
+    dt *= 1.05;
+    if (dt > 1000 * scene.dt) return null;
+  }
+  let [low, high] = [dt, dt * 1.05];
+  for (let i = 0; i < 40; i++) {
+    const middle = 0.5 * (low + high);
+    if (stable(middle)) low = middle;
+    else high = middle;
+  }
+  return low;
+}
