@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import stepwell as sw
 from abroad import bits, executed
 from stepwell.explorer import sliders
@@ -69,8 +70,7 @@ def data_of(name: str) -> dict[str, Any]:
     return found
 
 
-def no_node() -> bool:
-    return shutil.which("node") is None
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="there is no Node here")
 
 
 def in_node(script: str, folder: Path, given: Any = None, change: tuple[str, str, str] | None = None) -> Any:
@@ -91,6 +91,7 @@ import { TRUTHS } from "./truths.js";
 import { Trajectory, unpack, settings } from "./trajectory.js";
 import { Race, Truth, apart } from "./race.js";
 import { format, number, parse } from "./state.js";
+import { limitOf } from "./limits.js";
 const { scenes, given } = JSON.parse(readFileSync("given.json", "utf8"));
 for (const scene of scenes) scene.sources = await unpack(scene.packed);
 const scene = (name) => scenes.find((each) => each.name === name);

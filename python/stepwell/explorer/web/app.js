@@ -1,6 +1,6 @@
 // The page: its controls, the loop over frames, and the link that holds its state.
 
-import { limitOf } from "./limits.js";
+import { limitOf, marksOf } from "./limits.js";
 import { colourOf, palette } from "./palette.js";
 import { draw, tell } from "./pictures.js";
 import { Race } from "./race.js";
@@ -48,36 +48,7 @@ const place = (dt) => Math.log(dt / ends()[0]) / Math.log(ends()[1] / ends()[0])
 
 function showLimits() {
   page.limits = page.keys.map((key) => limitOf(page.scene, methods.get(key), page.values, page.race.runs[0].m));
-  const box = byId("limits");
-  box.replaceChildren();
-  const never = [];
-  const marks = [];
-  page.limits.forEach((limit, i) => {
-    const lane = LANES[i].toUpperCase();
-    if (limit === 0) never.push(`${lane} for no dt`);
-    const at = limit ? place(limit) : NaN;
-    if (!(at >= 0 && at <= 1)) return;
-    const same = marks.find((mark) => Math.abs(mark.limit / limit - 1) < 1e-9);
-    if (same) same.lanes += `, ${lane}`;
-    else marks.push({ limit, at, lanes: lane, colour: colours()[i] });
-  });
-  marks.sort((a, b) => a.at - b.at);
-  marks.forEach((mark, i) => {
-    const node = document.createElement("span");
-    node.textContent = `${mark.lanes} ${short(mark.limit)}`;
-    node.title = `stable up to dt = ${mark.limit}`;
-    node.style.left = `${100 * mark.at}%`;
-    node.style.color = mark.colour;
-    if (marks.length === 2) node.className = i ? "east" : "west";
-    else if (mark.at > 0.9 || mark.at < 0.1) node.className = mark.at > 0.5 ? "west" : "east";
-    box.append(node);
-  });
-  if (never.length) {
-    const note = document.createElement("span");
-    note.className = "none";
-    note.textContent = `stable: ${never.join(", ")}`;
-    box.append(note);
-  }
+  byId("limits").replaceChildren(...marksOf(page.limits, place, colours()));
 }
 
 // ---- the scene and its controls

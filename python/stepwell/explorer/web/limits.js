@@ -1,6 +1,7 @@
 // The step above which a method is unstable, for the marks on the slider of dt.
 
 import { stableTwo } from "./roots.js";
+import { LANES, short } from "./texts.js";
 import { Trajectory } from "./trajectory.js";
 
 // The frequency of the fastest swing of an undamped scene, by which a method's own limit is divided.
@@ -32,4 +33,37 @@ export function limitOf(scene, method, values, m) {
     else high = middle;
   }
   return low;
+}
+
+// Elements for the marks of both methods' limits: place tells where on the slider a step is, from 0 to 1.
+export function marksOf(limits, place, colours) {
+  const never = [];
+  const marks = [];
+  limits.forEach((limit, i) => {
+    const lane = LANES[i].toUpperCase();
+    if (limit === 0) never.push(`${lane} for no dt`);
+    const at = limit ? place(limit) : NaN;
+    if (!(at >= 0 && at <= 1)) return;
+    const same = marks.find((mark) => Math.abs(mark.limit / limit - 1) < 1e-9);
+    if (same) same.lanes += `, ${lane}`;
+    else marks.push({ limit, at, lanes: lane, colour: colours[i] });
+  });
+  marks.sort((a, b) => a.at - b.at);
+  const nodes = marks.map((mark, i) => {
+    const node = document.createElement("span");
+    node.textContent = `${mark.lanes} ${short(mark.limit)}`;
+    node.title = `stable up to dt = ${mark.limit}`;
+    node.style.left = `${100 * mark.at}%`;
+    node.style.color = mark.colour;
+    if (marks.length === 2) node.className = i ? "east" : "west";
+    else if (mark.at > 0.9 || mark.at < 0.1) node.className = mark.at > 0.5 ? "west" : "east";
+    return node;
+  });
+  if (never.length) {
+    const note = document.createElement("span");
+    note.className = "none";
+    note.textContent = `stable: ${never.join(", ")}`;
+    nodes.push(note);
+  }
+  return nodes;
 }
