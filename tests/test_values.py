@@ -213,6 +213,11 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.explain(FREE, "merson", attempt=True),
         lambda: sw.explain(sw.Chain(1000), "rk4"),
     ],
+    "Explorer": [
+        lambda: sw.explore("oscillator", methods=["rk4"]),
+        lambda: sw.explore("oscillator", methods=["verlet"]),
+        lambda: sw.explore(["oscillator", "pendulum"], methods=["rk4"]),
+    ],
     "ExportedStep": [
         lambda: sw.export(FREE, "rk4", "c"),
         lambda: sw.export(FREE, "rk4", "rust"),

@@ -326,6 +326,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False},
     ),
     "explain bodies": (sw.explain, {"system": sw.NBody(), "method": "rk4", "members": 2, "control": sw.EnergyControl(0.1)}),
+    "explore": (sw.explore, {"scenes": "oscillator", "methods": ["rk4"]}),
     "export": (
         sw.export,
         {"system": sw.Oscillator([1.0, 2.0]), "method": "rk4", "language": "c", "dt": 0.1, "t0": 0.0, "v": 0.0, "y": 1.0}

@@ -16,7 +16,7 @@ from ..errors import StepwellError
 
 #: The commands, in the order of the help.
 COMMANDS = (
-    *("scenes", "methods", "run", "advise", "bench", "chart", "control", "criteria", "stability", "explain", "export"),
+    *("scenes", "methods", "run", "explore", "advise", "bench", "chart", "control", "criteria", "stability", "explain", "export"),
     *("figures", "paper"),
 )
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from ..methods import Method
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system
+
+if TYPE_CHECKING:
+    from ..explorer import Explorer
 
 #: How many times of the horizon give the exact solution's scale.
 SCALE_SAMPLES = 1001
@@ -138,6 +141,30 @@ class Scene(Value):
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+
+    def explore(self, *, methods: Any = None, show: bool = True) -> Explorer:
+        """Show the scene in the browser: two methods side by side, with sliders for the step and the parameters.
+
+        In a notebook the page is shown in the cell, if this is its last expression; no browser is opened then.
+
+        Args:
+            methods: names of the methods to choose from; all if None.
+            show: whether to open the browser.
+
+        Returns:
+            The page, an ``Explorer``, which can also be saved; see ``stepwell.explore``.
+
+        Raises:
+            ArgumentError: what was given and what was expected.
+            UnsupportedError: if no method steps the scene, or its steps are too long for a page.
+        """
+        from ..explorer.page import explore, in_notebook
+
+        show = _checks.flag("show", show)
+        page = explore(self, methods=methods)
+        if show and not in_notebook():
+            page.open()
+        return page
 
     def steps_for(self, dt: float) -> int:
         """The least number of steps of ``dt`` that reach the horizon.
