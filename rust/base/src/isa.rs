@@ -90,6 +90,15 @@ impl Level {
         self == Level::Baseline || self == Level::Neon && cfg!(all(target_arch = "aarch64", target_os = "linux"))
     }
 
+    /// The level whose instructions the interpreter's own loops use: of `Baseline`, which says that no machine code is written, the best
+    /// that this machine has.
+    pub fn of_loops(self) -> Level {
+        match self {
+            Level::Baseline => Level::available().pop().unwrap_or(self),
+            written => written,
+        }
+    }
+
     /// The levels that this machine has, ascending.
     pub fn available() -> Vec<Level> {
         Level::ALL.into_iter().filter(|l| l.here()).collect()

@@ -25,7 +25,7 @@ const EMULATOR: &str = "qemu-aarch64";
 const DISASSEMBLER: &str = "aarch64-linux-gnu-objdump";
 
 /// How many kernels are run with how many numbers of steps each, unless `STEPWELL_EMULATED` says how many.
-const KERNELS: u64 = 1500;
+const KERNELS: u64 = 1000;
 const STEPS: [usize; 3] = [1, 2, 7];
 
 /// To nearest; and upwards, with subnormal numbers taken for zero and every NaN replaced by one.
