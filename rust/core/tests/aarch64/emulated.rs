@@ -82,14 +82,14 @@ impl Case {
 }
 
 /// The compiled runner; None where there is no compiler or no emulator, and it has been said.
-fn runner() -> Option<PathBuf> {
+fn runner(files: &str) -> Option<PathBuf> {
     for program in [COMPILER, EMULATOR] {
         if !crate::has(program) {
             crate::skipped(&format!("there is no {program}"));
             return None;
         }
     }
-    let runner = Path::new(env!("CARGO_TARGET_TMPDIR")).join("aarch64-runner");
+    let runner = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("aarch64-{files}-runner"));
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/aarch64/runner.c");
     let compiled = Command::new(COMPILER).args(["-O1", "-Wall", "-Werror", "-static", "-o"]).args([&runner, &source]).output();
     let compiled = compiled.unwrap();
@@ -97,44 +97,91 @@ fn runner() -> Option<PathBuf> {
     Some(runner)
 }
 
+/// Runs all and compares with the interpreter; how many numbers are the same, or what is the first that is not. Tests that run at the same
+/// time use files of their own.
+fn compare(runner: &Path, cases: &[Case], files: &str) -> Result<usize, String> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let [from, to] = ["cases", "states"].map(|kind| folder.join(format!("aarch64-{files}-{kind}")));
+    let mut bytes = Vec::new();
+    cases.iter().for_each(|case| case.write(&mut bytes));
+    fs::write(&from, &bytes).unwrap();
+    let ran = Command::new(EMULATOR).args([runner, &from, &to]).output().unwrap();
+    let out = fs::read(&to).unwrap();
+    let mut numbers = out.as_chunks().0.iter().map(|bits| u64::from_le_bytes(*bits));
+    let mut compared = 0;
+    for Case { seed, body, assembled, inputs } in cases {
+        let (shape, lanes, steps) = (assembled.shape, assembled.shape.lanes(), inputs.steps);
+        let about = format!("seed {seed}, {shape:?}, {steps} steps");
+        let want = inputs.run(&Interpreter::new(body, lanes, Level::Baseline), &mut Vec::new());
+        for (at, want) in want.iter().enumerate() {
+            let Some(got) = numbers.next().map(f64::from_bits) else {
+                return Err(format!("{about}: {} {}", ran.status, String::from_utf8_lossy(&ran.stderr)));
+            };
+            if !same(*want, got) {
+                return Err(format!("{about}: state {}, lane {} is {got:?}, not {want:?}", at / lanes, at % lanes));
+            }
+            compared += 1;
+        }
+        if numbers.next() != Some(0) {
+            return Err(format!("{about}: registers that belong to the caller have changed"));
+        }
+    }
+    if !ran.status.success() || numbers.next().is_some() {
+        return Err(String::from_utf8_lossy(&ran.stderr).into_owned());
+    }
+    Ok(compared)
+}
+
 /// `STEPWELL_EMULATED` says how many kernels.
 #[test]
 fn random_bodies_have_the_bits_of_the_interpreter() {
-    let Some(runner) = runner() else { return };
+    let Some(runner) = runner("random") else { return };
     let kernels = std::env::var("STEPWELL_EMULATED").ok().and_then(|n| n.parse().ok()).unwrap_or(KERNELS);
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let (from, to) = (folder.join("aarch64-cases"), folder.join("aarch64-states"));
     let mut compared = 0;
     for first in (0..kernels).step_by(500) {
         let cases: Vec<Case> = (first..kernels.min(first + 500)).flat_map(Case::all).collect();
-        let mut bytes = Vec::new();
-        cases.iter().for_each(|case| case.write(&mut bytes));
-        fs::write(&from, &bytes).unwrap();
-        let ran = Command::new(EMULATOR).args([&runner, &from, &to]).output().unwrap();
-        let out = fs::read(&to).unwrap();
-        let mut numbers = out.as_chunks().0.iter().map(|bits| u64::from_le_bytes(*bits));
-        for case in cases {
-            let Case { seed, body, assembled, inputs } = case;
-            let shape = assembled.shape;
-            let lanes = shape.lanes();
-            let want = inputs.run(&Interpreter::new(&body, lanes, Level::Baseline), &mut Vec::new());
-            for (at, want) in want.iter().enumerate() {
-                let Some(got) = numbers.next().map(f64::from_bits) else {
-                    panic!("seed {seed}, {shape:?}: {} {}", ran.status, String::from_utf8_lossy(&ran.stderr));
-                };
-                let (s, lane, steps) = (at / lanes, at % lanes, inputs.steps);
-                assert!(
-                    same(*want, got),
-                    "seed {seed}, {shape:?}, {steps} steps: state {s}, lane {lane} is {got:?}, not {want:?}"
-                );
-                compared += 1;
-            }
-            assert_eq!(numbers.next(), Some(0), "seed {seed}: registers that belong to the caller have changed");
-        }
-        assert!(ran.status.success() && numbers.next().is_none(), "{}", String::from_utf8_lossy(&ran.stderr));
+        compared += compare(&runner, &cases, "random").unwrap_or_else(|wrong| panic!("{wrong}"));
     }
     println!("{kernels} kernels, {compared} numbers compared");
     assert!(compared as u64 > 20 * kernels);
+}
+
+/// Mistakes: what is written, which bits of a word say so, and a wrong word for these bits.
+const MISTAKES: [(&str, u32, u32, u32); 12] = [
+    ("a sum for a difference", 0xFFE0_FC00, 0x4EE0_D400, 0x4E60_D400),
+    ("less or equal for less", 0xFFE0_FC00, 0x6EE0_E400, 0x6E60_E400),
+    ("less for less or equal", 0xFFE0_FC00, 0x6E60_E400, 0x6EE0_E400),
+    ("a fused sum for a fused difference", 0xFFE0_FC00, 0x4EE0_CC00, 0x4E60_CC00),
+    ("a fused difference with the wrong sign, of one number", 0xFFE0_8000, 0x1F60_8000, 0x1F40_8000),
+    ("the other choice", 0xFFE0_FC00, 0x6E60_1C00, 0x6EE0_1C00),
+    ("the other place", 0xFFE0_FC00, 0x6EA0_1C00, 0x6EE0_1C00),
+    ("to the nearest whole number for downwards", 0xFFFF_FC00, 0x4E61_9800, 0x4E61_8800),
+    ("the sign moved down with the bits", 0xFF80_FC00, 0x6F00_0400, 0x4F00_0400),
+    ("one number in the first lane only", 0xFFFF_FC00, 0x4E08_0400, 0x5E08_0400),
+    ("rounding as the caller does", u32::MAX, 0xD51B_441F, 0xD503_201F),
+    ("a register of the caller not given back", u32::MAX, 0x6D41_2FEA, 0xD503_201F),
+];
+
+#[test]
+fn every_mistake_is_noticed() {
+    let Some(runner) = runner("mistakes") else { return };
+    for (what, bits, right, wrong) in MISTAKES {
+        assert_eq!(right & !bits, 0, "{what}");
+        // Few kernels show some of them: a wrong number may be lost in a choice.
+        let is_noticed = (0..300).step_by(60).any(|first| {
+            let mut made = 0;
+            let mut cases: Vec<Case> = (first..first + 60).flat_map(Case::all).collect();
+            for word in cases.iter_mut().flat_map(|case| case.assembled.code.as_chunks_mut().0) {
+                let old = u32::from_le_bytes(*word);
+                if old & bits == right {
+                    *word = (old ^ right ^ wrong).to_le_bytes();
+                    made += 1;
+                }
+            }
+            made > 0 && compare(&runner, &cases, "mistakes").is_err()
+        });
+        assert!(is_noticed, "{what}");
+    }
 }
 
 /// What kernels are made of. What is not here is not exact, or not the same on all machines.
