@@ -511,11 +511,12 @@ def level() -> str:
 
 @pytest.mark.skipif(len(sw.isa_levels()) < 2, reason="no machine code here")
 def test_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STEPWELL_KERNELS", "avx2")
+    asked, width, registers = ("neon", 2, 32) if "neon" in sw.isa_levels() else ("avx2", 4, 16)
+    monkeypatch.setenv("STEPWELL_KERNELS", asked)
     explained = sw.explain(sw.Oscillator(), "false_euler", members=1000)
     code = explained.code
     assert code is not None
-    assert (explained.level, explained.interpreted_because, code.width, code.registers) == ("avx2", None, 4, 16)
+    assert (explained.level, explained.interpreted_because, code.width, code.registers) == (asked, None, width, registers)
     assert explained.lanes == code.width * code.vectors * code.turns
     assert code.resident
     assert code.size > 50
