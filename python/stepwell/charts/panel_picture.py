@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .panel import Panel
 from .picture import COUNTED, ERRORS, draw_errors, known_to, name_curves, title_of

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: Orders for which a slope is drawn.
 SLOPES = (1, 2, 4)
 
+#: Letters in a line below the panels.
+NOTE = 190
+
 #: The strip of runs without a right digit, as a share of the height of the panels.
 STRIP = 0.1
 
@@ -230,7 +233,12 @@ def _text(figure: Figure, chart: WorkPrecision, time: str, unnamed: list[str]) -
     system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)} ({scene.section})"
     figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
     what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
-    refusals = " ".join(f"{title_of(name)} is refused: {reason}." for name, reason in chart.refused.items())
+    reasons: dict[str, list[str]] = {}
+    for name, reason in chart.refused.items():
+        reasons.setdefault(reason, []).append(title_of(name))
+    refusals = " ".join(
+        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} refused: {reason}." for reason, names in reasons.items()
+    )
     not_named = f" Not named: {', '.join(unnamed)}." if unnamed else ""
     notes = (
         f"In colour: cheapest for some error.{not_named} Error 1, no digit right: {scene.error}."
@@ -238,9 +246,9 @@ def _text(figure: Figure, chart: WorkPrecision, time: str, unnamed: list[str]) -
         "Unstable: not finite, or no digit right and a growing amplitude; a method's own marker is where that begins.",
         f"Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, the bar at a curve's end spans them.",
     )
-    lines = [*notes, *([refusals] if refusals else [])]
-    lines = [textwrap.shorten(line, 230, placeholder=" …") for line in lines]
-    figure.text(0.012, 0.012, "\n".join(lines), size=11, color=GREY, linespacing=1.4)
+    shortened = textwrap.shorten(refusals, 2 * NOTE, placeholder=" …")
+    lines = [*(textwrap.shorten(note, NOTE, placeholder=" …") for note in notes), *textwrap.wrap(shortened, NOTE)]
+    figure.text(0.012, 0.012, "\n".join(lines), size=10.5, color=GREY, linespacing=1.25)
 
 
 def known_to(chart: WorkPrecision) -> str:
