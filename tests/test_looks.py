@@ -97,3 +97,19 @@ def test_the_title_is_what_the_front_says():
     assert finding(chart) in chart.plot().texts[0].get_text()
     useless = sw.charts.work_precision("oscillator", ["standard_euler"], [20], tolerances=[])
     assert finding(useless) == "no method has a digit right"
+
+
+@pytest.mark.parametrize("scene", sw.scenes.scenes(), ids=lambda scene: scene.name)
+def test_a_run_is_drawn_in_one_line(scene, tmp_path):
+    run = scene.run("rk4", steps=3, every=1)
+    figure = run.plot(tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert f"{type(scene.system).__name__} by Runge-Kutta 4" in [text.get_text() for text in figure.texts]
+
+
+def test_what_cannot_be_drawn_is_said():
+    batch = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=5, every=1)
+    with pytest.raises(sw.errors.ArgumentError, match=r"expected a run of one member, got a batch of shape \(2,\)"):
+        batch.plot()
+    with pytest.raises(sw.errors.ArgumentError, match="expected two saved states or more, got 1; run with every="):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5).plot()
