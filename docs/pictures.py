@@ -28,8 +28,8 @@ IMAGES = DOCS / "images"
 ERRORS = (0.1, 1e-2, 1e-4, 1e-6, 1e-9)
 PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL)
 
-#: Colours of a picture: enough for lines and letters, and a fraction of the bytes. A map's shades and many methods want more.
-COLOURS, SHADES = 64, 256
+#: Colours of an example's picture, of few lines.
+COLOURS = 64
 #: The picture of an example has as many colours as fit into so many bytes.
 MOST_BYTES = 60 * 1024
 
@@ -37,13 +37,11 @@ MOST_BYTES = 60 * 1024
 MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4", "merson", "fehlberg_5")
 
 
-def write(name: str, figure: Figure, colours: int = COLOURS) -> None:
-    """Write a picture with a palette."""
+def write(name: str, figure: Figure) -> None:
+    """Write a picture with all its colours: a palette would merge methods."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", facecolor="white")
-    Image.open(drawn).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=colours).save(
-        IMAGES / name, optimize=True
-    )
+    Image.open(drawn).convert("RGB").save(IMAGES / name, optimize=True)
     print(f"docs/images/{name}")
 
 
@@ -307,13 +305,13 @@ if __name__ == "__main__":
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
     for name, panel in panels.items():
-        write(name, panel.plot(), SHADES)
+        write(name, panel.plot())
     write_best(chart for name, panel in panels.items() if name not in NO_ROWS for chart in panel.charts)
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))
     write("stability-curves.png", stability.plot(kind="curves"))
     for method in MAPS:
-        write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot(), SHADES)
+        write(f"stability-map-{method}.png", sw.charts.stability_map(method).plot())
     write("quaternion-norm.png", sw.charts.norm().plot())
     write("figures.png", sw.charts.figures().plot())
     write("powers.png", sw.charts.powers().plot())

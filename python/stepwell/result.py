@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .errors import UnsupportedError
 from .methods import Method
 from .reference.types import Whole
 from .systems import System
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Status(IntEnum):
@@ -273,6 +277,46 @@ class Run(Value):
         if self.force is not None:
             state["force"] = self.force
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw the motion and its energy error, and write the picture to ``path`` if given.
+
+        For errors of the state see ``stepwell.charts.run_picture``, which knows the exact solution of a scene.
+
+        Args:
+            path: the file; its ending says in which format.
+
+        Returns:
+            The figure; a notebook shows it.
+
+        Raises:
+            ArgumentError: if the run is of a batch, fewer than two states were saved, or there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
+        Example:
+            >>> import stepwell as sw
+            >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=1)
+            >>> figure = run.plot()
+        """
+        from .charts.runs import own_picture
+
+        return own_picture(self).plot(path)
+
+    def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
+        """Write an animation of the motion; its frames are the saved states.
+
+        Args:
+            path: the file, ending in .gif, .mp4 or .html.
+            seconds: how long it lasts, above zero.
+            fps: frames a second, above zero; fewer if fewer states were saved.
+
+        Raises:
+            ArgumentError: if the run is of a batch, fewer than two states were saved, or an argument is wrong.
+            UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
+        """
+        from .charts.runs import own_picture
+
+        own_picture(self).animate(path, seconds=seconds, fps=fps)
 
     def __repr__(self) -> str:
         told = dict(self._told())

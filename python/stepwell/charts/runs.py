@@ -182,6 +182,23 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
     return RunPicture(scene, run, energy_error, scale, None if scene.exact is None else scene.state_error(run))
 
 
+def own_picture(run: Run) -> RunPicture:
+    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state.
+
+    Raises:
+        ArgumentError: if the run is of a batch, or too little was saved.
+    """
+    if run.status.ndim:
+        raise ArgumentError(f"run: expected a run of one member, got a batch of shape {run.status.shape}; integrate one of them")
+    if len(run.t) < 2:
+        raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
+    system = run.system.uncontrolled
+    title = type(system).__name__
+    horizon = float(run.t[-1] - run.t[0])
+    scene = Scene(system, v=run.v[0], y=run.y[0], dt=run.dt, horizon=horizon, name=title, title=title)
+    return run_picture(scene, run)
+
+
 def _begins(scene: Scene, run: Run) -> bool:
     """Whether the first state is the scene's start, but for the rounding of a method that makes v from something else."""
     pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
