@@ -243,7 +243,8 @@ def _errors(chart: RunPicture, shown: Array) -> list[Panel]:
         known = powers[np.isfinite(powers)]
         if not known.size:
             continue
-        low, high = max(float(known.min()), float(known.max()) - 9.0) - 0.3, float(known.max()) + 0.3
+        high = float(known.max()) + 0.3
+        low = min(max(float(known.min()), float(known.max()) - 9.0) - 0.3, high - 2.0)
         line = {"data": encoded(np.where(powers >= low, powers, np.nan)), "colour": "#333"}
         rect = (0.64, 0.06 + 0.48 * k, 0.34, 0.4)
         panels.append(_series(f"{name}, relative", [line], chart.run.t[shown], (low, high), rect, log=True))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from ..systems import Chain
 from .runs import RunPicture
 from .style import FAMILIES, FONT, GREY, new_figure
 
@@ -141,7 +142,10 @@ def fixed(axes: Axes, chart: RunPicture, plane: tuple[int, int]) -> None:
     for name, at, _ in chart.fixed_points:
         x, y = (at[i] for i in plane)
         axes.plot([x], [y], linestyle="", marker="o", markersize=9.0 if name else 5.0, color=GREY, zorder=4)
-        axes.annotate(name, (x, y), (9, 7), textcoords="offset points", size=12, color=GREY, zorder=6)
+        low, high = axes.get_xlim()
+        side = -1 if x > 0.5 * (low + high) else 1  # towards the middle, where there is room
+        way = {"ha": "right" if side < 0 else "left", "textcoords": "offset points"}
+        axes.annotate(name, (x, y), (10 * side, 9), size=12, color=GREY, zorder=6, **way)
 
 
 def links(chart: RunPicture) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -191,7 +195,8 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
     for i in range(0 if many else bodies):
         look = body(chart, i)
         handles.append(Line2D([], [], **(look | {"linestyle": "-" if long else look["linestyle"]}), linewidth=1.4, markersize=8))
-        labels.append(f"body {i + 1}" if np.ptp(masses) == 0.0 else f"mass {masses[i]:g}")
+        alike = f"body {i + 1}" if bodies > 1 else chart.run.method.title
+        labels.append(alike if np.ptp(masses) == 0.0 else f"mass {masses[i]:g}")
     if chart.exact is not None:
         dashed = {"color": "black", "linewidth": 1.5, "linestyle": (0, (3, 1.5))}
         handles.append(Line2D([], [], **(dashed if long else EXACT)))
@@ -276,7 +281,8 @@ def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
         )
     axes.set_yticks([place * step for place in range(len(chosen))], [str(i + 1) for i in chosen.tolist()])
     axes.set_ylim(-1.15 * size, (len(chosen) - 1) * step + 1.15 * size)
-    axes.set_ylabel(f"coordinate; from line to line {step:.3g}")
+    what = "mass" if isinstance(chart.run.system, Chain) else "coordinate"
+    axes.set_ylabel(f"number of the {what}; from line to line {step:.3g}")
     over_time(axes, chart)
 
 

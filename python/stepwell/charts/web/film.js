@@ -91,7 +91,9 @@ function points(g, size, panel, now, film) {
   for (const body of panel.fixed) {
     const here = at(...body.at);
     disc(g, here, body.radius, body.colour);
-    if (body.name) words(g, body.name, here[0] + body.radius + 4, here[1] - body.radius - 2);
+    const side = here[0] > box.x + 0.5 * box.w ? -1 : 1; // towards the middle, where there is room
+    const align = side < 0 ? "right" : "left";
+    if (body.name) words(g, body.name, here[0] + side * (body.radius + 3), here[1] - body.radius - 5, "#555", align);
   }
   if (panel.radius > 0) {
     for (let i = 0; i < panel.count; i++) disc(g, place(i), panel.radius, panel.colours[i % panel.colours.length]);
