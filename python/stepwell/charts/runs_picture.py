@@ -144,7 +144,7 @@ def fixed(axes: Axes, chart: RunPicture, plane: tuple[int, int]) -> None:
         axes.plot([x], [y], linestyle="", marker="o", markersize=9.0 if name else 5.0, color=GREY, zorder=4)
         low, high = axes.get_xlim()
         side = -1 if x > 0.5 * (low + high) else 1  # towards the middle, where there is room
-        way = {"ha": "right" if side < 0 else "left", "textcoords": "offset points"}
+        way: dict[str, Any] = {"ha": "right" if side < 0 else "left", "textcoords": "offset points"}
         axes.annotate(name, (x, y), (10 * side, 9), size=12, color=GREY, zorder=6, **way)
 
 
