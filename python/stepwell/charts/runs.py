@@ -132,10 +132,10 @@ class RunPicture(Drawn, Value):
             ArgumentError: what was given and what was expected.
             UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
-        from . import film, runs_animation
+        from . import page_animation, runs_animation
 
         seconds, fps = runs_animation.need(path, seconds, fps)
-        write = film.write if Path(path).suffix.lower() == ".html" else runs_animation.write
+        write = page_animation.write if Path(path).suffix.lower() == ".html" else runs_animation.write
         write(self, path, seconds, fps)
 
     def summary(self) -> dict[str, Any]:

@@ -43,15 +43,19 @@ def write(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> No
 
 def page(chart: RunPicture, seconds: float, fps: float) -> str:
     """The page as text."""
-    data = json.dumps(film(chart, seconds, fps), ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
-    text = (WEB / "film.html").read_text(encoding="utf-8")
-    parts = {"SCRIPT": (WEB / "film.js").read_text(encoding="utf-8"), "TITLE": html.escape(chart.title), "DATA": data}
+    text_of_data = json.dumps(data(chart, seconds, fps), ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
+    text = (WEB / "animation.html").read_text(encoding="utf-8")
+    parts = {
+        "SCRIPT": (WEB / "animation.js").read_text(encoding="utf-8"),
+        "TITLE": html.escape(chart.title),
+        "DATA": text_of_data,
+    }
     for name, part in parts.items():
         text = text.replace(name, part)
     return text
 
 
-def film(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
+def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     """What the page is filled with: titles, the times of the states that are shown, and panels."""
     good = np.flatnonzero(chart.finite)
     each = 2 * (2 * chart.places.shape[1] if chart.kind == "orbits" else 9 + int(np.prod(chart.run.y.shape[1:]))) + 12

@@ -11,12 +11,12 @@ import pytest
 import stepwell as sw
 from abroad import executed
 from explored import needs_node
-from stepwell.charts import film, run_picture
+from stepwell.charts import page_animation, run_picture
 from stepwell.charts.runs import own_picture
 
 DECODING = """
 const { readFileSync } = require("node:fs");
-const unpacked = unpack(JSON.parse(readFileSync("film.json", "utf8")));
+const unpacked = unpack(JSON.parse(readFileSync("animation.json", "utf8")));
 const plain = (key, value) => value instanceof Float64Array ? Array.from(value, (x) => Number.isNaN(x) ? null : x) : value;
 console.log(JSON.stringify(unpacked, plain));
 """
@@ -30,10 +30,10 @@ def data_of(page):
 
 def in_node(data, folder, change=("", "")):
     """The data as the page's own script decodes them."""
-    script = (film.WEB / "film.js").read_text(encoding="utf-8")
+    script = (page_animation.WEB / "animation.js").read_text(encoding="utf-8")
     assert change[0] in script
     (folder / "run.js").write_text(script.replace(*change) + DECODING, encoding="utf-8")
-    (folder / "film.json").write_text(json.dumps(data), encoding="utf-8")
+    (folder / "animation.json").write_text(json.dumps(data), encoding="utf-8")
     return json.loads(executed(["node", "run.js"], folder))
 
 
@@ -42,7 +42,7 @@ def numbers(values):
 
 
 def shown(chart, unpacked):
-    """The saved states that are in a film: those nearest to its times."""
+    """The saved states that are in an animation: those nearest to its times."""
     t = numbers(unpacked["t"])
     at = np.abs(chart.run.t[:, np.newaxis] - t).argmin(axis=0)
     assert len(set(at.tolist())) == len(at)
@@ -56,10 +56,10 @@ def off(values, given):
 
 def test_codes_are_off_by_half_a_step():
     values = np.array([-1.0, math.nan, 0.123456, 2.0, math.inf])
-    given = film.encoded(values)
+    given = page_animation.encoded(values)
     assert (given["low"], given["step"]) == (-1.0, 3.0 / 65534)
-    assert film.encoded(np.array([5.0, 5.0]))["low"] == 5.0
-    assert film.encoded(np.array([math.nan])) == {"low": 0.0, "step": 1.0, "codes": "//8="}
+    assert page_animation.encoded(np.array([5.0, 5.0]))["low"] == 5.0
+    assert page_animation.encoded(np.array([math.nan])) == {"low": 0.0, "step": 1.0, "codes": "//8="}
 
 
 @needs_node
@@ -67,12 +67,12 @@ def test_codes_are_off_by_half_a_step():
 def test_places_in_a_page_are_the_states(name, tmp_path):
     scene = sw.scenes.scene(name)
     chart = own_picture(scene.run("rk4", steps=60, every=1))
-    data = film.film(chart, 3.0, 20.0)
+    data = page_animation.data(chart, 3.0, 20.0)
     unpacked = in_node(data, tmp_path)
     at = shown(chart, unpacked)
     (panel, given) = (unpacked["panels"][0], data["panels"][0])
     places = chart.places[at]
-    expected = film.FALLING.flat(places) if panel["name"].startswith("seen from the front") else places[..., :2]
+    expected = page_animation.FALLING.flat(places) if panel["name"].startswith("seen from the front") else places[..., :2]
     found = numbers(panel["values"]).reshape(expected.shape)
     assert np.abs(found - expected).max() <= off(expected, given["data"])
     assert given["data"]["step"] <= 1e-4 * np.ptp(expected)  # four digits of what is seen
@@ -84,7 +84,7 @@ def test_places_in_a_page_are_the_states(name, tmp_path):
 @needs_node
 def test_a_page_that_decodes_wrongly_is_noticed(tmp_path):
     chart = own_picture(sw.scenes.figure_eight().run("rk4", steps=60, every=1))
-    data = film.film(chart, 3.0, 20.0)
+    data = page_animation.data(chart, 3.0, 20.0)
     wrong = in_node(data, tmp_path, ("256 * bytes", "255 * bytes"))
     found = numbers(wrong["panels"][0]["values"]).reshape(61, 3, 2)
     assert np.abs(found - chart.places).max() > 2.0 * off(chart.places, data["panels"][0]["data"])
@@ -95,7 +95,7 @@ def test_a_page_that_decodes_wrongly_is_noticed(tmp_path):
 def test_other_views_hold_the_states_and_errors(name, tmp_path):
     scene = sw.scenes.scene(name)
     chart = run_picture(scene, scene.run("rk4", steps=50, every=1))
-    data = film.film(chart, 3.0, 20.0)
+    data = page_animation.data(chart, 3.0, 20.0)
     unpacked = in_node(data, tmp_path)
     at = shown(chart, unpacked)
     first, given = unpacked["panels"][0], data["panels"][0]
@@ -105,9 +105,9 @@ def test_other_views_hold_the_states_and_errors(name, tmp_path):
     elif name == "chain":
         expected, found, codes = chart.run.y[at].ravel(), numbers(first["values"]), given["data"]
     else:
-        turned = film.attitude_picture.rotation(chart)[..., at]
+        turned = page_animation.attitude_picture.rotation(chart)[..., at]
         if name == "dzhanibekov":
-            turned = np.einsum("ij,jkn->ikn", film.body_picture.upright(chart), turned)
+            turned = np.einsum("ij,jkn->ikn", page_animation.body_picture.upright(chart), turned)
         expected, found, codes = np.moveaxis(turned, -1, 0).ravel(), numbers(first["values"]), given["data"]
     assert np.abs(found - expected).max() <= off(expected, codes)
     if chart.state_error is not None:
@@ -140,9 +140,9 @@ def test_the_largest_pages_are_small():
     """The most of everything: a net, five bodies with exact curves, and a run of more states than a page holds."""
     scene = sw.scenes.figure_eight()
     run = scene.run("leapfrog", dt=scene.dt / 10, every=1)
-    assert len(film.page(run_picture(scene, run), 10.0, 20.0).encode()) <= 200_000
+    assert len(page_animation.page(run_picture(scene, run), 10.0, 20.0).encode()) <= 200_000
     net = sw.scenes.cloth()
-    page = film.page(own_picture(net.run("leapfrog", every=2)), 10.0, 20.0)
+    page = page_animation.page(own_picture(net.run("leapfrog", every=2)), 10.0, 20.0)
     assert len(page.encode()) <= 200_000
     assert data_of(page)["between"]
     assert "saved states, and straight lines between them" in data_of(page)["about"]
@@ -152,7 +152,7 @@ def test_a_diverged_run_is_shown_as_far_as_it_is_finite():
     scene = sw.scenes.oscillator()
     with pytest.warns(sw.DivergenceWarning):
         run = scene.run("standard_euler", 100.0, steps=400, every=1)
-    data = film.film(own_picture(run), 10.0, 20.0)
+    data = page_animation.data(own_picture(run), 10.0, 20.0)
     assert f"Diverged at step {int(run.first_bad_step)}" in data["about"]
     assert len(data["t"]["codes"]) < 400 * 2 * 4 / 3
 
@@ -163,6 +163,6 @@ def test_a_page_needs_no_matplotlib_and_no_other_text_becomes_script(monkeypatch
     run = sw.scenes.clover().run("leapfrog", every=5)
     run.animate(tmp_path / "run.html", seconds=2)
     own = sw.Scene(sw.Oscillator(), v=0.0, y=1.0, dt=0.1, horizon=3.0, title="</script><b>DATA")
-    page = film.page(run_picture(own, own.run("rk4", every=1)), 10.0, 20.0)
+    page = page_animation.page(run_picture(own, own.run("rk4", every=1)), 10.0, 20.0)
     assert "</script><b>" not in page
     assert data_of(page)["title"].startswith("</script><b>DATA")

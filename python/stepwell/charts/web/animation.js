@@ -57,7 +57,7 @@ function words(g, text, x, y, colour = "#555", align = "left", font = 15) {
   g.fillText(text, x, y);
 }
 
-// The places of all points at a state; a film of few states goes straight from one to the next.
+// The places of all points at a state; an animation of few states goes straight from one to the next.
 function placed(panel, now) {
   const n = 2 * panel.count, first = Math.floor(now), share = now - first;
   const from = panel.values.subarray(first * n, (first + 1) * n);
@@ -66,7 +66,7 @@ function placed(panel, now) {
   return from.map((value, i) => value + share * (to[i] - value));
 }
 
-function points(g, size, panel, now, film) {
+function points(g, size, panel, now, given) {
   const { box, at } = framed(size, panel);
   g.save();
   g.beginPath();
@@ -78,7 +78,7 @@ function points(g, size, panel, now, film) {
   if (panel.trail > 0) {
     for (let i = 0; i < panel.count; i++) {
       const trail = [];
-      for (let k = first; k >= 0 && film.t[k] >= film.t[first] - panel.trail; k--) {
+      for (let k = first; k >= 0 && given.t[k] >= given.t[first] - panel.trail; k--) {
         trail.push(at(panel.values[2 * (k * panel.count + i)], panel.values[2 * (k * panel.count + i) + 1]));
       }
       g.globalAlpha = 0.6;
@@ -108,7 +108,7 @@ function pairs(values) {
   return found;
 }
 
-function series(g, size, panel, now, film) {
+function series(g, size, panel, now, given) {
   const { box, at } = framed(size, panel);
   const first = Math.floor(now), [t0, t1, low, high] = panel.limits;
   g.strokeStyle = "#bbb";
@@ -124,14 +124,14 @@ function series(g, size, panel, now, film) {
   g.rect(box.x, box.y, box.w, box.h);
   g.clip();
   for (const line of panel.lines) {
-    const all = Array.from(line.values, (value, k) => at(film.t[k], value));
+    const all = Array.from(line.values, (value, k) => at(given.t[k], value));
     polyline(g, all, line.exact ? "#d4d4d4" : "#cfcfcf", line.exact ? 5 : 1.4);
     if (!line.exact) {
       polyline(g, all.slice(0, first + 1), line.colour, 2);
       if (Number.isFinite(line.values[first])) disc(g, all[first], 5, line.colour);
     }
   }
-  polyline(g, [at(film.t[first], low), at(film.t[first], high)], "#888", 1);
+  polyline(g, [at(given.t[first], low), at(given.t[first], high)], "#888", 1);
   g.restore();
   words(g, panel.name, box.x, box.y - 8);
 }
@@ -152,7 +152,7 @@ function rows(g, size, panel, now) {
 }
 
 // A body in space: its faces, turned and seen from a screen, the farthest first.
-function solid(g, size, panel, now, film) {
+function solid(g, size, panel, now, given) {
   const { box, at } = framed(size, panel);
   const first = Math.floor(now), m = panel.values.subarray(9 * first, 9 * first + 9), [right, up, near] = panel.screen;
   const turned = (p) => [0, 1, 2].map((i) => m[3 * i] * p[0] + m[3 * i + 1] * p[1] + m[3 * i + 2] * p[2]);
@@ -162,7 +162,7 @@ function solid(g, size, panel, now, film) {
   polyline(g, circle.map(seen), "#c8c8c8", 1.2);
   if (panel.tip) {
     const trail = [];
-    for (let k = first; k >= 0 && film.t[k] >= film.t[first] - panel.trail; k--) {
+    for (let k = first; k >= 0 && given.t[k] >= given.t[first] - panel.trail; k--) {
       const one = panel.values.subarray(9 * k, 9 * k + 9);
       trail.push(seen([0, 1, 2].map((i) => on(panel.tip, one.subarray(3 * i, 3 * i + 3)))));
     }
@@ -188,25 +188,25 @@ function solid(g, size, panel, now, film) {
 
 const DRAWN = { points, series, rows, solid };
 
-function unpack(film) {
-  film.t = decode(film.t);
-  for (const panel of film.panels) {
+function unpack(given) {
+  given.t = decode(given.t);
+  for (const panel of given.panels) {
     if (panel.data) panel.values = decode(panel.data);
     if (panel.joined) panel.links = pairs(decode(panel.joined));
     for (const line of [...(panel.lines ?? []), ...(Array.isArray(panel.exact) ? panel.exact : [panel.exact ?? {}])]) {
       if (line.data) line.values = decode(line.data);
     }
   }
-  return film;
+  return given;
 }
 
-function start(film) {
+function start(given) {
   const byId = (id) => document.getElementById(id);
   const canvas = byId("picture"), play = byId("play"), slider = byId("time"), clock = byId("clock");
-  const last = film.t.length - 1, size = { width: 1000, height: 562.5 };
+  const last = given.t.length - 1, size = { width: 1000, height: 562.5 };
   let now = 0, running = true, before = null;
-  byId("title").textContent = film.title;
-  byId("about").textContent = film.about;
+  byId("title").textContent = given.title;
+  byId("about").textContent = given.about;
   slider.max = last;
 
   function show() {
@@ -216,12 +216,12 @@ function start(film) {
     const g = canvas.getContext("2d");
     g.setTransform(scale, 0, 0, scale, 0, 0);
     g.clearRect(0, 0, size.width, size.height);
-    for (const panel of film.panels) DRAWN[panel.type](g, size, panel, film.between ? now : Math.floor(now), film);
+    for (const panel of given.panels) DRAWN[panel.type](g, size, panel, given.between ? now : Math.floor(now), given);
     slider.value = Math.floor(now);
-    clock.textContent = `t = ${film.t[Math.floor(now)].toFixed(film.digits)}`;
+    clock.textContent = `t = ${given.t[Math.floor(now)].toFixed(given.digits)}`;
   }
   function tick(time) {
-    if (before !== null) now += ((time - before) / 1000) * (last / film.seconds);
+    if (before !== null) now += ((time - before) / 1000) * (last / given.seconds);
     before = time;
     if (now >= last) now = 0;
     show();
