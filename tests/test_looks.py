@@ -68,6 +68,15 @@ def test_every_method_has_the_colour_of_its_family():
     assert all(style.look(method)["color"] == style.FAMILIES[of[method.name]] for method in sw.methods())
 
 
+@pytest.mark.parametrize("eye", EYES)
+def test_methods_of_a_family_are_told_apart_where_no_names_are_beside_them(eye):
+    """The four methods of a control chart, two of which are Euler's."""
+    methods = [sw.method(name) for name in ("standard_euler", "false_euler", "standard_heun", "rk4")]
+    assert least(eye, [style.apart(methods, method)["color"] for method in methods]) > 1.0
+    assert style.look(methods[0])["color"] == style.look(methods[1])["color"]  # which is what would merge them
+    assert style.apart(methods[1:], methods[1])["color"] == style.FAMILIES["Euler"]
+
+
 def test_labels_lie_in_the_axes_and_not_on_each_other():
     figure = style.new_figure(6.0, 4.0)
     axes = figure.add_axes((0.1, 0.1, 0.85, 0.85))
