@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +23,8 @@ from .exact import MAX_ROWS
 from .parts import spectra
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 #: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
