@@ -176,7 +176,7 @@ def test_bodies_that_others_pull_apart_are_not_looked_for(monkeypatch):
     """At the start of the figure-eight bodies 0 and 1 are at rest against each other: alone they would fall together.
 
     The third, half way between them, pulls each towards itself by m/r², r half of their distance: the two pulls differ by 2m/r²,
-    where they pull each other together by 2/(2r)², four times less. To look for their encounter takes 20 times as long as the run.
+    where they pull each other together by 2/(2r)², a quarter. Looking for their encounter takes 20 times as long as the run.
     """
     scene = sw.scenes.figure_eight()
     v, y, masses = (np.asarray(each) for each in (scene.v, scene.y, scene.system.masses))
