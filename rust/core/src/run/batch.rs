@@ -1,6 +1,6 @@
 //! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
-use std::{sync::Arc, thread, time::Instant};
+use std::{sync::Arc, time::Instant};
 
 use super::{
     Machine, Model,
@@ -131,12 +131,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let lanes = plan.model.lanes(&traced, plan.machine, b, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
-    let threads = match plan.machine.threads {
-        0 if work < MIN_NUMBER_STEPS_FOR_THREADS => 1,
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        n => n,
-    };
-    let threads = threads.min(groups).max(1);
+    let threads = plan.machine.threads_for(groups, work >= MIN_NUMBER_STEPS_FOR_THREADS);
     plan.model.room(traced.shape, threads)?;
     // A single group may use all threads; it decides whether they are worthwhile.
     let machine = Machine { threads: if groups == 1 { plan.machine.threads } else { 1 }, ..plan.machine };
