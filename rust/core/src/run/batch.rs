@@ -71,9 +71,10 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
 }
 
 /// The most steps between two checks of the clock and of whether all states are finite.
-const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 14;
-/// Numbers × steps until the first check, about.
+const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 16;
+/// Numbers × steps until the first check, about, and steps at most: until then it is not known how long steps take.
 const NUMBERS_TO_FIRST_CHECK: i64 = 1 << 19;
+const STEPS_TO_FIRST_CHECK: i64 = 1 << 14;
 /// Numbers × steps between two later checks, at most.
 const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
 /// A group of more numbers than this is first checked after one step, to see how long that takes: the cost of a step of many bodies
@@ -302,7 +303,7 @@ impl Job<'_, '_> {
         let first = if numbers > LARGE_MEMBER_NUMBERS {
             1
         } else {
-            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL)
+            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, STEPS_TO_FIRST_CHECK)
         };
         let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
