@@ -300,11 +300,8 @@ impl Job<'_, '_> {
 
         let mut k = plan.first;
         let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
-        let first = if numbers > LARGE_MEMBER_NUMBERS {
-            1
-        } else {
-            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, STEPS_TO_FIRST_CHECK)
-        };
+        let first =
+            if numbers > LARGE_MEMBER_NUMBERS { 1 } else { (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, STEPS_TO_FIRST_CHECK) };
         let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
