@@ -33,7 +33,7 @@ def save(run: Run, path: str | Path) -> None:
     place = _place(path)
     writer = Writer()
     text = writer.text(run)
-    # Written beside the file and then put in its place, so that whoever stops it in between loses nothing.
+    # Written beside the file and then put in its place, so that a stop in between loses nothing.
     if place.suffix == ".npz":
         _checks.file("path", place)
         number, beside = tempfile.mkstemp(dir=place.parent, suffix=".npz")

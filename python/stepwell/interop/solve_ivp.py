@@ -137,8 +137,8 @@ def solve_ivp(
         ...     return [a * x - b * x * y, -c * y + d * x * y]
         >>> found = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), dense_output=True, rtol=1e-9, atol=1e-9)
         >>> found.sol([5.0, 10.0]).round(6)
-        array([[0.923177, 2.207606],
-               [0.204788, 0.261812]])
+        array([[0.264187, 0.287213],
+               [3.134133, 0.449777]])
         >>> found.success, found.message
         (True, 'The solver successfully reached the end of the integration interval.')
     """
