@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 import warnings
 from typing import Any
@@ -157,6 +158,23 @@ def test_the_steps_of_gymnasiums_cart_pole() -> None:
     theirs.step(1)
     envs.step(np.array([1]))
     assert abs(envs.world.y[0, 0] - theirs.state[0]) > 1e-4
+
+
+@pytest.mark.parametrize(
+    "wrong", [("4.0 / 3.0", "1.3333"), ("pull - moment", "pull + moment"), ("cosine**2 / whole", "cosine**2")]
+)
+def test_a_wrong_formula_of_the_cart_would_be_seen(wrong: tuple[str, str]) -> None:
+    """By far more than the bound above: one step of 0.02 s makes it so."""
+    text = inspect.getsource(sw.gym.cart_pole.function)
+    assert wrong[0] in text
+    namespace: dict[str, Any] = {"np": np, "system": sw.system, "Any": Any}
+    exec(text.replace(*wrong), namespace)
+    after = []
+    for kind in (sw.gym.cart_pole, namespace["cart_pole"]):
+        world = sw.World(kind, "standard_euler", v=np.array([0.1, 0.2]), y=np.array([0.0, 0.1, 10.0]), dt=0.02)
+        world.step()
+        after.append(world.v)
+    assert np.abs(after[0] - after[1]).max() > 1e-7
 
 
 def test_the_steps_of_gymnasiums_pendulum() -> None:

@@ -169,7 +169,7 @@ def test_states_are_those_of_a_run_to_the_bit() -> None:
     times = np.linspace(0.0, 5.0, 41)
     run = sw.integrate(lorenz, "merson", y=[1.0, 2.0, 3.0], tolerance=(1e-6, np.sqrt(3) * 1e-8), at=times)
     options: dict[str, Any] = {"t_span": (0.0, 5.0), "y0": [1.0, 2.0, 3.0], "method": "merson", "rtol": 1e-6, "atol": 1e-8}
-    once = sw.solve_ivp(lorenz.function, t_eval=times, **options)
+    once = sw.solve_ivp(lorenz, t_eval=times, **options)
     stepped = sw.solve_ivp(lorenz.function, t_eval=times, dense_output=True, **options)
     assert once.y.tobytes() == np.ascontiguousarray(run.y.T).tobytes()
     assert stepped.y.tobytes() == once.y.tobytes()
@@ -509,6 +509,7 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"events": event(height, terminal=-1)}, ArgumentError, "terminal: expected 0 or more"),
     ({"dense_output": 1}, DTypeError, "dense_output: expected True or False"),
     ({"fun": 3}, DTypeError, r"fun: expected a function fun\(t, y\), got 3 \(int\)"),
+    ({"fun": sw.system(lambda t, v, y: -y)}, DTypeError, "got the system <lambda> of second order; use integrate"),
     ({"fun": np.sin}, DTypeError, "fun: expected a function written in Python"),
     ({"fun": lambda t, y: [1.0]}, TraceError, r"expected ẏ of shape \(2,\)"),
     ({"fun": lambda t, y: 1j * y}, TraceError, "complex"),

@@ -24,7 +24,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     """Environments that are stepped together, as the members of one ``World``.
 
     An environment whose episode ended begins anew at the next call of ``step``, whose action for it is ignored
-    (``AutoresetMode.NEXT_STEP``).
+    (``AutoresetMode.NEXT_STEP``). A kind of environment is a subclass with the spaces of one, which makes the world, draws
+    states, lets actions act, and says what is seen and rewarded; see docs/interop.md.
 
     Args:
         num_envs: how many.
@@ -68,32 +69,32 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self.single_observation_space, self.single_action_space = self.one_observation, self.one_action
         self.observation_space = batch_space(self.one_observation, self.num_envs)
         self.action_space = batch_space(self.one_action, self.num_envs)
-        self.world = self._world(method, _checks.number("dt", dt, positive=True, unit="seconds"))
+        self.world = self.make_world(method, _checks.number("dt", dt, positive=True, unit="seconds"))
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
 
     @abstractmethod
-    def _world(self, method: str | Method, dt: float) -> World:
+    def make_world(self, method: str | Method, dt: float) -> World:
         """The world, at any state."""
 
     @abstractmethod
-    def _drawn(self, count: int) -> tuple[Array, Array]:
+    def draw(self, count: int) -> tuple[Array, Array]:
         """Random states to begin with, v and y, of so many members."""
 
     @abstractmethod
-    def _push(self, actions: Any) -> None:
+    def act(self, actions: Any) -> None:
         """Let actions act: called before each step of the method."""
 
     @abstractmethod
-    def _observed(self) -> Array:
+    def observe(self) -> Array:
         """What is seen of the states, shape (num_envs, numbers)."""
 
-    @abstractmethod
-    def _rewards(self, actions: Any) -> Array | None:
+    def rewards_before(self, actions: Any) -> Array | None:
         """The rewards, where they are of the states before a step; else None."""
+        return None
 
     @abstractmethod
-    def _judged(self, actions: Any) -> tuple[Array, Truths]:
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
         """The rewards of the states after a step (not read if there are others), and which of them end an episode."""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observations, dict[str, Any]]:
@@ -114,12 +115,12 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         actions = np.asarray(actions)
         if actions.shape != self.action_space.shape or actions.dtype.kind not in "biuf":
             raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
-        before = self._rewards(actions)
+        before = self.rewards_before(actions)
         for _ in range(self.substeps):
-            self._push(actions)
+            self.act(actions)
             self.world.step()
         self.steps += 1
-        rewards, terminated = self._judged(actions)
+        rewards, terminated = self.judge(actions)
         rewards = rewards if before is None else before
         late = 2**62 if self.max_episode_steps is None else self.max_episode_steps
         truncated: Truths = self.steps >= late
@@ -131,7 +132,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         return self._seen(), rewards, terminated, truncated, {}
 
     def _begin(self, which: Truths) -> None:
-        v, y = self._drawn(int(which.sum()))
+        v, y = self.draw(int(which.sum()))
         self.world.v[..., which] = v
         self.world.y[..., which] = y
         self.steps[which] = 0
@@ -140,7 +141,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def _seen(self) -> Observations:
         # Rounding to float32 may pass a bound by one unit of its last place.
         space = self.one_observation
-        return np.clip(self._observed().astype(np.float32), space.low, space.high)
+        return np.clip(self.observe().astype(np.float32), space.low, space.high)
 
 
 class WorldEnv(gymnasium.Env):  # type: ignore[misc]

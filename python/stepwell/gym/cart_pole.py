@@ -78,24 +78,26 @@ class CartPoleVectorEnv(WorldVectorEnv):
             num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
         )
 
-    def _world(self, method: str | Method, dt: float) -> World:
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """Carts with poles."""
         return World(cart_pole(), method, v=np.zeros((2, self.num_envs)), y=np.zeros((3, self.num_envs)), dt=dt)
 
-    def _drawn(self, count: int) -> tuple[Array, Array]:
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """Near rest."""
         drawn = self.np_random.uniform(-NEAR_REST, NEAR_REST, (4, count))
         return drawn[[1, 3]], np.stack([drawn[0], drawn[2], np.zeros(count)])
 
-    def _push(self, actions: Any) -> None:
+    def act(self, actions: Any) -> None:
+        """Push the carts."""
         self.world.y[2] = np.where(actions > 0, PUSH, -PUSH)
 
-    def _observed(self) -> Array:
+    def observe(self) -> Array:
+        """Place, velocity, angle, angular velocity."""
         v, y = self.world.v, self.world.y
         return np.stack([y[0], v[0], y[1], v[1]], axis=-1)
 
-    def _rewards(self, actions: Any) -> None:
-        return None
-
-    def _judged(self, actions: Any) -> tuple[Array, Truths]:
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """One for each step."""
         place, angle = np.abs(self.world.y[:2])
         return np.ones(self.num_envs), (place > END) | (angle > TILT)
 

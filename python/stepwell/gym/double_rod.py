@@ -59,14 +59,16 @@ class DoubleRodVectorEnv(WorldVectorEnv):
             num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
         )
 
-    def _world(self, method: str | Method, dt: float) -> World:
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """Two rods that hang from an anchor."""
         v, self._force = np.zeros((2, 2, self.num_envs)), np.zeros((2, 2, self.num_envs))
         y = np.zeros_like(v)
         y[:, 1] = [[-1.0], [-2.0]]
         rods = Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0, gravity=GRAVITY)
         return World(rods, method, v=v, y=y, dt=dt, force=self._force, control=Projection("length"))
 
-    def _drawn(self, count: int) -> tuple[Array, Array]:
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """Near rest."""
         angles, turning = self.np_random.uniform(-NEAR_REST, NEAR_REST, (2, 2, count))
         # Rows of both are the rods, then x and height.
         along = np.stack([sin(angles), -cos(angles)], axis=1)
@@ -81,7 +83,8 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         turning = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / square
         return along / np.sqrt(square)[:, np.newaxis], turning
 
-    def _push(self, actions: Any) -> None:
+    def act(self, actions: Any) -> None:
+        """Turn the rods against each other."""
         along, _ = self._rods()
         across = np.stack([-along[:, 1], along[:, 0]], axis=1)
         torque = np.clip(actions[:, 0].astype(np.float64), -MAX_TORQUE, MAX_TORQUE)
@@ -89,14 +92,13 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         self._force[1] = torque * across[1]
         self._force[0] = -torque * across[1] - torque * across[0]
 
-    def _observed(self) -> Array:
+    def observe(self) -> Array:
+        """Cosines and sines of the angles, and angular velocities."""
         along, turning = self._rods()
         return np.stack([-along[0, 1], along[0, 0], -along[1, 1], along[1, 0], *turning], axis=-1)
 
-    def _rewards(self, actions: Any) -> None:
-        return None
-
-    def _judged(self, actions: Any) -> tuple[Array, Truths]:
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """Whether the tip is up."""
         up = self.world.y[1, 1] > GOAL
         return np.where(up, 0.0, -1.0), up
 

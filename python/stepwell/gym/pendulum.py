@@ -54,12 +54,14 @@ class PendulumVectorEnv(WorldVectorEnv):
             num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
         )
 
-    def _world(self, method: str | Method, dt: float) -> World:
+    def make_world(self, method: str | Method, dt: float) -> World:
+        """Rods on hinges."""
         # A uniform rod on its end: its moment of inertia is m·l²/3.
         v, y, self._force = (np.zeros(self.num_envs) for _ in range(3))
         return World(Pendulum(np.sqrt(1.5 * GRAVITY / LENGTH)), method, v=v, y=y, dt=dt, force=self._force)
 
-    def _drawn(self, count: int) -> tuple[Array, Array]:
+    def draw(self, count: int) -> tuple[Array, Array]:
+        """At any angle."""
         above, speed = self.np_random.uniform(-np.pi, np.pi, count), self.np_random.uniform(-1.0, 1.0, count)
         return speed, above + np.pi
 
@@ -67,20 +69,24 @@ class PendulumVectorEnv(WorldVectorEnv):
         torque: Array = np.clip(actions[:, 0].astype(np.float64), -MAX_TORQUE, MAX_TORQUE)
         return torque
 
-    def _push(self, actions: Any) -> None:
+    def act(self, actions: Any) -> None:
+        """Turn the motors."""
         self._force[...] = self._torque(actions) * (3.0 / (MASS * LENGTH * LENGTH))
 
-    def _observed(self) -> Array:
+    def observe(self) -> Array:
+        """Cosine and sine of the angle from upright, angular velocity."""
         # y is the angle from below.
         return np.stack([-cos(self.world.y), -sin(self.world.y), self.world.v], axis=-1)
 
-    def _rewards(self, actions: Any) -> Array:
+    def rewards_before(self, actions: Any) -> Array:
+        """How far from upright, how fast, and what the motor does."""
         turns = np.floor(self.world.y / (2.0 * np.pi))
         above = self.world.y - 2.0 * np.pi * turns - np.pi
         torque, speed = self._torque(actions), self.world.v
         return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque))
 
-    def _judged(self, actions: Any) -> tuple[Array, Truths]:
+    def judge(self, actions: Any) -> tuple[Array, Truths]:
+        """No episode ends before its time."""
         np.clip(self.world.v, -MAX_SPEED, MAX_SPEED, out=self.world.v)
         return np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=np.bool_)
 

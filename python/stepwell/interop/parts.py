@@ -25,14 +25,11 @@ from ..integrate import _collision
 from ..methods import Method
 from ..methods import method as find_method
 from ..reference.traced import Tracer
-from ..result import AdaptiveState, Paces, Run
+from ..result import Run
 from ..systems import System
 from ..systems.own import OwnSystem
 
 Arrays = dict[str, Any]
-
-#: Named tuples that are parts of a run.
-TUPLES: dict[str, type[Any]] = {each.__name__: each for each in (AdaptiveState, Paces, engine.Plan)}
 
 #: What goes through the steps of a run again, under the names of its attributes; see ``Run``.
 RERUNS: dict[str, Callable[..., Any]] = {
@@ -45,11 +42,11 @@ RERUNS: dict[str, Callable[..., Any]] = {
 KIND = "is"
 
 
-def kinds() -> dict[str, type[Any]]:
-    """Classes of stepwell whose objects cannot be changed, by name: systems, controls, surfaces and inputs."""
+def kinds(base: type[Any] = Fixed) -> dict[str, type[Any]]:
+    """Classes of stepwell below one, by name: below ``Fixed`` there are systems, controls, surfaces and inputs."""
     from ..systems import aircraft as aircraft  # imported only when used, but a file may name it
 
-    found, todo = {}, [Fixed]
+    found, todo = {}, [base]
     while todo:
         for each in todo.pop().__subclasses__():
             todo.append(each)
@@ -74,8 +71,12 @@ class Writer:
         if value is None or isinstance(value, (bool, str)) or type(value) in (int, float):
             return value
         match value:
-            case np.ndarray() | np.generic():
+            case np.ndarray():
                 return self._array(value, name)
+            case np.generic():
+                return {KIND: "scalar", "array": self._array(value, name)}
+            case np.dtype():
+                return {KIND: "dtype", "name": value.str}
             case Method():
                 return {KIND: "method", "name": value.name}
             case Definition():
@@ -143,11 +144,13 @@ class Reader:
 
     def __init__(self, arrays: Arrays, system: Any = None) -> None:
         self.arrays, self.system = arrays, system
-        self._kinds = kinds()
+        self._kinds, self._tuples = kinds(), kinds(tuple)
 
     def run(self, text: str) -> Run:
         """The run that a description tells of."""
-        return Run(**{name: self._whole(part) for name, part in json.loads(text).items()})
+        run = Run.__new__(Run)
+        vars(run).update({name: self._whole(part) for name, part in json.loads(text).items()})
+        return run
 
     def _whole(self, part: Any) -> Any:
         if isinstance(part, list):
@@ -159,6 +162,10 @@ class Reader:
             case "array":
                 array = self.arrays[part["of"]]
                 return np.broadcast_to(array, part["over"]) if "over" in part else array
+            case "scalar":
+                return self._whole(part["array"])[()]
+            case "dtype":
+                return np.dtype(part["name"])
             case "method":
                 return find_method(part["name"])
             case "function":
@@ -181,8 +188,8 @@ class Reader:
                 made = Equations(*(parts.pop(key) for key in ("definition", "v_shape", "y_shape", "own_shapes")))
                 vars(made).update(parts)
                 return made
-            case kind if kind in TUPLES:
-                return TUPLES[kind](**parts)
+            case kind if kind in self._tuples:
+                return self._tuples[kind](**parts)
             case kind:
                 one = object.__new__(self._kinds[kind])
                 one.__setstate__(parts)

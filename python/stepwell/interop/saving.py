@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -34,36 +34,37 @@ def save(run: Run, path: str | Path) -> None:
     writer = Writer()
     text = writer.text(run)
     # Written beside the file and then put in its place, so that a stop in between loses nothing.
+    beside = place.with_name(f"{place.stem}.{uuid4().hex}{place.suffix}")
     if place.suffix == ".npz":
         _checks.file("path", place)
-        number, beside = tempfile.mkstemp(dir=place.parent, suffix=".npz")
         try:
-            with os.fdopen(number, "wb") as file:
+            with beside.open("xb") as file:
                 about = {ABOUT: np.array(text), FORM: np.array([VERSION]), "stepwell_version": np.array(_core.__version__)}
                 np.savez(file, **about, **writer.arrays)  # type: ignore[arg-type]  # NumPy's stubs mean one of its options
-            os.replace(beside, place)
+            beside.replace(place)
         except BaseException:
-            Path(beside).unlink(missing_ok=True)
+            beside.unlink(missing_ok=True)
             raise
         return
     zarr = imported("zarr", "save")
     _checks.folder("path", place.parent)
-    if place.exists() and not _is_ours(zarr, place):
+    if (replaced := place.exists()) and not _is_ours(zarr, place):
         raise ArgumentError(f"path: expected a new folder, or one with a saved run, got {_checks.short(str(path))}")
-    folder = Path(tempfile.mkdtemp(dir=place.parent, suffix=".zarr"))
     try:
-        group = zarr.open_group(str(folder), mode="w")
+        group = zarr.open_group(str(beside), mode="w")
         for name, array in writer.arrays.items():
             # A chunk that is zero is left out by default, and then a −0 in it is lost.
             made = group.create_array(name, shape=array.shape, dtype=array.dtype, config={"write_empty_chunks": True})
             made[...] = array
         group.attrs.update({ABOUT: text, FORM: VERSION, "stepwell_version": _core.__version__})
-        if place.exists():
-            shutil.rmtree(place)
-        folder.replace(place)
+        if replaced:
+            place.replace(old := place.with_name(f"{place.stem}.{uuid4().hex}.old"))
+        beside.replace(place)
     except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(beside, ignore_errors=True)
         raise
+    if replaced:
+        shutil.rmtree(old)
 
 
 def load(path: str | Path, *, system: Any = None) -> Run:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from ..equations.definition import Definition
 from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
 from ..reference import adaptive
 from .ivp_events import Event, found
@@ -87,8 +88,8 @@ def solve_ivp(
 ) -> OdeResult:
     """Solve ẏ = fun(t, y) from a state, called as SciPy's ``solve_ivp`` is, so that one import tries stepwell.
 
-    ``fun`` is run once, with symbols, and not at every step; what cannot be traced (``if`` on a state, ``np.random``) is an error
-    that names the line. Results have the same bits on every machine.
+    ``fun`` is run at the start, with symbols, and not at every step; what cannot be traced (``if`` on a state, ``np.random``) is
+    an error that names the line. Results have the same bits on every machine.
 
     What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. The error of a step is that of the whole
     state, its length, and not that of each number; see ``rtol``. ``sol`` and events use no interpolation, but short steps of the
@@ -153,6 +154,10 @@ def solve_ivp(
     _warn_of_useless(jac=jac, jac_sparsity=jac_sparsity, lband=lband, uband=uband, min_step=min_step or None)
     if not callable(fun):
         raise DTypeError(f"fun: expected a function fun(t, y), got {_checks.short(fun)} ({type(fun).__name__})")
+    if isinstance(fun, Definition):
+        if fun.has_v:
+            raise DTypeError(f"fun: expected a function fun(t, y), got the system {fun.name} of second order; use integrate")
+        fun = fun.function
     right = RightHandSide(fun, args, len(state), vectorized=_checks.flag("vectorized", vectorized), backward=sign < 0.0)
     trajectory = Trajectory(right.system(), how, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
     trajectory.limited(
