@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import inspect
 import sys
 import warnings
@@ -249,6 +250,16 @@ def test_shorter_steps_come_nearer_to_the_truth() -> None:
 
     finest = end(64)
     assert 0 < abs(end(16) - finest) < abs(end(1) - finest) / 1000
+
+
+@pytest.mark.parametrize("name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name != "WorldVectorEnv"])
+def test_examples_print_what_they_say(name: str) -> None:
+    found = doctest.DocTestParser().get_doctest(inspect.getdoc(getattr(sw.gym, name)) or "", {}, name, None, None)
+    assert found.examples
+    told: list[str] = []
+    runner = doctest.DocTestRunner(verbose=False)
+    runner.run(found, out=told.append)
+    assert runner.failures == 0, "".join(told)
 
 
 # ---- wrong calls
