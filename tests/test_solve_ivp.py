@@ -299,8 +299,9 @@ def test_directions_and_ends(direction: int, which: list[int], sign: int) -> Non
         np.testing.assert_array_equal(ended.y[:, -1], ended.y_events[0][-1])
         np.testing.assert_array_equal(ended.sol(ended.t[-1]), ended.y[:, -1])
     scipy = pytest.importorskip("scipy.integrate")
-    theirs = scipy.solve_ivp(turning, events=event(height, direction=direction, terminal=2), method="DOP853", **options)
-    assert ended.t_events[0] == pytest.approx(theirs.t_events[0], abs=1e-6)
+    # Older versions do not know numbers for ``terminal``.
+    theirs = scipy.solve_ivp(turning, events=event(height, direction=direction, terminal=True), method="DOP853", **options)
+    assert ended.t_events[0][:1] == pytest.approx(theirs.t_events[0], abs=1e-6)
 
 
 def test_events_of_one_step_come_in_their_order() -> None:
