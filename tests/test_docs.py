@@ -24,6 +24,9 @@ LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
 INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
 
+#: What a page needs beside what every page may use. The extra ``test`` has it.
+NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray")}
+
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 
@@ -49,6 +52,8 @@ def blocks(page: Path) -> list[tuple[int, str, str]]:
 
 @pages
 def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
+    for package in NEEDS.get(page.name, ()):
+        pytest.importorskip(package)
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": page.stem}
     for line, code, module in blocks(page):

@@ -88,9 +88,21 @@ def test_import_is_quick_and_small() -> None:
     """No plotting, no terminal library, no reference steppers: those are imported when used."""
     code = "import numpy, sys; before = set(sys.modules); import stepwell; print(*sorted(set(sys.modules) - before))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    for heavy in ("matplotlib", "rich", "numba", "scipy", "hypothesis", "asyncio", "argparse"):
+    for heavy in (
+        "matplotlib",
+        "rich",
+        "numba",
+        "scipy",
+        "hypothesis",
+        "asyncio",
+        "argparse",
+        "gymnasium",
+        "pandas",
+        "xarray",
+        "zarr",
+    ):
         assert not [m for m in loaded if m.split(".")[0] == heavy]
-    assert not [m for m in loaded if m.startswith("stepwell.reference.steppers.")]
+    assert not [m for m in loaded if m.startswith(("stepwell.reference.steppers.", "stepwell.interop", "stepwell.gym"))]
     # A coarse guard of the 20 ms promise, which the benchmarks measure: modules cost time.
     assert len(loaded) < 60, loaded
 

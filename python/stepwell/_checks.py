@@ -57,6 +57,8 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         return np.array(value)  # the most frequent case: nothing more to check
     if type(value) is np.ndarray and _core.sound(value, finite, positive):
         return value  # likewise; the checks below say what is wrong with any other
+    if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
+        value = shared(argument, value)
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, RecursionError) as error:
@@ -79,6 +81,19 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
+
+
+def shared(argument: str, value: Any) -> Any:
+    """An array of another library, such as PyTorch or JAX, as NumPy's, over the same memory."""
+    try:
+        return np.from_dlpack(value)
+    except Exception as error:  # of what kind it is differs from library to library
+        why = str(error).strip().splitlines() or [type(error).__name__]
+        raise DTypeError(
+            f"{argument}: expected an array in the memory of the CPU, of a type that NumPy has and without gradients, got "
+            f"{type(value).__module__}.{type(value).__name__} ({short(why[0])[1:-1]}); convert it first: PyTorch's by "
+            f".detach().cpu().double(), JAX's by jax.device_get outside of jax.jit"
+        ) from None
 
 
 def _masked(value: Any) -> int:
@@ -321,7 +336,12 @@ def _fields(path: str) -> dict[str, int]:
 
 
 def in_place(argument: str, array: Any, shape: Shape, what: str = "to step in place", *, written: bool = True) -> Array:
-    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied."""
+    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied.
+
+    Of another library's array in the memory of the CPU it is NumPy's array over that memory.
+    """
+    if hasattr(array, "__dlpack__") and not isinstance(array, np.ndarray):
+        array = shared(argument, array)
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != np.float64 or not array.dtype.isnative:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 class Status(IntEnum):
@@ -258,8 +260,7 @@ class Run(Value):
         """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
 
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
-        last one. A carry is for the same method only. ``np.savez`` writes all of it to a file; a control is an object, for which
-        ``np.load`` needs ``allow_pickle=True``. ``dt`` is that of this run; another
+        last one. A carry is for the same method only. ``save`` writes all of it to a file. ``dt`` is that of this run; another
         is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
         """
         told = {"fused": True} if self.fused else {}
@@ -278,6 +279,60 @@ class Run(Value):
         if self.force is not None:
             state["force"] = self.force
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
+
+    def save(self, path: str | Path) -> None:
+        """Write the run to a file, from which ``stepwell.load`` reads it again, bit for bit, and from which it goes on.
+
+        All arrays are there under their names, for any program that reads such files: ``np.load(path)["y"]``. The system, its
+        control and what a method carries are there, too. Of a system of your own equations there are the name of its function and
+        a digest of its operations, but not the function. A file that is there already is replaced when the new one is complete.
+
+        Args:
+            path: the file, ending in .npz, or in .zarr for a folder of compressed arrays, which needs the package zarr.
+
+        Raises:
+            ArgumentError: if the ending is another, or the file cannot be written.
+            UnsupportedError: if the file ends in .zarr and zarr is not installed.
+        """
+        from .interop.saving import save
+
+        save(self, path)
+
+    def to_xarray(self, dims: Sequence[str] | None = None, coords: Mapping[str, Any] | None = None) -> Dataset:
+        """The run as an xarray ``Dataset``: the saved states, what was recorded, and how the members ended.
+
+        The arrays are those of the run, not copies. They have the axis ``t``, those of a block, and those of the batch.
+
+        Args:
+            dims: names of the batch axes; "member", or "member_0", "member_1", … if None.
+            coords: further coordinates, as ``Dataset`` takes them: ``{"omega": ("member", omega)}`` for the parameter of a sweep.
+
+        Raises:
+            ArgumentError: if there is not one name for each axis, or a name is given twice.
+            UnsupportedError: if xarray is not installed.
+        """
+        from .interop.tables import to_xarray
+
+        made: Dataset = to_xarray(self, dims, coords)
+        return made
+
+    def to_dataframe(self, dims: Sequence[str] | None = None) -> DataFrame:
+        """The run as a pandas ``DataFrame``: a row for each saved state of each member, a column for each of its numbers.
+
+        The index is the time, and the member in a batch. The columns are v and y, or v_0, v_1, … of a block, and what was
+        recorded.
+
+        Args:
+            dims: names of the batch axes in the index; "member", or "member_0", "member_1", … if None.
+
+        Raises:
+            ArgumentError: if there is not one name for each axis, or a name is given twice.
+            UnsupportedError: if pandas is not installed.
+        """
+        from .interop.tables import to_dataframe
+
+        made: DataFrame = to_dataframe(self, dims)
+        return made
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the motion and its energy error, and write the picture to ``path`` if given.

@@ -50,7 +50,8 @@ class World:
     for them. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between
     steps, the method starts again from the new values. Ctrl-C leaves the world at the last complete step, or at the
     one before (leapfrog of many bodies, whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays.
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. Arrays of another library are stepped in place,
+    too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
     ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
