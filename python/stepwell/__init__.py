@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         quaternion,
         scenes,
         stability,
+        sweeps,
     )
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from .exports import ExportedStep, export
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
+    from .sweeps import sweep
     from .systems import Aircraft
 
 __version__: str = _core.__version__
@@ -128,6 +130,8 @@ __all__ = [
     "stability",
     "stability_along",
     "stability_limit",
+    "sweep",
+    "sweeps",
     "system",
 ]
 
@@ -179,6 +183,8 @@ _LATER = {
     "paper": "paper",
     "quaternion": "quaternion",
     "scenes": "scenes",
+    "sweep": "sweeps.sweep",
+    "sweeps": "sweeps",
     "system": "equations.system",
     "stability": "stability",
     "analyse": "stability.analyse",
