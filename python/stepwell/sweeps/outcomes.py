@@ -217,16 +217,15 @@ class _Mean(Reduction):
         self.run = piece.run
         all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
         # State after state, so that the order of the sum does not depend on the piece.
-        with np.errstate(all="ignore"):
-            for k, t in enumerate(piece.t.tolist()):
-                now = [each[k] for each in all_of]
-                if not self.before:
-                    self.sums, self.begin = [np.zeros(each.shape) for each in now], t
-                else:
-                    half = 0.5 * (t - self.t)
-                    for total, old, new in zip(self.sums, self.before, now, strict=True):
-                        total += half * (old + new)
-                self.before, self.t = now, t
+        for k, t in enumerate(piece.t.tolist()):
+            now = [each[k] for each in all_of]
+            if not self.before:
+                self.sums, self.begin = [np.zeros(each.shape) for each in now], t
+            else:
+                half = 0.5 * (t - self.t)
+                for total, old, new in zip(self.sums, self.before, now, strict=True):
+                    total += half * (old + new)
+            self.before, self.t = now, t
         self.before = [each.copy() for each in self.before]  # not the whole piece
 
     def found(self) -> Found:
@@ -317,8 +316,7 @@ class Function(Outcome):
 
     def of_run(self, run: Run) -> Found:
         """What it finds."""
-        with np.errstate(all="ignore"):
-            made = self.function(run)
+        made = self.function(run)
         named = made if isinstance(made, Mapping) else {name_of(self.function): made}
         found = {}
         for name, given in named.items():

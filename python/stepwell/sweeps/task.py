@@ -122,7 +122,7 @@ def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
-    with _quiet():
+    with _quiet(), np.errstate(all="ignore"):  # members that diverge are told of by their status
         system, given = made(task, values)
         start = given
         for each in _pieces(task, system, given, members, task.transient, None, stopped):
