@@ -42,7 +42,7 @@ def whole() -> Any:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
         yield made
 
 
@@ -70,7 +70,7 @@ def test_processes(whole: Any, start: str) -> None:
 
 
 def test_a_cluster(whole: Any, client: Any, tmp_path: Path) -> None:
-    for options in ({}, {"chunk": 3}, {"store": tmp_path / "a.zarr", "chunk": 6}, {"store": tmp_path / "a.nc", "chunk": 8}):
+    for options in ({}, {"store": tmp_path / "a.zarr", "chunk": 10}, {"store": tmp_path / "a.nc", "chunk": 15}):
         with small(engine=client, **options) as found:
             assert unlike(whole, found) == []
             assert found.attrs["bits"] == whole.attrs["bits"]
@@ -105,7 +105,7 @@ def dying(mark: str, run: sw.Run) -> Any:
 def test_a_worker_that_is_lost(tmp_path: Path, kept: bool) -> None:
     """Its chunks are computed by others."""
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         before = set(client.scheduler_info(n_workers=-1)["workers"])
@@ -189,7 +189,7 @@ SCRIPT = """
         from distributed import Client, LocalCluster
         given = dict(v=0.0, y=1.0, dt=0.1, steps=50, outcomes=["last", half])
         here = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **given)
-        with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as cluster, Client(cluster) as client:
+        with LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster, Client(cluster) as client:
             there = sw.sweep(spring, {"k": np.linspace(1.0, 2.0, 9)}, "rk4", **given, engine=client, chunk=2)
         assert here.attrs["bits"] == there.attrs["bits"]
         print("equal", (here.half == here.y_last / 2).all().item())
@@ -244,12 +244,13 @@ def test_kernels_are_compiled_once_a_worker() -> None:
     package = portable.packed(task)
     before = mapped()
     kernels = []
-    for k in range(5):
+    for k in range(6):
         chunk = Chunk((k,), (slice(64 * k, 64 * k + 64),), (64,), 64 * k)
         portable.run_packed(package, {"gamma": np.linspace(0.1, 0.6, 64) + k}, chunk)
         kernels.append(mapped())
-    assert kernels[0] != before
-    assert all(each == kernels[0] for each in kernels)
+    # A step is interpreted until compiling it pays, which for one of the two kinds of pieces may be in the second chunk.
+    assert kernels[1] != before
+    assert all(each == kernels[1] for each in kernels[1:])
     assert portable._task(package) is portable._task(bytes(bytearray(package)))
 
 
@@ -260,8 +261,9 @@ def test_what_cannot_travel_is_told() -> None:
         with lock:
             return run.y[-1]
 
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool, pytest.raises(
-        (ArgumentError, RuntimeError), match=r"engine: system and outcomes go to other processes by pickle|shared"
+    with (
+        ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool,
+        pytest.raises((ArgumentError, RuntimeError), match=r"engine: system and outcomes go to other processes by pickle|shared"),
     ):
         small(engine=pool, outcomes=locked)
 
