@@ -161,7 +161,8 @@ def sweep(
     where = store_of(store)
     kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
     _compute(task, grid, workers, kept, _checks.flag("progress", progress))
-    return kept.finish()
+    dataset: xarray.Dataset = kept.finish()
+    return dataset
 
 
 def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any]) -> None:

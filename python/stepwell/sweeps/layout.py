@@ -15,7 +15,7 @@ from ..result import Status
 from .axes import Chunk, Grid
 from .outcomes import Found
 
-#: What is in the place of whole numbers of members that are not computed yet.
+#: What stands for whole numbers of members that are not computed yet.
 NOT_YET = -1
 #: Length of a hash in bytes: of all results, and of those of a chunk.
 BYTES_OF_HASH, BYTES_OF_CHUNK_HASH = 16, 8
