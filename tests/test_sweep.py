@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.stats
 import stepwell as sw
+import xarray
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.sweeps import axes as of_axes
 from stepwell.sweeps import crossings, observed, outcomes
 from sweeping import AXES, OUTCOMES, duffing, power, small, unlike
-
-xarray = pytest.importorskip("xarray")
-scipy = pytest.importorskip("scipy")
 
 Oscillator = sw.Oscillator
 
@@ -343,6 +342,31 @@ def test_finite_numbers_that_mean_nothing_are_told() -> None:
         sw.sweep(sw.Pendulum(), {"v": [1.0, 1e18]}, "rk4", y=0.0, dt=0.1, steps=10)
 
 
+OBSERVED: dict[str, sw.System] = {
+    "own equations, driven": duffing(gamma=np.array([0.1, 0.5, 0.9])),
+    "sinusoid": sw.Pendulum(1.3, 0.1, a=sw.Sinusoid(np.array([0.5, 1.0, 1.5]), 1.1, 0.3)),
+    "samples": sw.Oscillator(1.3, 0.1, x=sw.Sampled(np.linspace(-1.0, 1.0, 16), 0.5), form="physical"),
+    "canonical": sw.Oscillator(np.array([1.0, 2.0, 3.0])),
+    "bodies": sw.scenes.figure_eight().system,
+}
+
+
+@pytest.mark.parametrize("name", OBSERVED)
+def test_rates_are_those_of_the_motion(name: str) -> None:
+    """Each member at a time of its own, as at passages; compared with a short step of RK4 from there."""
+    system, rng, t, h = OBSERVED[name], np.random.default_rng(1), np.array([0.1, 1.3, 2.6]), 1e-5
+    v, y = (rng.uniform(0.5, 1.0, (*shape, 3)) for shape in (system.v_shape, system.y_shape))
+    run = sw.integrate(system, "rk4", v=v, y=y, dt=0.1, steps=1)
+    for block in ("v", "y"):
+        found = observed.rates(run, block, t, v, y)
+        assert found is not None
+        for i in range(3):
+            after = sw.integrate(system, "rk4", v=v, y=y, dt=h, steps=1, t0=float(t[i]))
+            change = (getattr(after, block)[-1] - (v if block == "v" else y))[..., i] / h
+            # Rates change by some units in a unit of time (bodies that are near: some hundred), and differences are rounded.
+            np.testing.assert_allclose(found[..., i], change, atol=1e3 * h, rtol=1e-4)
+
+
 # ---- the same bits
 
 
@@ -542,3 +566,15 @@ def test_filters_of_warnings_are_as_before() -> None:
 def test_every_kind_of_outcome_is_tried() -> None:
     tried = {type(each).__name__ if isinstance(each, outcomes.Outcome) else each for each in OUTCOMES if not callable(each)}
     assert {"last", "extremes", "mean", "crossing", "period", "lyapunov"} <= tried
+
+
+@pytest.mark.parametrize("name", sw.sweeps.__all__)
+def test_everything_public_has_an_example_that_runs(name: str) -> None:
+    import doctest
+
+    thing, told = getattr(sw.sweeps, name), []
+    examples = doctest.DocTestParser().get_doctest(thing.__doc__ or "", {"sw": sw, "np": np}, name, None, None)
+    assert examples.examples
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE, verbose=False)
+    runner.run(examples, out=told.append)
+    assert runner.failures == 0, "".join(told)

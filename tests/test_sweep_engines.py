@@ -17,19 +17,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pytest
 import stepwell as sw
+import xarray
 from stepwell.errors import ArgumentError
 from stepwell.sweeps import portable
 from stepwell.sweeps.axes import Chunk
 from stepwell.sweeps.ensemble import _outcomes
 from stepwell.sweeps.task import Task
 from sweeping import AXES, OUTCOMES, duffing, ends, small, unlike
-
-xarray = pytest.importorskip("xarray")
-pytest.importorskip("cloudpickle")
-distributed = pytest.importorskip("distributed")
 
 #: Of Dask and its loops, at their own end.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")

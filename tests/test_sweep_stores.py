@@ -17,14 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+import xarray
 from stepwell.errors import ArgumentError
 from stepwell.sweeps import engines, stores
 from sweeping import small, unlike
-
-xarray = pytest.importorskip("xarray")
-zarr = pytest.importorskip("zarr")
-pytest.importorskip("h5netcdf")
-pytest.importorskip("dask.array")
 
 KINDS = pytest.mark.parametrize("ending", ["zarr", "nc"])
 
@@ -200,6 +196,16 @@ def test_a_path_with_something_else(ending: str, tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=r"store: expected a new path or that of a sweep, got .*, which is something else"):
         small(store=path, outcomes="last")
     assert path.read_text() == "mine"
+
+
+def test_a_removal_that_was_interrupted(tmp_path: Path) -> None:
+    """Of the chunks of a NetCDF file, after the file was written."""
+    small(store=tmp_path / "a.nc", outcomes="last").close()
+    left = tmp_path / "a.nc.unfinished"
+    left.mkdir()
+    (left / "y_last").mkdir()
+    small(store=tmp_path / "a.nc", outcomes="last").close()
+    assert os.listdir(tmp_path) == ["a.nc"]
 
 
 @KINDS

@@ -83,6 +83,12 @@ class Period(_Passages):
         level: in the units of the quantity.
         direction: "rising", "falling" or "both".
         name: of the results, in place of what they are of.
+
+    Example:
+        >>> axes = {"y": ("y0", [0.1, 2.0])}
+        >>> found = sw.sweep(sw.Pendulum(), axes, "rk4", v=0.0, dt=0.01, steps=5000, outcomes="period")
+        >>> found.y_period.values.round(5)  # four complete elliptic integrals
+        array([6.28711, 8.34975])
     """
 
     def begin(self) -> Reduction:

@@ -21,6 +21,13 @@ class Exponents(Outcome):
     Args:
         exponents: how many, or "all".
         every: steps from one orthonormalisation to the next.
+
+    Example:
+        >>> axes = {"damping": ("damping", [0.1, 0.2])}
+        >>> of = sw.sweeps.Exponents("all")
+        >>> found = sw.sweep(sw.Oscillator, {"omega": [1.0], **axes}, "rk4", v=0.0, y=1.0, dt=0.1, steps=200, outcomes=of)
+        >>> found.lyapunov.sum("exponent").values.round(4)
+        array([[-0.2, -0.4]])
     """
 
     observes = False

@@ -103,7 +103,14 @@ def _unit(what: Of) -> str | None:
 
 
 class Last(Outcome):
-    """The state at the end: ``v_last`` and ``y_last``."""
+    """The state at the end: ``v_last`` and ``y_last``.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=100, outcomes=sw.sweeps.Last())
+        >>> found.y_last.values.round(6)
+        array([ 0.540302, -0.416147])
+    """
 
     observes = False
 
@@ -199,6 +206,13 @@ class Mean(_Several):
     Args:
         of: as for ``Crossing``; both blocks if None.
         name: of the results, in place of what they are of.
+
+    Example:
+        >>> square = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
+        >>> axes = {"y": ("y0", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator(), axes, "rk4", v=0.0, dt=np.pi / 100, steps=200, outcomes=square)
+        >>> found.square_mean.values.round(6)
+        array([0.5, 2. ])
     """
 
     def begin(self) -> Reduction:
@@ -254,7 +268,16 @@ def called(name: Any, of: Of | None) -> str | None:
 
 
 class History(Outcome):
-    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it."""
+    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it.
+
+    Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, every=5)
+        >>> found.y.dims, found.t.values
+        (('omega', 't'), array([0. , 0.5, 1. ]))
+    """
 
     observes = False
 

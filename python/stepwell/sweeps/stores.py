@@ -167,7 +167,10 @@ class NetCDF(Zarr):
                     f"something else ({type(error).__name__}: {error})"
                 ) from None
             same_sweep(path, told, json.loads(layout.attrs[SWEEP]))
-        super().__init__(path.with_name(f"{path.name}.unfinished"), layout, chunk_shape)
+        unfinished = path.with_name(f"{path.name}.unfinished")
+        if self.whole and unfinished.exists():  # its removal was interrupted
+            shutil.rmtree(unfinished)
+        super().__init__(unfinished, layout, chunk_shape)
 
     def finished(self, chunk: Chunk) -> bool:
         """Whether the results of a chunk are there and whole."""
