@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         quaternion,
         scenes,
         stability,
+        sweeps,
     )
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from .interop.solve_ivp import solve_ivp
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
+    from .sweeps import sweep
     from .systems import Aircraft
 
 __version__: str = _core.__version__
@@ -133,6 +135,8 @@ __all__ = [
     "stability",
     "stability_along",
     "stability_limit",
+    "sweep",
+    "sweeps",
     "system",
 ]
 
@@ -187,6 +191,8 @@ _LATER = {
     "quaternion": "quaternion",
     "scenes": "scenes",
     "solve_ivp": "interop.solve_ivp.solve_ivp",
+    "sweep": "sweeps.sweep",
+    "sweeps": "sweeps",
     "system": "equations.system",
     "stability": "stability",
     "analyse": "stability.analyse",

@@ -215,4 +215,6 @@ class World:
 
 
 def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
+    # Arrays of a message from another process may be read-only, and begin at an odd place in memory.
+    state = {name: np.array(value) if isinstance(value, np.ndarray) else value for name, value in state.items()}
     return World(system, method, dt=dt, **state)
