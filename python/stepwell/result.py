@@ -21,6 +21,8 @@ from .systems import System
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from .events import Occurrences
+
     from matplotlib.figure import Figure
 
 
@@ -42,6 +44,8 @@ class Status(IntEnum):
     UNDERFLOW = 3
     #: With a tolerance: no step, however short, gave a finite state.
     NOT_FINITE = 4
+    #: A terminal event stopped it; ``Run.stopped_at`` says when.
+    EVENT = 5
 
 
 class Collision(NamedTuple):
@@ -117,11 +121,15 @@ class Run(Value):
         steps: number of steps.
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
+        events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
+        stopped_at: the time at which a terminal event stopped each member, NaN for others, shape (*batch); later saved states are
+            that of the event. None if there was no such event to look for.
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
         force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
+            None in a run with events.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -185,6 +193,8 @@ class Run(Value):
         self.stand = stand
         self.fused = fused
         self.force = force
+        self.events: dict[str, Occurrences] = {}
+        self.stopped_at: Array | None = None
 
     def _held(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""
@@ -260,8 +270,17 @@ class Run(Value):
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
         last one. A carry is for the same method only. ``np.savez`` writes all of it to a file; a control is an object, for which
         ``np.load`` needs ``allow_pickle=True``. ``dt`` is that of this run; another
-        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
+        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are
+        given again.
+
+        Raises:
+            UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
+        if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
+            raise UnsupportedError(
+                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run for "
+                f"each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+            )
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:
             kept = {} if self.system.keeper is None else {"control": self.system.keeper}
@@ -334,17 +353,20 @@ class Run(Value):
 
     def _told(self) -> list[tuple[str, str]]:
         """What it is, by name: steps, time, saved states, members, and how they ended."""
-        members, bad = self.status.size, int(np.count_nonzero(self.status))
+        diverged = (self.status != 0) & (self.status != Status.EVENT)
+        members, bad, stopped = self.status.size, int(np.count_nonzero(diverged)), int(np.count_nonzero(self.status == Status.EVENT))
         if self.paces is None:
             steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
             first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
-            how, number = "diverged", int(self.first_bad_step[self.status != 0].min()) if bad else None
+            how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
             steps = f"{_counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
             first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
         verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        if stopped:
+            verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
         return [
             ("steps", steps + (", fused" if self.fused else "")),
             ("time", f"{first:g} to {last:g}"),

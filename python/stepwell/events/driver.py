@@ -1,0 +1,270 @@
+"""A run with events: some steps of some members at a time, all of whose states are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import _checks, engine
+from .._checks import Array
+from ..reference import contact
+from ..reference.events import crosses, located
+from ..reference.types import Whole
+from ..result import Status
+from .event import Event
+from .members import Members
+from .result import Occurrences
+from .traced import Quantity
+
+#: Members × steps × numbers of a state that are looked at together: half a megabyte, which stays in a cache.
+NUMBERS_AT_ONCE = 1 << 16
+#: Members are cut into groups such that at least so many steps of each group are looked at together.
+LEAST_STEPS = 16
+#: The first look is after so many steps, each later one after four times as many, up to the most: a member may stop early.
+FIRST_STEPS, MOST_STEPS = 64, 1 << 13
+
+
+class Found(NamedTuple):
+    """Occurrences of one event within some steps: members of the group, steps from the first, times, states."""
+
+    member: Whole
+    step: Whole
+    share: Array
+    t: Array
+    v: Array
+    y: Array
+
+    def some(self, which: Any) -> Found:
+        """Some of them."""
+        return Found(*(each[..., which] for each in self))
+
+
+def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
+    """Raise if what may be kept of the events would not fit in memory."""
+    numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    rows = sum(numbers * (1 if event.terminal else min(event.most, plan.steps)) for event in events)
+    _checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
+
+
+class Run:
+    """A run with events, in place of ``engine.advance``.
+
+    Args:
+        events: what was asked for.
+        v: velocities at the start, or what the method carries, shape (*block, *batch).
+        y: coordinates, likewise.
+        before: first bad steps of earlier runs, as of ``engine.advance``.
+        carried: whether ``v`` is what the method carries.
+    """
+
+    def __init__(self, events: Sequence[Event], v: Array, y: Array, before: Whole | None, carried: bool) -> None:
+        self._events, self._start = events, (v, y, before, carried)
+        self._driver: _Driver | None = None
+
+    def made(self, plan: engine.Plan) -> engine.Outcome:
+        """Make it."""
+        check_room(self._events, plan)
+        self._driver = _Driver(plan, self._events)
+        return self._driver.run(*self._start)
+
+    def tell(self, run: Any) -> None:
+        """Give the result what was found."""
+        assert self._driver is not None
+        run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
+        if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
+            run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
+            run.encounter = run.overshoots = None  # these go through all of the steps
+
+
+class _Driver:
+    """The run of all members."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
+        self.plan, self.events = plan, events
+        self.members = Members(plan)
+        self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
+        total = plan.members
+        self.saves = plan.saves
+        blocks = plan.system.v_shape, plan.system.y_shape
+        self.kept = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
+        self.last = tuple(np.empty((*shape, total)) for shape in blocks)  # the v slot, and y
+        self.first_bad = np.full(total, -1, dtype=np.int64)
+        self.stopped_at = np.full(total, np.nan)
+        self.count = np.zeros((len(events), total), dtype=np.int64)
+        self.found: list[list[Found]] = [[] for _ in events]
+        self.done = 0
+        #: Per member of the group that is looked at, the share of its last step after which it has stopped.
+        self._end = np.empty(0)
+
+    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+        plan, total = self.plan, self.plan.members
+        numbers = max(1, prod(plan.system.v_shape) + prod(plan.system.y_shape))
+        v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
+        bad = self.first_bad.copy() if before is None else before.reshape(-1)
+        size = max(1, NUMBERS_AT_ONCE // (LEAST_STEPS * numbers))
+        for first in range(0, total, size):
+            index = np.arange(first, min(first + size, total))
+            self._group(index, v[..., index], y[..., index], bad[index], carried, max(1, NUMBERS_AT_ONCE // numbers))
+        return self._outcome()
+
+    def _group(self, index: Whole, slot: Array, y: Array, bad: Whole, carried: bool, most: int) -> None:
+        """All steps of some members; those that stop leave the group."""
+        plan, done, piece = self.plan, 0, FIRST_STEPS
+        some = self.members.plan(index)
+        while done < plan.steps and len(index):
+            steps = max(1, min(piece, most // len(index), MOST_STEPS, plan.steps - done))
+            now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
+            out = engine.advance(now, slot, y, bad, carried=carried)
+            slot, y, bad, carried = out.slot, out.y[-1], out.first_bad, True
+            self._save(done, steps, index, out.v, out.y)
+            stopped = self._look(now, index, out, done)
+            self.done += steps * len(index)
+            done, piece = done + steps, 4 * piece
+            self.last[0][..., index], self.last[1][..., index], self.first_bad[index] = slot, y, bad
+            if stopped.any():
+                self.first_bad[index[stopped]] = -1
+                self.done += int(stopped.sum()) * (plan.steps - done)
+                index, slot, y, bad = index[~stopped], slot[..., ~stopped], y[..., ~stopped], bad[~stopped]
+                if len(index):
+                    some = self.members.plan(index)
+            if plan.progress is not None:
+                plan.progress(self.done / (plan.steps * plan.members))
+
+    def _save(self, done: int, steps: int, index: Whole, *states: Array) -> None:
+        """Keep those of these states that are asked for."""
+        first, last = np.searchsorted(self.saves, done, "left"), np.searchsorted(self.saves, done + steps, "right")
+        if first == last:
+            return
+        where, members = self.saves[first:last] - done, slice(index[0], index[-1] + 1)
+        for kept, state in zip(self.kept, states, strict=True):
+            if len(index) == index[-1] + 1 - index[0]:
+                kept[first:last, ..., members] = state[where]
+            else:
+                kept[first:last][..., index] = state[where]
+
+    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
+        t = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
+        given = self.members.numbers(index)
+        g = [quantity(t, *states, given) for quantity in self.quantities]
+        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
+        if (out.first_bad >= 0).any():
+            ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
+            finite = (out.first_bad < 0) | (ends < out.first_bad)
+            changes = [each & finite for each in changes]
+        # The step in which a member may stop; later ones do not count.
+        last = np.full(len(index), now.steps)
+        for each, event in zip(changes, self.events, strict=True):
+            if event.terminal:
+                last = np.minimum(last, np.where(each.any(axis=0), each.argmax(axis=0), now.steps))
+        stops = last < now.steps
+        if stops.any():
+            changes = [each & (np.arange(now.steps)[:, np.newaxis] <= last) for each in changes]
+        found = [self._locate(now, index, e, changes[e], g[e], states, last) for e in range(len(changes))]
+        if stops.any():
+            self._stop(index, found, last, stops, done)
+        for e, (each, event) in enumerate(zip(found, self.events, strict=True)):
+            if each is None:
+                continue
+            kept = each
+            if stops.any():  # what comes after the end of a member is not there
+                share = np.where(each.step == last[each.member], self._end[each.member], 1.0)
+                kept = each.some(each.share <= share)
+            lost = np.bincount(each.member, minlength=len(index)) - np.bincount(kept.member, minlength=len(index))
+            before = self.count[e, index]
+            self.count[e, index] = before + changes[e].sum(axis=0) - lost
+            ordinal = before[kept.member] + _ordinals(kept.member)
+            kept = kept.some(ordinal <= event.most)
+            self.found[e].append(kept._replace(member=index[kept.member], step=kept.step + now.first))
+        return stops
+
+    def _locate(self, now: engine.Plan, index: Whole, e: int, changes: Any, g: Array, states: Any, last: Whole) -> Found | None:
+        """The places of these changes of sign, as far as they are kept or may come after the end of a member."""
+        if not changes.any():
+            return None
+        step, member = np.nonzero(changes)
+        ordinal = np.cumsum(changes, axis=0)[step, member] + self.count[e, index][member]
+        wanted = (ordinal <= self.events[e].most) | (step == last[member])
+        step, member = step[wanted], member[wanted]
+        v, y = (each[..., step, member] for each in states)
+        end_v, end_y = (each[..., step + 1, member] for each in states)
+        t = now.t0 + (now.first + step) * now.dt
+        numbers = index[member]
+
+        def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
+            some, h = self.members.plan(numbers[which]), share * now.dt
+            v_there, y_there = one_step(some, t[which], h, v[..., which], y[..., which])
+            return self.quantities[e](t[which] + h, v_there, y_there, self.members.numbers(numbers[which])), v_there, y_there
+
+        share, end_v, end_y = located(trial, g[step, member], g[step + 1, member], end_v, end_y)
+        return Found(member, step, share, t + share * now.dt, end_v, end_y)
+
+    def _stop(self, index: Whole, found: list[Found | None], last: Whole, stops: Any, done: int) -> None:
+        """Let members stop at the first terminal event of their last step: their state stays from there on."""
+        self._end = np.full(len(index), np.inf)
+        times = np.full(len(index), np.nan)
+        v, y = (np.empty((*each.shape[:-1], len(index))) for each in self.last)
+        for each, event in zip(found, self.events, strict=True):
+            if each is None or not event.terminal:
+                continue
+            ends = each.some((each.step == last[each.member]) & (each.share < self._end[each.member]))
+            self._end[ends.member], times[ends.member] = ends.share, ends.t
+            v[..., ends.member], y[..., ends.member] = ends.v, ends.y
+        self.stopped_at[index[stops]] = times[stops]
+        after = np.searchsorted(self.saves, done + last, "right")
+        for first in np.unique(after[stops]):
+            these = stops & (after == first)
+            for kept, state in zip(self.kept, (v, y), strict=True):
+                kept[first:][..., index[these]] = state[..., these]
+
+    def _outcome(self) -> engine.Outcome:
+        """As that of a run without events, without what a control added up."""
+        batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
+        v, y = (each.reshape(len(self.saves), *shape, *batch) for each, shape in zip(self.kept, blocks, strict=True))
+        first_bad = self.first_bad.reshape(batch)
+        diverged = bool((first_bad >= 0).any())
+        return engine.Outcome(v, y, self.last[0].reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+
+    def stops(self) -> Array | None:
+        """When a terminal event stopped each member; None without such events."""
+        return self.stopped_at.reshape(self.plan.batch) if any(event.terminal for event in self.events) else None
+
+    def occurrences(self) -> dict[str, Occurrences]:
+        """Those of each event, by name."""
+        blocks, made = (self.plan.system.v_shape, self.plan.system.y_shape), {}
+        for event, found, count in zip(self.events, self.found, self.count, strict=True):
+            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(_nothing(blocks), *found, strict=True))
+            order = np.lexsort((step, member))
+            v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
+            numbers = count.reshape(self.plan.batch)
+            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
+        return made
+
+
+def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+    """A step of the method from v and y, of another time and length for each member. What a method carries is made anew."""
+    steps, s = plan.method.steps, plan.system.scaled(h, plan.batch, plan.force)
+    with np.errstate(all="ignore"):
+        slot = v if plan.method.carry is None else steps.start(s, plan.choice, t, v, y)
+        slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
+        return np.asarray(slot if plan.method.carry is None else steps.finish(s, plan.choice, t + h, slot, y)), np.asarray(y)
+
+
+def _ordinals(member: Whole) -> Whole:
+    """For each entry the how many-th of its member it is, from 1 on; entries are in the order of time."""
+    order = np.argsort(member, kind="stable")
+    ascending = member[order]
+    first = np.searchsorted(ascending, ascending, "left")
+    ordinals = np.empty(len(member), dtype=np.int64)
+    ordinals[order] = np.arange(len(member)) - first + 1
+    return ordinals
+
+
+def _nothing(blocks: Any) -> Found:
+    """No occurrences."""
+    whole, real = np.empty(0, dtype=np.int64), np.empty(0)
+    return Found(whole, whole, real, real, *(np.empty((*shape, 0)) for shape in blocks))
