@@ -10,7 +10,6 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference import contact
 from ..reference.events import crosses, located
 from ..reference.types import Whole
 from ..result import Status
@@ -18,17 +17,37 @@ from .event import Event
 from .members import Members
 from .result import Occurrences
 from .traced import Quantity
+from .trials import Trials
 
-#: Members × steps × numbers of a state that are looked at together: half a megabyte, which stays in a cache.
-NUMBERS_AT_ONCE = 1 << 16
+#: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
+NUMBERS_AT_ONCE = 1 << 17
 #: Members are cut into groups such that at least so many steps of each group are looked at together.
 LEAST_STEPS = 16
 #: The first look is after so many steps, each later one after four times as many, up to the most: a member may stop early.
 FIRST_STEPS, MOST_STEPS = 64, 1 << 13
+#: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
+LOCATED_AT_ONCE = 1 << 12
+
+
+class Changes(NamedTuple):
+    """Changes of sign of one event that are yet to be located: whose, in which step, and what is known at both ends of that."""
+
+    member: Whole
+    step: Whole
+    g: Array
+    g_end: Array
+    v: Array
+    y: Array
+    v_end: Array
+    y_end: Array
+
+    def some(self, which: Any) -> Changes:
+        """Some of them."""
+        return Changes(*(each[..., which] for each in self))
 
 
 class Found(NamedTuple):
-    """Occurrences of one event within some steps: members of the group, steps from the first, times, states."""
+    """Occurrences of one event: members, numbers of steps, shares of them, times, and states there."""
 
     member: Whole
     step: Whole
@@ -95,9 +114,8 @@ class _Driver:
         self.stopped_at = np.full(total, np.nan)
         self.count = np.zeros((len(events), total), dtype=np.int64)
         self.found: list[list[Found]] = [[] for _ in events]
-        self.done = 0
-        #: Per member of the group that is looked at, the share of its last step after which it has stopped.
-        self._end = np.empty(0)
+        self.trials, self.done = Trials(plan, self.members), 0
+        self.waiting: list[list[Changes]] = [[] for _ in events]
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
         plan, total = self.plan, self.plan.members
@@ -108,6 +126,8 @@ class _Driver:
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
             self._group(index, v[..., index], y[..., index], bad[index], carried, max(1, NUMBERS_AT_ONCE // numbers))
+        for e in range(len(self.events)):
+            self._locate_waiting(e)
         return self._outcome()
 
     def _group(self, index: Whole, slot: Array, y: Array, bad: Whole, carried: bool, most: int) -> None:
@@ -156,7 +176,7 @@ class _Driver:
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
             finite = (out.first_bad < 0) | (ends < out.first_bad)
             changes = [each & finite for each in changes]
-        # The step in which a member may stop; later ones do not count.
+        # The step in which a member stops; later ones do not count.
         last = np.full(len(index), now.steps)
         for each, event in zip(changes, self.events, strict=True):
             if event.terminal:
@@ -164,62 +184,73 @@ class _Driver:
         stops = last < now.steps
         if stops.any():
             changes = [each & (np.arange(now.steps)[:, np.newaxis] <= last) for each in changes]
-        found = [self._locate(now, index, e, changes[e], g[e], states, last) for e in range(len(changes))]
+        in_last: list[tuple[Found, Whole]] = []
+        for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
+            step, member = np.nonzero(each)
+            if stops.any():
+                mine = step == last[member]
+                in_last.append((self._located(e, self._changes(now, index, g[e], states, step[mine], member[mine])), member[mine]))
+                step, member = step[~mine], member[~mine]
+            if len(step):
+                kept = _ordinals(member) + self.count[e, index[member]] <= event.most
+                self.count[e, index] += np.bincount(member, minlength=len(index))
+                self._put_off(e, self._changes(now, index, g[e], states, step[kept], member[kept]))
         if stops.any():
-            self._stop(index, found, last, stops, done)
-        for e, (each, event) in enumerate(zip(found, self.events, strict=True)):
-            if each is None:
-                continue
-            kept = each
-            if stops.any():  # what comes after the end of a member is not there
-                share = np.where(each.step == last[each.member], self._end[each.member], 1.0)
-                kept = each.some(each.share <= share)
-            lost = np.bincount(each.member, minlength=len(index)) - np.bincount(kept.member, minlength=len(index))
-            before = self.count[e, index]
-            self.count[e, index] = before + changes[e].sum(axis=0) - lost
-            ordinal = before[kept.member] + _ordinals(kept.member)
-            kept = kept.some(ordinal <= event.most)
-            self.found[e].append(kept._replace(member=index[kept.member], step=kept.step + now.first))
+            self._stop(index, in_last, last, stops, done)
         return stops
 
-    def _locate(self, now: engine.Plan, index: Whole, e: int, changes: Any, g: Array, states: Any, last: Whole) -> Found | None:
-        """The places of these changes of sign, as far as they are kept or may come after the end of a member."""
-        if not changes.any():
-            return None
-        step, member = np.nonzero(changes)
-        ordinal = np.cumsum(changes, axis=0)[step, member] + self.count[e, index][member]
-        wanted = (ordinal <= self.events[e].most) | (step == last[member])
-        step, member = step[wanted], member[wanted]
-        v, y = (each[..., step, member] for each in states)
-        end_v, end_y = (each[..., step + 1, member] for each in states)
-        t = now.t0 + (now.first + step) * now.dt
-        numbers = index[member]
+    def _changes(self, now: engine.Plan, index: Whole, g: Array, states: Any, step: Whole, member: Whole) -> Changes:
+        """What is known of the changes of sign of these members in these steps."""
+        begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
+        return Changes(index[member], now.first + step, g[step, member], g[step + 1, member], *begins, *ends)
+
+    def _put_off(self, e: int, changes: Changes) -> None:
+        """Locate these with others, as many at once as are quick together."""
+        self.waiting[e].append(changes)
+        if sum(len(each.member) for each in self.waiting[e]) >= LOCATED_AT_ONCE:
+            self._locate_waiting(e)
+
+    def _locate_waiting(self, e: int) -> None:
+        """Locate what was put off."""
+        waiting, self.waiting[e] = self.waiting[e], []
+        if waiting:
+            together = Changes(*(np.concatenate(each, axis=-1) for each in zip(*waiting, strict=True)))
+            for first in range(0, len(together.member), LOCATED_AT_ONCE):
+                self.found[e].append(self._located(e, together.some(slice(first, first + LOCATED_AT_ONCE))))
+
+    def _located(self, e: int, changes: Changes) -> Found:
+        """The places of these changes of sign."""
+        member, step, dt = changes.member, changes.step, self.plan.dt
+        t = self.plan.t0 + step * dt
 
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
-            some, h = self.members.plan(numbers[which]), share * now.dt
-            v_there, y_there = one_step(some, t[which], h, v[..., which], y[..., which])
-            return self.quantities[e](t[which] + h, v_there, y_there, self.members.numbers(numbers[which])), v_there, y_there
+            index, h = member[which], share * dt
+            v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
+            return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        share, end_v, end_y = located(trial, g[step, member], g[step + 1, member], end_v, end_y)
-        return Found(member, step, share, t + share * now.dt, end_v, end_y)
+        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end)
+        return Found(member, step, share, t + share * dt, v, y)
 
-    def _stop(self, index: Whole, found: list[Found | None], last: Whole, stops: Any, done: int) -> None:
+    def _stop(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any, done: int) -> None:
         """Let members stop at the first terminal event of their last step: their state stays from there on."""
-        self._end = np.full(len(index), np.inf)
-        times = np.full(len(index), np.nan)
+        end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*each.shape[:-1], len(index))) for each in self.last)
-        for each, event in zip(found, self.events, strict=True):
-            if each is None or not event.terminal:
-                continue
-            ends = each.some((each.step == last[each.member]) & (each.share < self._end[each.member]))
-            self._end[ends.member], times[ends.member] = ends.share, ends.t
-            v[..., ends.member], y[..., ends.member] = ends.v, ends.y
+        for (each, member), event in zip(in_last, self.events, strict=True):
+            if event.terminal:
+                first = each.share < end[member]
+                ends, who = each.some(first), member[first]
+                end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
+        for e, ((each, member), event) in enumerate(zip(in_last, self.events, strict=True)):
+            before_it = each.share <= end[member]  # what comes after the end of a member is not there
+            kept = each.some(before_it)
+            self.count[e, kept.member] += 1
+            self.found[e].append(kept.some(self.count[e, kept.member] <= event.most))
         self.stopped_at[index[stops]] = times[stops]
         after = np.searchsorted(self.saves, done + last, "right")
-        for first in np.unique(after[stops]):
-            these = stops & (after == first)
-            for kept, state in zip(self.kept, (v, y), strict=True):
-                kept[first:][..., index[these]] = state[..., these]
+        for place in np.unique(after[stops]):
+            these = stops & (after == place)
+            for kept_states, state in zip(self.kept, (v, y), strict=True):
+                kept_states[place:][..., index[these]] = state[..., these]
 
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""
@@ -243,15 +274,6 @@ class _Driver:
             numbers = count.reshape(self.plan.batch)
             made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
         return made
-
-
-def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-    """A step of the method from v and y, of another time and length for each member. What a method carries is made anew."""
-    steps, s = plan.method.steps, plan.system.scaled(h, plan.batch, plan.force)
-    with np.errstate(all="ignore"):
-        slot = v if plan.method.carry is None else steps.start(s, plan.choice, t, v, y)
-        slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
-        return np.asarray(slot if plan.method.carry is None else steps.finish(s, plan.choice, t + h, slot, y)), np.asarray(y)
 
 
 def _ordinals(member: Whole) -> Whole:

@@ -11,6 +11,7 @@ from .. import engine
 from .._checks import Array, Shape
 from .._value import changed, complete
 from ..reference.signal import Constant, Held, Sine
+from ..systems.own import OwnSystem
 
 #: From numbers, and how many axes of their own they have (None if as many as the batch leaves), to others.
 Change = Callable[[Array, int | None], Array]
@@ -80,6 +81,8 @@ class Members:
         if control is not None:
             control = changed(control, **{name: some(value) for name, value in self._control.items()})
         taken = changed(system)
+        if isinstance(system, OwnSystem):
+            complete(taken, _core=system._core)  # its operations, which a copy leaves out
         complete(
             taken,
             batch=batch,
