@@ -21,9 +21,9 @@ from .systems import System
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from .events import Occurrences
-
     from matplotlib.figure import Figure
+
+    from .events import Occurrences
 
 
 class Status(IntEnum):
@@ -112,7 +112,8 @@ class Run(Value):
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
         first_bad_step: per member, the number of the first step after which the state was not finite, or at which a run with a
             tolerance stopped; −1 if there is none, shape (*batch).
-        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
+        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None; NaN for members that
+            stopped at an event.
         system: the system that was stepped, with its control.
         method: the method.
         dt: the step.
@@ -278,8 +279,8 @@ class Run(Value):
         """
         if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
             raise UnsupportedError(
-                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run for "
-                f"each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run "
+                f"for each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
             )
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:
@@ -354,7 +355,11 @@ class Run(Value):
     def _told(self) -> list[tuple[str, str]]:
         """What it is, by name: steps, time, saved states, members, and how they ended."""
         diverged = (self.status != 0) & (self.status != Status.EVENT)
-        members, bad, stopped = self.status.size, int(np.count_nonzero(diverged)), int(np.count_nonzero(self.status == Status.EVENT))
+        members, bad, stopped = (
+            self.status.size,
+            int(np.count_nonzero(diverged)),
+            int(np.count_nonzero(self.status == Status.EVENT)),
+        )
         if self.paces is None:
             steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
             first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt

@@ -176,13 +176,16 @@ def run_by(function: Callable[..., Any], name: str, quick_sines: bool, *given: A
         known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
         said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
         told = TraceError(f"{name}{line}: {said}")
-        told.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+        told.of_shape = (
+            known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+        )
         raise told from error
     finally:
         QUICK_SINES.reset(before)
 
 
 def kind_of(made: Any) -> str:
+    """What a function returned, in a word or two."""
     return "nothing: is there a return?" if made is None else f"{type(made).__name__}"
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses, located
+from ..reference.events import crosses, located, width_at
 from ..reference.types import Whole
 from ..result import Status
 from .event import Event
@@ -43,7 +43,8 @@ class Changes(NamedTuple):
 
     def some(self, which: Any) -> Changes:
         """Some of them."""
-        return Changes(*(each[..., which] for each in self))
+        parts: Any = (each[..., which] for each in self)
+        return Changes(*parts)
 
 
 class Found(NamedTuple):
@@ -58,7 +59,8 @@ class Found(NamedTuple):
 
     def some(self, which: Any) -> Found:
         """Some of them."""
-        return Found(*(each[..., which] for each in self))
+        parts: Any = (each[..., which] for each in self)
+        return Found(*parts)
 
 
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
@@ -109,7 +111,7 @@ class _Driver:
         self.saves = plan.saves
         blocks = plan.system.v_shape, plan.system.y_shape
         self.kept = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
-        self.last = tuple(np.empty((*shape, total)) for shape in blocks)  # the v slot, and y
+        self.slot = np.empty((*blocks[0], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.stopped_at = np.full(total, np.nan)
         self.count = np.zeros((len(events), total), dtype=np.int64)
@@ -143,9 +145,10 @@ class _Driver:
             stopped = self._look(now, index, out, done)
             self.done += steps * len(index)
             done, piece = done + steps, 4 * piece
-            self.last[0][..., index], self.last[1][..., index], self.first_bad[index] = slot, y, bad
+            self.slot[..., index], self.first_bad[index] = slot, bad
             if stopped.any():
                 self.first_bad[index[stopped]] = -1
+                self.slot[..., index[stopped]] = np.nan  # what a method would carry from there on is not known
                 self.done += int(stopped.sum()) * (plan.steps - done)
                 index, slot, y, bad = index[~stopped], slot[..., ~stopped], y[..., ~stopped], bad[~stopped]
                 if len(index):
@@ -167,10 +170,10 @@ class _Driver:
 
     def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
         """Find the events within these steps; which of the members stop."""
-        states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
-        t = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
+        v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
+        t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
-        g = [quantity(t, *states, given) for quantity in self.quantities]
+        g = [quantity(t, v, y, given) for quantity in self.quantities]
         changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
         if (out.first_bad >= 0).any():
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
@@ -189,7 +192,9 @@ class _Driver:
             step, member = np.nonzero(each)
             if stops.any():
                 mine = step == last[member]
-                in_last.append((self._located(e, self._changes(now, index, g[e], states, step[mine], member[mine])), member[mine]))
+                in_last.append(
+                    (self._located(e, self._changes(now, index, g[e], states, step[mine], member[mine])), member[mine])
+                )
                 step, member = step[~mine], member[~mine]
             if len(step):
                 kept = _ordinals(member) + self.count[e, index[member]] <= event.most
@@ -221,20 +226,20 @@ class _Driver:
     def _located(self, e: int, changes: Changes) -> Found:
         """The places of these changes of sign."""
         member, step, dt = changes.member, changes.step, self.plan.dt
-        t = self.plan.t0 + step * dt
+        t: Any = self.plan.t0 + step * dt
 
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
             index, h = member[which], share * dt
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
             return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end)
+        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end, width_at(t, dt))
         return Found(member, step, share, t + share * dt, v, y)
 
     def _stop(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any, done: int) -> None:
         """Let members stop at the first terminal event of their last step: their state stays from there on."""
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
-        v, y = (np.empty((*each.shape[:-1], len(index))) for each in self.last)
+        v, y = (np.empty((*each.shape[1:-1], len(index))) for each in self.kept)
         for (each, member), event in zip(in_last, self.events, strict=True):
             if event.terminal:
                 first = each.share < end[member]
@@ -258,7 +263,7 @@ class _Driver:
         v, y = (each.reshape(len(self.saves), *shape, *batch) for each, shape in zip(self.kept, blocks, strict=True))
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
-        return engine.Outcome(v, y, self.last[0].reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+        return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
 
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""

@@ -67,7 +67,8 @@ def several(events: Any) -> list[Event]:
     """The events that were given: one or a list, of which each may be a function alone."""
     given: Sequence[Any] = [events] if isinstance(events, Event) or callable(events) else []
     made = [
-        each if isinstance(each, Event) else Event(_function(each)) for each in given or _checks.several("events", events, "events")
+        each if isinstance(each, Event) else Event(_function(each))
+        for each in given or _checks.several("events", events, "events")
     ]
     names = [each.name for each in made]
     for name in names:

@@ -77,7 +77,7 @@ class Quantity:
         return Operations(*tape.operations([value if isinstance(value, _core.Symbol) else tape.number(float(value))]))
 
     def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> Array:
-        """g of states whose axes are the block's first; times and parameters broadcast over the others."""
+        """The quantity of states whose axes are the block's first; times and parameters broadcast over the others."""
         state = [t, *_rows(v, self.v_shape), *_rows(y, self.y_shape)] if self.has_v else [t, *_rows(y, self.y_shape)]
         numbers = [each for name in self._parameters for each in _rows(given[name], given[name].shape[:-1])]
         with np.errstate(all="ignore"):

@@ -67,8 +67,9 @@ class Trials:
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
     """A step of all members of a plan, likewise."""
+    system: Any = plan.system  # whose step is one number elsewhere
     with np.errstate(all="ignore"):
-        v, y = stepped(plan, plan.system.scaled(h, plan.batch, plan.force), t, h, v, y)
+        v, y = stepped(plan, system.scaled(h, plan.batch, plan.force), t, h, v, y)
     return np.asarray(v), np.asarray(y)
 
 
