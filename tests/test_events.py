@@ -142,13 +142,13 @@ def test_batch_axes_and_parameters_of_all_shapes() -> None:
     assert found.count.shape == (3, 2)
     for i, j in np.ndindex(3, 2):
         alone = sw.integrate(sw.Pendulum(omega[i, j], damping[j]), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=event)
-        np.testing.assert_array_equal(alone.events["zero"].t, found.of(i, j).t)
-        np.testing.assert_array_equal(alone.events["zero"].y, found.of(i, j).y)
-    assert len(found.of(-1, -1).t) == found.count[-1, -1]
+        np.testing.assert_array_equal(alone.events["zero"].t, found.of((i, j)).t)
+        np.testing.assert_array_equal(alone.events["zero"].y, found.of((i, j)).y)
+    assert len(found.of((-1, -1)).t) == found.count[-1, -1]
     with pytest.raises(sw.errors.ArgumentError, match="index: expected 2 whole"):
         found.of(1)
     with pytest.raises(sw.errors.ArgumentError, match="index: expected -2"):
-        found.of(0, 2)
+        found.of((0, 2))
 
 
 @pytest.mark.parametrize("method", ["rk4", "verlet", "leapfrog"])

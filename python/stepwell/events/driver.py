@@ -23,7 +23,7 @@ from .trials import Trials
 NUMBERS_AT_ONCE = 1 << 17
 #: Members are cut into groups such that at least so many steps of each group are looked at together.
 LEAST_STEPS = 16
-#: The first look is after so many steps, each later one after four times as many, up to the most: a member may stop early.
+#: The first steps are few, then four times as many are made together each time, up to the most: a member may stop early.
 FIRST_STEPS, MOST_STEPS = 64, 1 << 13
 #: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
 LOCATED_AT_ONCE = 1 << 12

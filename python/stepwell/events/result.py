@@ -43,16 +43,17 @@ class Occurrences(Value):
     v: Array
     y: Array
 
-    def of(self, *index: int) -> Occurrences:
+    def of(self, index: int | tuple[int, ...] = ()) -> Occurrences:
         """Those of one member.
 
         Args:
-            index: of the member in the batch, one whole number for each batch axis.
+            index: of the member in the batch, a whole number or, for several batch axes, a tuple of them.
 
         Raises:
             ArgumentError: if there is no such member.
         """
         shape = self.count.shape
+        index = index if isinstance(index, tuple) else (index,)
         if len(index) != len(shape):
             raise ArgumentError(f"index: expected {len(shape)} whole number(s), for a batch of shape {shape}, got {len(index)}")
         place = tuple(_checks.count("index", i, -n, n - 1) % n for i, n in zip(index, shape, strict=True))
