@@ -50,13 +50,20 @@ DIRECT = [case for case in cases() if case.form == "direct"]
 
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
 @pytest.mark.filterwarnings("ignore")
-def test_steps_are_those_of_a_run_without_and_both_backends_agree(case: Case) -> None:
+def test_steps_are_those_of_a_run_without_and_both_backends_agree(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     event = nearly_first(case)
     plain, run = case.run(5), case.run(5, events=event)
     assert_same(plain, run)
     reference = case.run(5, events=event, backend="numpy")
     assert_same(reference, run)
     assert_same_events(reference, run)
+    # Where few states are saved the core notices changes of sign, and only the steps of such members are looked at.
+    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
+    monkeypatch.setattr(driver, "WATCHED_STEPS", 8)
+    noticed = case.run(5, every=None, events=event)
+    assert_same_events(reference, noticed)
+    np.testing.assert_array_equal(noticed.y[-1], plain.y[-1])
+    np.testing.assert_array_equal(noticed.v[-1], plain.v[-1])
 
 
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
@@ -126,6 +133,46 @@ def test_how_many_are_looked_at_together_does_not_matter(method: str, monkeypatc
         other = sweep(method=method)
         assert_same(run, other)
         assert_same_events(run, other)
+
+
+@pytest.mark.parametrize("method", ["rk4", "verlet"])
+@pytest.mark.parametrize("every", [None, 50])
+def test_what_the_core_notices_is_all_that_there_is(method: str, every: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    every_state = sweep(method=method, every=every)  # 40 are few
+    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
+    for steps in (64, 3, 1000):
+        monkeypatch.setattr(driver, "WATCHED_STEPS", steps)
+        noticed = sweep(method=method, every=every)
+        assert_same(every_state, noticed)
+        assert_same_events(every_state, noticed)
+
+
+def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So the core's part is not idle: of a quantity that never changes its sign it notices nothing within some steps."""
+    found = sweep(every=None)
+    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
+    right = driver.watched
+    never = sw.Event(lambda t, v, y: y * y + 1.0)
+
+    def wrong(quantities: Any, plan: Any) -> Any:
+        return right([driver.Quantity(never, plan.system, {}) for _ in quantities], plan)
+
+    monkeypatch.setattr(driver, "watched", wrong)
+    assert sweep(every=None).events["crossing"].count.sum() < found.events["crossing"].count.sum()
+
+
+def test_a_system_whose_step_is_too_long_for_one_tape(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 600 masses: there the core does not notice anything, and all states are looked at."""
+    monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
+    y = np.zeros((600, 3))
+    y[0] = 1.0, 1.1, 1.2
+    event = sw.Event(lambda t, v, y: y[0] - 0.5, name="half")
+    runs = [
+        sw.integrate(sw.Chain(600), "rk4", v=0.0, y=y, dt=0.1, steps=40, events=event, backend=backend)
+        for backend in ("rust", "numpy")
+    ]
+    assert runs[0].events["half"].count.all()
+    assert_same_events(*runs)
 
 
 def test_threads_do_not_matter() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,9 @@ from ..reference.types import Whole
 from ..result import Status
 from .event import Event
 from .members import Members
+from .parts import At, Changes, Found, nothing, ordinals
 from .result import Occurrences
-from .traced import Quantity
+from .traced import Quantity, watched
 from .trials import Trials
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
@@ -25,42 +26,15 @@ NUMBERS_AT_ONCE = 1 << 17
 LEAST_STEPS = 16
 #: The first steps are few, then four times as many are made together each time, up to the most: a member may stop early.
 FIRST_STEPS, MOST_STEPS = 64, 1 << 13
+#: Where the core notices changes of sign, so many steps are made at once; those of a member that has one are repeated.
+#: Twice as many the next time if fewer than this share of the members had one, half as many if more than that had.
+WATCHED_STEPS, FEW_NOTICED, MANY_NOTICED = 64, 1 / 16, 1 / 4
+#: All states of fewer members than these are looked at: a repetition would take longer than that.
+FEW_MEMBERS = 64
+#: Where states are saved more often than after so many steps, all are looked at instead.
+LEAST_BETWEEN_SAVES = 32
 #: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
 LOCATED_AT_ONCE = 1 << 12
-
-
-class Changes(NamedTuple):
-    """Changes of sign of one event that are yet to be located: whose, in which step, and what is known at both ends of that."""
-
-    member: Whole
-    step: Whole
-    g: Array
-    g_end: Array
-    v: Array
-    y: Array
-    v_end: Array
-    y_end: Array
-
-    def some(self, which: Any) -> Changes:
-        """Some of them."""
-        parts: Any = (each[..., which] for each in self)
-        return Changes(*parts)
-
-
-class Found(NamedTuple):
-    """Occurrences of one event: members, numbers of steps, shares of them, times, and states there."""
-
-    member: Whole
-    step: Whole
-    share: Array
-    t: Array
-    v: Array
-    y: Array
-
-    def some(self, which: Any) -> Found:
-        """Some of them."""
-        parts: Any = (each[..., which] for each in self)
-        return Found(*parts)
 
 
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
@@ -117,6 +91,7 @@ class _Driver:
         self.count = np.zeros((len(events), total), dtype=np.int64)
         self.found: list[list[Found]] = [[] for _ in events]
         self.trials, self.done = Trials(plan, self.members), 0
+        self.watched: engine.Watched | None = None
         self.waiting: list[list[Changes]] = [[] for _ in events]
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
@@ -125,36 +100,77 @@ class _Driver:
         v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
         size = max(1, NUMBERS_AT_ONCE // (LEAST_STEPS * numbers))
+        if plan.backend == "rust" and not plan.fused and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES):
+            self.watched = watched(self.quantities, self.members.plan(np.arange(min(2, total))))
+            size = max(1, NUMBERS_AT_ONCE // numbers)  # no states are kept between
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
-            self._group(index, v[..., index], y[..., index], bad[index], carried, max(1, NUMBERS_AT_ONCE // numbers))
+            self._group(index, At(v[..., index], y[..., index], bad[index], carried), max(1, NUMBERS_AT_ONCE // numbers))
         for e in range(len(self.events)):
             self._locate_waiting(e)
         return self._outcome()
 
-    def _group(self, index: Whole, slot: Array, y: Array, bad: Whole, carried: bool, most: int) -> None:
+    def _group(self, index: Whole, at: At, most: int) -> None:
         """All steps of some members; those that stop leave the group."""
-        plan, done, piece = self.plan, 0, FIRST_STEPS
+        plan, done, piece, together = self.plan, 0, FIRST_STEPS, WATCHED_STEPS
         some = self.members.plan(index)
         while done < plan.steps and len(index):
-            steps = max(1, min(piece, most // len(index), MOST_STEPS, plan.steps - done))
-            now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
-            out = engine.advance(now, slot, y, bad, carried=carried)
-            slot, y, bad, carried = out.slot, out.y[-1], out.first_bad, True
-            self._save(done, steps, index, out.v, out.y)
-            stopped = self._look(now, index, out, done)
-            self.done += steps * len(index)
-            done, piece = done + steps, 4 * piece
-            self.slot[..., index], self.first_bad[index] = slot, bad
+            now = some._replace(first=plan.first + done, record=(), progress=None)
+            noticing = self.watched is not None and len(index) >= FEW_MEMBERS
+            if noticing and done > 0:
+                now = now._replace(steps=min(together, self._next_save(done) - done), every=None, watched=self.watched)
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                if out.noticed is None or np.isnan(out.noticed[-1]).any():
+                    self.watched = None  # steps too long for one tape
+                    continue
+                stopped, share = self._look_again(now, index, at, out, done, most)
+                if share < FEW_NOTICED:
+                    together = min(2 * together, MOST_STEPS)
+                elif share > MANY_NOTICED:
+                    together = max(together // 2, LEAST_STEPS)
+            else:
+                longest = 1 if noticing else min(piece, most // len(index), MOST_STEPS)
+                now = now._replace(steps=min(max(1, longest), plan.steps - done), every=1)
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                self._save(done, now.steps, index, out.v, out.y)
+                stopped = self._look(now, index, out, done)
+            self.done += now.steps * len(index)
+            done, piece = done + now.steps, 4 * piece
+            at = At(out.slot, out.y[-1], out.first_bad, True)
+            self.slot[..., index], self.first_bad[index] = at.slot, at.bad
             if stopped.any():
                 self.first_bad[index[stopped]] = -1
                 self.slot[..., index[stopped]] = np.nan  # what a method would carry from there on is not known
                 self.done += int(stopped.sum()) * (plan.steps - done)
-                index, slot, y, bad = index[~stopped], slot[..., ~stopped], y[..., ~stopped], bad[~stopped]
+                index, at = index[~stopped], at.some(~stopped)
                 if len(index):
                     some = self.members.plan(index)
             if plan.progress is not None:
                 plan.progress(self.done / (plan.steps * plan.members))
+
+    def _look_again(self, now: engine.Plan, index: Whole, at: At, out: engine.Outcome, done: int, most: int) -> Any:
+        """Repeat the steps of members with a change of sign, to find it; which members stop, and which share was repeated."""
+        assert out.noticed is not None
+        if done + now.steps == self._next_save(done):
+            self._save(done + now.steps, 0, index, out.v, out.y)
+        end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
+        noticed = out.noticed[-1] > 0.0
+        for quantity, event, before in zip(self.quantities, self.events, out.noticed, strict=False):
+            noticed |= crosses(before, quantity(np.array(end), out.v[-1], out.y[-1], given), event.direction)
+        stopped, where = np.zeros(len(index), dtype=bool), np.flatnonzero(noticed)
+        size = max(1, most // now.steps)
+        for first in range(0, len(where), size):
+            these = where[first : first + size]
+            again = self.members.plan(index[these])
+            again = now._replace(system=again.system, batch=again.batch, force=again.force, every=1, watched=None)
+            then = at.some(these)
+            states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
+            stopped[these] = self._look(again, index[these], states, done)
+        return stopped, len(where) / len(index)
+
+    def _next_save(self, done: int) -> int:
+        """The next step after these whose state is kept."""
+        return int(self.saves[np.searchsorted(self.saves, done, "right")])
 
     def _save(self, done: int, steps: int, index: Whole, *states: Array) -> None:
         """Keep those of these states that are asked for."""
@@ -197,7 +213,7 @@ class _Driver:
                 )
                 step, member = step[~mine], member[~mine]
             if len(step):
-                kept = _ordinals(member) + self.count[e, index[member]] <= event.most
+                kept = ordinals(member) + self.count[e, index[member]] <= event.most
                 self.count[e, index] += np.bincount(member, minlength=len(index))
                 self._put_off(e, self._changes(now, index, g[e], states, step[kept], member[kept]))
         if stops.any():
@@ -273,25 +289,9 @@ class _Driver:
         """Those of each event, by name."""
         blocks, made = (self.plan.system.v_shape, self.plan.system.y_shape), {}
         for event, found, count in zip(self.events, self.found, self.count, strict=True):
-            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(_nothing(blocks), *found, strict=True))
+            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
             order = np.lexsort((step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
             made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
         return made
-
-
-def _ordinals(member: Whole) -> Whole:
-    """For each entry the how many-th of its member it is, from 1 on; entries are in the order of time."""
-    order = np.argsort(member, kind="stable")
-    ascending = member[order]
-    first = np.searchsorted(ascending, ascending, "left")
-    ordinals = np.empty(len(member), dtype=np.int64)
-    ordinals[order] = np.arange(len(member)) - first + 1
-    return ordinals
-
-
-def _nothing(blocks: Any) -> Found:
-    """No occurrences."""
-    whole, real = np.empty(0, dtype=np.int64), np.empty(0)
-    return Found(whole, whole, real, real, *(np.empty((*shape, 0)) for shape in blocks))

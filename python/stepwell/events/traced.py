@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import count
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from .. import _core
+from .. import _core, engine
 from .._checks import Array
 from ..equations.namespace import rebound
 from ..equations.trace import kind_of, run_by, scalars
@@ -34,7 +34,9 @@ class Quantity:
         self.event, self.v_shape, self.y_shape = event, system.v_shape, system.y_shape
         self.has_v = prod(system.v_shape) > 0
         self._parameters = self._named(system, given)
-        made = [self._traced(system, given) for _ in range(2)]
+        self._quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
+        self._shapes = {name: given[name].shape[:-1] for name in self._parameters}
+        made = [self._operations_of() for _ in range(2)]
         if made[0].lines != made[1].lines:
             raise TraceError(
                 f"events: {event.name}: expected the same operations at every call, got others: an event may not draw random "
@@ -62,19 +64,29 @@ class Quantity:
                 )
         return taken
 
-    def _traced(self, system: System, given: dict[str, Any]) -> Operations:
+    def _operations_of(self) -> Operations:
+        """Its operations, of which the time is the first number of the state."""
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
-        parameters = {name: _symbols(given[name].shape[:-1], numbers) for name in self._parameters}
-        t = Scalar(next(state))
+        t = next(state)
+        parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
+        return Operations(*tape.operations([self.on(tape, t, state, parameters)]))
+
+    def on(self, tape: _core.Tape, t: _core.Symbol, state: Iterator[_core.Symbol], parameters: dict[str, Any]) -> _core.Symbol:
+        """The same on a tape."""
         blocks = [_symbols(self.v_shape, state), _symbols(self.y_shape, state)][0 if self.has_v else 1 :]
-        name, quick = f"events: {self.event.name}", bool(getattr(getattr(system, "definition", None), "quick_sines", False))
-        made = objects(run_by(rebound(self.event.function), name, quick, t, *blocks, **parameters))
+        name = f"events: {self.event.name}"
+        made = objects(run_by(rebound(self.event.function), name, self._quick_sines, Scalar(t), *blocks, **parameters))
         if made.ndim or not isinstance(made[()], (Scalar, int, float)):
             got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
             raise TraceError(f"{name}: expected one number, whose changes of sign are the event, got {got}")
         value = made[()].value if isinstance(made[()], Scalar) else made[()]
-        return Operations(*tape.operations([value if isinstance(value, _core.Symbol) else tape.number(float(value))]))
+        return value if isinstance(value, _core.Symbol) else tape.number(float(value))
+
+    def with_parameters(self, tape: _core.Tape, places: dict[str, int]) -> _core.Symbol:
+        """The same as the core computes it: parameters are those from these places on."""
+        parameters = {name: _symbols(shape, map(tape.param, count(places[name]))) for name, shape in self._shapes.items()}
+        return self.on(tape, tape.time(), map(tape.state, count()), parameters)
 
     def __call__(self, t: Array, v: Array, y: Array, given: dict[str, Any]) -> Array:
         """The quantity of states whose axes are the block's first; times and parameters broadcast over the others."""
@@ -83,6 +95,18 @@ class Quantity:
         with np.errstate(all="ignore"):
             made = self._operations(state, numbers)[0]
         return np.broadcast_to(np.asarray(made, dtype=np.float64), y.shape[len(self.y_shape) :])
+
+
+def watched(quantities: Sequence[Quantity], plan: engine.Plan) -> engine.Watched:
+    """What the core computes them by, for members of this plan."""
+    places, rows = {}, 0
+    for name, value in plan.system.parameters(plan.batch):
+        if isinstance(value, np.ndarray):
+            places[name], rows = rows, rows + len(value)
+    tape = _core.Tape()
+    words = {1: "rising", -1: "falling", 0: "both"}
+    made = [(words[each.event.direction], each.with_parameters(tape, places)) for each in quantities]
+    return engine.Watched(tape.equations([], [], made), len(made))
 
 
 def _symbols(shape: tuple[int, ...], symbols: Iterator[Any]) -> Any:
