@@ -29,6 +29,8 @@ FIRST_STEPS, MOST_STEPS = 64, 1 << 13
 #: Where the core notices changes of sign, so many steps are made at once; those of a member that has one are repeated.
 #: Twice as many the next time if fewer than this share of the members had one, half as many if more than that had.
 WATCHED_STEPS, FEW_NOTICED, MANY_NOTICED = 64, 1 / 16, 1 / 4
+#: If so many have one in so few steps, all states are looked at from there on.
+TOO_MANY_NOTICED = 1 / 2
 #: All states of fewer members than these are looked at: a repetition would take longer than that.
 FEW_MEMBERS = 64
 #: Where states are saved more often than after so many steps, all are looked at instead.
@@ -99,24 +101,29 @@ class _Driver:
         numbers = max(1, prod(plan.system.v_shape) + prod(plan.system.y_shape))
         v, y = v.reshape(*plan.system.v_shape, total), y.reshape(*plan.system.y_shape, total)
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
-        size = max(1, NUMBERS_AT_ONCE // (LEAST_STEPS * numbers))
+        size = max(1, NUMBERS_AT_ONCE // numbers)
         if plan.backend == "rust" and not plan.fused and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES):
             self.watched = watched(self.quantities, self.members.plan(np.arange(min(2, total))))
-            size = max(1, NUMBERS_AT_ONCE // numbers)  # no states are kept between
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
-            self._group(index, At(v[..., index], y[..., index], bad[index], carried), max(1, NUMBERS_AT_ONCE // numbers))
+            self._group(index, At(v[..., index], y[..., index], bad[index], carried), size)
         for e in range(len(self.events)):
             self._locate_waiting(e)
         return self._outcome()
 
-    def _group(self, index: Whole, at: At, most: int) -> None:
-        """All steps of some members; those that stop leave the group."""
-        plan, done, piece, together = self.plan, 0, FIRST_STEPS, WATCHED_STEPS
+    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+        """All further steps of some members; those that stop leave the group."""
+        plan, piece, together = self.plan, FIRST_STEPS, WATCHED_STEPS
         some = self.members.plan(index)
         while done < plan.steps and len(index):
             now = some._replace(first=plan.first + done, record=(), progress=None)
-            noticing = self.watched is not None and len(index) >= FEW_MEMBERS
+            noticing = notices and self.watched is not None and len(index) >= FEW_MEMBERS
+            size = max(1, most // LEAST_STEPS)
+            if not noticing and len(index) > size:  # too few states of so many members fit
+                for first in range(0, len(index), size):
+                    these = np.arange(first, min(first + size, len(index)))
+                    self._group(index[these], at.some(these), most, done, notices)
+                return
             if noticing and done > 0:
                 now = now._replace(steps=min(together, self._next_save(done) - done), every=None, watched=self.watched)
                 out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
@@ -126,8 +133,10 @@ class _Driver:
                 stopped, share = self._look_again(now, index, at, out, done, most)
                 if share < FEW_NOTICED:
                     together = min(2 * together, MOST_STEPS)
-                elif share > MANY_NOTICED:
-                    together = max(together // 2, LEAST_STEPS)
+                elif share > MANY_NOTICED and together > LEAST_STEPS and len(index) * together > most:
+                    together //= 2
+                elif share > TOO_MANY_NOTICED:
+                    notices = False
             else:
                 longest = 1 if noticing else min(piece, most // len(index), MOST_STEPS)
                 now = now._replace(steps=min(max(1, longest), plan.steps - done), every=1)
