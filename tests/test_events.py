@@ -181,6 +181,19 @@ def test_threads_do_not_matter() -> None:
     assert_same_events(one, two)
 
 
+def test_neither_threads_nor_the_batch_matter_where_the_core_notices() -> None:
+    """A hundred members are enough for that; one alone is not, and all of its states are looked at."""
+    omega, given = np.linspace(0.5, 2.0, 100), {"v": 0.1, "y": 1.0, "dt": 0.1, "steps": 300}
+    one, two = (sw.integrate(sw.Pendulum(omega), "rk4", **given, events=THREE, threads=threads) for threads in (1, 2))
+    assert_same(one, two)
+    assert_same_events(one, two)
+    for i in (0, 63, 99):
+        alone = sw.integrate(sw.Pendulum(omega[i]), "rk4", **given, events=THREE)
+        for name, mine in alone.events.items():
+            np.testing.assert_array_equal(mine.t, one.events[name].of(i).t)
+            np.testing.assert_array_equal(mine.y, one.events[name].of(i).y)
+
+
 def test_batch_axes_and_parameters_of_all_shapes() -> None:
     omega, damping = np.linspace(0.5, 2.0, 6).reshape(3, 2), np.array([0.0, 0.2])
     event = sw.Event(lambda t, v, y, omega, damping: y - 0.1 * omega - damping, name="zero")
