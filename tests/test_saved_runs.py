@@ -389,3 +389,15 @@ def test_zarr_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.Monke
     for use in (lambda: run.save(tmp_path / "run.zarr"), lambda: sw.load(tmp_path / "run.zarr")):
         with pytest.raises(UnsupportedError, match=r"needs zarr, which is not installed; pip install 'stepwell\[zarr\]'"):
             use()
+
+
+def test_events_are_in_the_file(tmp_path: Path) -> None:
+    ends = sw.Event(lambda t, v, y: y, direction=1, name="lowest")
+    low = sw.Event(lambda t, v, y: y - 0.5, direction=-1, terminal=True, name="half")
+    for events in (ends, [ends, low]):
+        run = sw.integrate(sw.Pendulum(omega=[1.0, 2.0]), "rk4", v=0.0, y=1.0, dt=0.05, steps=400, events=events)
+        run.save(tmp_path / "run.npz")
+        back = sw.load(tmp_path / "run.npz")
+        assert back == run
+        assert back.events == run.events
+    assert np.isfinite(back.stopped_at).all()

@@ -152,6 +152,13 @@ OF_METHODS = {"methods": ["rk4"]}
 KEPLER = sw.scenes.kepler()
 
 
+def passage(t: Any, v: Any, y: Any) -> Any:
+    return y
+
+
+PASSAGES = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=30, events=passage).events["passage"]
+
+
 def _world(**given: Any) -> sw.World:
     arrays = {name: np.full(3, given[name]) for name in ("v", "y") if isinstance(given.get(name), float)}
     return sw.World(**given | arrays)
@@ -217,6 +224,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "NormControl": (sw.NormControl, {"k": 0.5}),
     "EnergyControl": (sw.EnergyControl, {"gain": 0.1, "form": "limited", "target": 1.0}),
     "EnergyControl relative": (sw.EnergyControl, {"relative": 0.1}),
+    "Event": (sw.Event, {"function": passage, "direction": 1, "terminal": False, "most": 10, "name": "passage"}),
+    "Occurrences.of": (PASSAGES.of, {"index": 0}),
     "Projection": (sw.Projection, {"way": "scaling", "target": 1.0}),
     "method": (sw.method, {"name": "rk4"}),
     "integrate": (
@@ -234,6 +243,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         }
         | {"control": None, "tolerance": None, "at": None, "max_steps": None},
     ),
+    "integrate events": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "events": [sw.Event(passage, terminal=True)]}),
     "integrate bodies": (
         sw.integrate,
         BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
+    from .events import Event
     from .explanation import Explanation, explain
     from .explorer import Explorer, explore
     from .exports import ExportedStep, export
@@ -75,6 +76,7 @@ __all__ = [
     "ControlWarning",
     "DivergenceWarning",
     "EnergyControl",
+    "Event",
     "Explanation",
     "Explorer",
     "ExportedStep",
@@ -169,6 +171,7 @@ _LATER = {
     "advice": "advice",
     "Scene": "scenes.Scene",
     "advise": "advice.advise",
+    "Event": "events.Event",
     "Explanation": "explanation.Explanation",
     "charts": "charts",
     "derivatives": "derivatives",

@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 Looped = tuple[Array, Array, Blocks, Whole]
 
 
+class Watched(NamedTuple):
+    """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
+
+    quantities: _core.Equations
+    number: int
+
+
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇."""
 
@@ -50,6 +57,7 @@ class Plan(NamedTuple):
     record: tuple[str, ...] = ()
     fused: bool = False
     force: Array | None = None
+    watched: Watched | None = None
 
     @property
     def saves(self) -> Whole:
@@ -110,7 +118,8 @@ class Arrays(NamedTuple):
 class Outcome(NamedTuple):
     """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
 
-    ``diverged`` is False if it is known that no member has such a step.
+    ``diverged`` is False if it is known that no member has such a step. ``noticed`` has for each watched quantity its value at
+    the start of the last step, and last how many changes of sign there were up to there; NaN where the core did not count.
     """
 
     v: Array
@@ -120,6 +129,7 @@ class Outcome(NamedTuple):
     recorded: dict[str, Array] | None = None
     work: Array | None = None
     diverged: bool = True
+    noticed: Array | None = None
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
@@ -303,6 +313,8 @@ def model(plan: Plan) -> _core.ModelSpec:
     given = plan.system.parameters(plan.batch)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
+    if plan.watched is not None:
+        given.append(("watched()", plan.watched.quantities))
     if not plan.record and not plan.fused:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
@@ -321,7 +333,11 @@ def _rust(
         shapes = {name: plan.system.quantities[name] for name in plan.record}
         recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
     work = None if plan.system.control is None else np.empty(plan.batch)
-    tally = None if work is None else work.reshape(-1)
+    tally, noticed = None if work is None else work.reshape(-1), None
+    if plan.watched is not None:
+        before_it = 0 if work is None else 1
+        sums = np.full((before_it + plan.watched.number + 1, *plan.batch), np.nan)
+        tally, noticed, work = sums.reshape(-1), sums[before_it:], None
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     diverged = _core.run(
         model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
@@ -332,7 +348,7 @@ def _rust(
             mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
             by_name[name] = mine.reshape(kept, *shape, *plan.batch)
     work = None if work is None else _per_step(plan, work)
-    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged, noticed)
 
 
 # ---- the transition-matrix form

@@ -32,7 +32,10 @@ from .systems import NBody, Sampled, System
 from .systems.base import TINY, a_system
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ._words import Backend, RunForm
+    from .events import Event
     from .reference.adaptive import Pace
 
 BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
@@ -63,6 +66,7 @@ def integrate(
     control: AnyControl | None = None,
     force: Any = None,
     record: str | Sequence[str] | None = (),
+    events: Any = None,
     form: RunForm = "direct",
     fused: bool = False,
     t0: float = 0.0,
@@ -110,6 +114,9 @@ def integrate(
             per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
         record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
+        events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
+            g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed steps in the direct form
+            (docs/events.md).
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
@@ -164,6 +171,7 @@ def integrate(
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
             "force": force,
+            "events": events,
         }
         if not isinstance(form, str) or form != "direct":
             fixed["form"] = form
@@ -190,6 +198,7 @@ def integrate(
         raise UnsupportedError(f"force: goes with form='direct' only, got form={form!r}; a linear system has inputs")
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    asked = None if events is None else _asked(events, form)
     control = a_control(control)
     if form == "power":
         _goes_on_by_a_rule(system)
@@ -251,11 +260,18 @@ def integrate(
         plan = plan._replace(force=_spread(force, system.v_shape, batch))
     if record or system is not plan.system:
         plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
+    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
+    ended = None
+    if asked is not None:
+        from .events import driver  # only such runs need it
+
+        ended = driver.Run(asked, v, y, before, carry is not None)
+        make = ended.made
     if _checks.flag("progress", progress):
         with _bar(f"{how.title}, {steps} steps") as told:
-            out = engine.advance(plan._replace(progress=told), v, y, before, carried=carry is not None)
+            out = make(plan._replace(progress=told))
     else:
-        out = engine.advance(plan, v, y, before, carried=carry is not None)
+        out = make(plan)
     collides = isinstance(system, NBody)
     if collides:
         v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
@@ -282,12 +298,26 @@ def integrate(
         work=out.work,
         force=plan.force,
     )
+    if ended is not None:
+        ended.tell(run)
+    for name in plan.record:
+        if name not in run.recorded:
+            run.recorded[name] = run.quantity(name)
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before)
     warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
     return run
+
+
+def _asked(events: Any, form: str) -> list[Event]:
+    """The events that were asked for."""
+    from .events.event import several
+
+    if form != "direct":
+        raise UnsupportedError(f"events: goes with form='direct' only, got form={form!r}")
+    return several(events)
 
 
 def forced(system: System) -> None:

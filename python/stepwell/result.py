@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from .events import Occurrences
+
 
 class Status(IntEnum):
     """How a member ended.
@@ -44,6 +46,8 @@ class Status(IntEnum):
     UNDERFLOW = 3
     #: With a tolerance: no step, however short, gave a finite state.
     NOT_FINITE = 4
+    #: A terminal event stopped it; ``Run.stopped_at`` says when.
+    EVENT = 5
 
 
 class Collision(NamedTuple):
@@ -110,7 +114,8 @@ class Run(Value):
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
         first_bad_step: per member, the number of the first step after which the state was not finite, or at which a run with a
             tolerance stopped; −1 if there is none, shape (*batch).
-        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
+        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None; NaN for members that
+            stopped at an event.
         system: the system that was stepped, with its control.
         method: the method.
         dt: the step.
@@ -119,11 +124,15 @@ class Run(Value):
         steps: number of steps.
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
+        events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
+        stopped_at: the time at which a terminal event stopped each member, NaN for others, shape (*batch); later saved states are
+            that of the event. None if there was no such event to look for.
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
         force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
+            None in a run with events.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -187,6 +196,8 @@ class Run(Value):
         self.stand = stand
         self.fused = fused
         self.force = force
+        self.events: dict[str, Occurrences] = {}
+        self.stopped_at: Array | None = None
 
     def _held(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""
@@ -261,8 +272,17 @@ class Run(Value):
 
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
         last one. A carry is for the same method only. ``save`` writes all of it to a file. ``dt`` is that of this run; another
-        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
+        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are
+        given again.
+
+        Raises:
+            UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
+        if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
+            raise UnsupportedError(
+                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run "
+                f"for each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+            )
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:
             kept = {} if self.system.keeper is None else {"control": self.system.keeper}
@@ -389,17 +409,24 @@ class Run(Value):
 
     def _told(self) -> list[tuple[str, str]]:
         """What it is, by name: steps, time, saved states, members, and how they ended."""
-        members, bad = self.status.size, int(np.count_nonzero(self.status))
+        diverged = (self.status != 0) & (self.status != Status.EVENT)
+        members, bad, stopped = (
+            self.status.size,
+            int(np.count_nonzero(diverged)),
+            int(np.count_nonzero(self.status == Status.EVENT)),
+        )
         if self.paces is None:
             steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
             first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
-            how, number = "diverged", int(self.first_bad_step[self.status != 0].min()) if bad else None
+            how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
             steps = f"{_counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
             first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
         verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        if stopped:
+            verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
         return [
             ("steps", steps + (", fused" if self.fused else "")),
             ("time", f"{first:g} to {last:g}"),

@@ -22,6 +22,7 @@ from ..equations.definition import Definition
 from ..equations.trace import Equations
 from ..errors import ArgumentError
 from ..integrate import _collision
+from ..events.result import Occurrences
 from ..methods import Method
 from ..methods import method as find_method
 from ..reference.traced import Tracer
@@ -88,6 +89,8 @@ class Writer:
                 return {KIND: "bytes", "hex": value.hex()}
             case list():
                 return {KIND: "list", "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value)]}
+            case Occurrences():
+                return {KIND: "occurrences", "parts": self._parts(vars(value), name)}
             case partial():
                 (kind,) = (key for key, function in RERUNS.items() if function is value.func)
                 return {
@@ -98,7 +101,7 @@ class Writer:
             case tuple() if type(value) is not tuple:
                 fields = dict(zip(type(value)._fields, value, strict=True))  # type: ignore[attr-defined]  # a named tuple
                 if isinstance(value, engine.Plan):
-                    fields["progress"] = None  # it was shown
+                    fields |= {"progress": None, "watched": None}  # the one was shown, and the other looked for
                 return {KIND: type(value).__name__, "parts": self._parts(fields, name)}
             case tuple():
                 return {KIND: "tuple", "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value)]}
@@ -182,6 +185,8 @@ class Reader:
                 return parts
             case "parameters":
                 return FixedDict(parts)
+            case "occurrences":
+                return Occurrences(**parts)
             case "rerun":
                 return partial(RERUNS[part["of"]], *self._whole(part["items"]))
             case "equations":

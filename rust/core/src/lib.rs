@@ -30,6 +30,7 @@ pub mod system;
 pub mod tableau;
 pub mod tape;
 pub mod trace;
+pub mod watch;
 
 /// The methods, one file each; `build.rs` lists the folder.
 #[allow(missing_docs, reason = "each file documents its method in the record")]

@@ -21,6 +21,7 @@ use crate::{
     system::{Block, Kind, Shape, System},
     systems::linear::products,
     tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
+    watch,
 };
 
 /// The kind of step.
@@ -80,8 +81,8 @@ pub struct Traced {
     scene: Scene,
     /// How large the blocks are.
     pub shape: Shape,
-    /// Whether the system has a tally, a sum over the steps in a number of the state behind v and y.
-    pub tally: bool,
+    /// How many numbers of the state stand behind v and y: a sum over the steps, the tally, if the system has one; what is watched.
+    pub tally: usize,
     /// How many numbers are recorded.
     pub recorded: usize,
     /// Whether the method has a carry instead of v between steps.
@@ -207,6 +208,8 @@ fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));
+    let first = next.len();
+    next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
     (next, tally.is_some())
 }
 
@@ -250,6 +253,11 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     made.into_iter().map(|symbol| symbol.0).collect()
 }
 
+/// A system with surfaces and the force from outside: what a method's start and finish see.
+pub(crate) fn around(kind: &Kind, p: &Parameters<Symbol>) -> Box<dyn System<Symbol>> {
+    controls::force::wrap(p, contact::wrap(p, (kind.symbols)(p)))
+}
+
 /// Traces a program that changes the block v alone.
 fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(given)?;
@@ -258,8 +266,7 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
-        let s = controls::force::wrap(&p, contact::wrap(&p, (kind.symbols)(&p)));
-        let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
+        let mut made = program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter();
         ids([&made.next().unwrap_or(v), &y])
     }))
 }
@@ -344,9 +351,11 @@ impl Scene {
             if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
-            let (mut tally, mut carries) = (false, false);
+            let (mut tally, mut carries) = (0, false);
             if let How::Method { name, .. } = &self.how {
-                (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
+                watch::check(&self.given, shape)?;
+                tally = usize::from(controls::is_given(&self.given)) + watch::numbers(&self.given);
+                carries = method(name)?.carry.is_some();
             }
             if let How::Attempts { name } = &self.how {
                 controls::only_fixed(&self.given)?;

@@ -40,6 +40,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![false; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), false)).collect(),
         equations: None,
+        watched: None,
     }
 }
 

@@ -107,6 +107,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![true; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
         equations: None,
+        watched: None,
     }
 }
 

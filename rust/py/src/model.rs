@@ -16,6 +16,9 @@ use stepwell_core::{
     trace::{How, Scene},
 };
 
+/// The name of quantities whose changes of sign are noticed.
+const WATCHED: &str = "watched()";
+
 /// A message as an argument error of the package.
 pub fn argument_error(message: String) -> PyErr {
     error_of("ArgumentError", message)
@@ -141,6 +144,7 @@ impl ModelSpec {
                     names.rows.push((name.clone(), vec![members == 1 && name != force::NAME; count]));
                     rows.push(array);
                 }
+                Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).readonly().as_array().ncols() == 1;

@@ -52,7 +52,7 @@ pub struct Arrays<'a> {
     pub saved_y: &'a mut [f64],
     /// What is recorded beside each saved state.
     pub recorded: &'a mut [f64],
-    /// What the systems added up, one number per member; empty if not asked for.
+    /// What the systems added up, and what is watched, rows of one number per member; empty if not asked for.
     pub tally: &'a mut [f64],
     /// The v slot at the end; empty if not asked for.
     pub carry: &'a mut [f64],
@@ -114,7 +114,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("saved_y", kept * q * b, arrays.saved_y.len())?;
     expect("recorded", kept * traced.recorded * b, arrays.recorded.len())?;
     if !arrays.tally.is_empty() {
-        expect("tally", b, arrays.tally.len())?;
+        expect("tally", traced.tally * b, arrays.tally.len())?;
     }
     if !arrays.carry.is_empty() {
         expect("carry", p * b, arrays.carry.len())?;

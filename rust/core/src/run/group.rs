@@ -68,7 +68,7 @@ pub trait Group: Send + Sync {
     /// Records the present state, whose v slot is finished: rows of lanes.
     fn record(&mut self, rows: &mut [f64]);
 
-    /// The sums over the steps, such as the work of a control: a row of lanes, or nothing.
+    /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
     fn tally(&self) -> &[f64];
 
     /// The same sums, to write.
@@ -124,7 +124,7 @@ impl Lanes {
         let tapes = traced.tapes()?;
         let step = PreparedStage::with(&tapes.step, kit, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
-        let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
+        let numbers = traced.shape.v + traced.shape.y + traced.tally;
         let side = |stage: &Option<Stage>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
         Ok(Lanes {
             state: Aligned::new(numbers * lanes),

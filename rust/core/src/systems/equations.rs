@@ -104,6 +104,11 @@ impl Equations {
         Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept)
     }
 
+    /// The quantities by name.
+    pub fn quantities(&self) -> &[(String, Id)] {
+        &self.quantities
+    }
+
     /// Whether there is an invariant that a projection can keep.
     pub fn has_gradient(&self) -> bool {
         self.kept.is_some()
@@ -145,8 +150,7 @@ impl Equations {
     }
 
     /// An error unless each operation comes after what it reads and no leaf is beyond what is given.
-    fn check(&self, given: &Given) -> Result<(), Error> {
-        let states = self.shape().v + self.shape().y;
+    pub fn check(&self, given: &Given, states: usize) -> Result<(), Error> {
         let (parameters, tables) = (given.parameters(), given.tables.len());
         let fits = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();
@@ -177,7 +181,7 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     let Some(equations) = &given.equations else {
         return Err(Error::Shape { what: "equations", expected: 1, got: 0 });
     };
-    equations.check(given)?;
+    equations.check(given, equations.shape().v + equations.shape().y)?;
     Ok(equations.shape())
 }
 
@@ -215,6 +219,14 @@ fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
         p.given.equations.clone().unwrap_or_else(|| Equations::new(Vec::new(), Vec::new(), None, Vec::new(), None).into());
     let (of_v, of_y) = (equations.needed(&equations.dv), equations.needed(equations.dy.as_deref().unwrap_or(&[])));
     Box::new(Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations, of_v, of_y })
+}
+
+/// The values of these quantities for a state of any system with these parameters.
+pub fn values_of(equations: &std::sync::Arc<Equations>, p: &Parameters<Symbol>, t: Symbol, v: &Block<Symbol>, y: &Block<Symbol>) -> Vec<Symbol> {
+    let roots: Vec<Id> = equations.quantities.iter().map(|(_, id)| *id).collect();
+    let (of_v, of_y) = (Vec::new(), Vec::new());
+    let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: equations.clone(), of_v, of_y };
+    own.values(&equations.needed(&roots), &roots, t, v, y).iter().copied().collect()
 }
 
 impl<N: Operand> Own<N> {
