@@ -394,7 +394,7 @@ def test_the_line_that_cannot_be_traced_is_named() -> None:
             return [y[1], 1.0]
         return [y[1], -1.0]
 
-    with pytest.raises(TraceError, match=r"bouncing \(test_solve_ivp.py, line \d+: if y\[0\] < 0:\): .* write\s+np.where"):
+    with pytest.raises(TraceError, match=r"fun: bouncing \(test_solve_ivp.py, line \d+: if y\[0\] < 0:\): .* write\s+np.where"):
         sw.solve_ivp(bouncing, (0, 1), [1.0, 0.0])
 
 
@@ -503,6 +503,9 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"rtol": 0.0}, ArgumentError, "rtol: expected numbers above zero"),
     ({"atol": -1.0}, ArgumentError, "atol: expected numbers of zero or more"),
     ({"atol": [1e-6, 1e-6, 1e-6]}, ShapeError, "atol: expected a number, or one for each of the 2 of the state"),
+    ({"args": (3.0,)}, ArgumentError, r"fun, args: decay\(t, y\) is called with t, y and 1 args"),
+    ({"events": lambda t: t}, ArgumentError, r"events, args: <lambda>\(t\) is called with t, y and 0 args"),
+    ({"events": dict}, DTypeError, r"events: expected functions event\(t, y\), got <class 'dict'>"),
     ({"args": 3}, ArgumentError, r"args: expected a tuple such as args=\(a,\), got 3"),
     ({"events": 3}, DTypeError, "events: expected a list of functions, got 3"),
     ({"events": [3]}, DTypeError, r"events: expected functions event\(t, y\), got 3 \(int\)"),

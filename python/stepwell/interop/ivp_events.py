@@ -10,6 +10,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from ..errors import DTypeError
+from .ivp_function import takes
 
 #: A zero is located to so much, relative to its time, and absolutely where the time is about zero: four roundings.
 ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
@@ -30,8 +31,9 @@ class Event:
     """
 
     def __init__(self, function: Any, args: tuple[Any, ...]) -> None:
-        if not callable(function):
+        if not callable(function) or isinstance(function, type):
             raise DTypeError(f"events: expected functions event(t, y), got {_checks.short(function)} ({type(function).__name__})")
+        takes("events", function, args)
         terminal = getattr(function, "terminal", None)
         if terminal is None or terminal is False:
             self.terminal = np.inf

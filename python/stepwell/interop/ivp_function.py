@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from functools import partial
 from types import FunctionType, MethodType
@@ -12,7 +13,7 @@ import numpy as np
 from .. import _checks
 from ..equations.definition import Definition
 from ..equations.namespace import rebound
-from ..errors import ArgumentError, DTypeError
+from ..errors import ArgumentError, DTypeError, TraceError
 
 
 class RightHandSide:
@@ -44,8 +45,15 @@ class RightHandSide:
         return [-each for each in made] if self._backward else made
 
     def system(self) -> Any:
-        """The system of these rates."""
-        return Definition(_named(self), 1, 1, ((0,), (self._size,)))().sized(None, np.empty(self._size))
+        """The system of these rates.
+
+        Raises:
+            TraceError: if the function does what cannot be traced.
+        """
+        try:
+            return Definition(_named(self), 1, 1, ((0,), (self._size,)))().sized(None, np.empty(self._size))
+        except TraceError as error:
+            raise TraceError(f"fun: {error}") from error
 
 
 def _named(rates: RightHandSide) -> Any:
@@ -93,7 +101,26 @@ def arguments(args: Any) -> tuple[Any, ...]:
     """
     if args is None:
         return ()
-    try:
+    if isinstance(args, (tuple, list)) or (isinstance(args, np.ndarray) and args.ndim):
         return tuple(args)
-    except TypeError:
-        raise ArgumentError(f"args: expected a tuple such as args=(a,), got {_checks.short(args)}") from None
+    raise ArgumentError(f"args: expected a tuple such as args=(a,), got {_checks.short(args)}")
+
+
+def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
+    """Raise if a function cannot be called with a time, a state and the further arguments.
+
+    Raises:
+        ArgumentError: what it takes, and how many are given.
+    """
+    name = _checks.short(getattr(function, "__name__", type(function).__name__))[1:-1]
+    try:
+        expected = inspect.signature(function)
+    except (TypeError, ValueError):  # what is not written in Python may not tell
+        return
+    try:
+        expected.bind(None, None, *args)
+    except TypeError as error:
+        raise ArgumentError(
+            f"{argument}, args: {name}({', '.join(expected.parameters)}) is called with t, y and {len(args)} args, which it does "
+            f"not take: {error}"
+        ) from None

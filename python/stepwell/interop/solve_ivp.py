@@ -14,7 +14,7 @@ from ..equations.definition import Definition
 from ..errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning
 from ..reference import adaptive
 from .ivp_events import Event, found
-from .ivp_function import RightHandSide, arguments
+from .ivp_function import RightHandSide, arguments, takes
 from .ivp_methods import chosen
 from .ivp_steps import FAILURES, Solution, Trajectory
 
@@ -158,11 +158,13 @@ def solve_ivp(
         if fun.has_v:
             raise DTypeError(f"fun: expected a function fun(t, y), got the system {fun.name} of second order; use integrate")
         fun = fun.function
+    if not isinstance(fun, type):
+        takes("fun", fun, args)
     right = RightHandSide(fun, args, len(state), vectorized=_checks.flag("vectorized", vectorized), backward=sign < 0.0)
     trajectory = Trajectory(right.system(), how, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
     trajectory.limited(
         None if first_step is None else _first(first_step, abs(end - begin)),
-        np.inf if max_step == np.inf else _checks.number("max_step", max_step, positive=True, unit="units of time"),
+        _longest(max_step),
     )
     if times is not None and noted is None and not dense_output and end != begin:
         wanted = sign * times
@@ -232,11 +234,15 @@ def _span(t_span: Any) -> tuple[float, float]:
 
 
 def _start(y0: Any) -> Array:
-    if np.asarray(y0).dtype.kind == "c":
-        raise DTypeError(
-            "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
-        )
-    state = _checks.numbers("y0", y0)
+    try:
+        state = _checks.numbers("y0", y0)
+    except DTypeError:
+        readable = isinstance(y0, np.ndarray) or not hasattr(y0, "__dlpack__")
+        if readable and np.asarray(y0).dtype.kind == "c":
+            raise DTypeError(
+                "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
+            ) from None
+        raise
     if state.ndim != 1 or not state.size:
         raise ShapeError(f"y0: expected a state of shape (n,), got shape {state.shape}")
     return np.array(state)
@@ -262,6 +268,12 @@ def _first(first_step: Any, whole: float) -> float:
     return first
 
 
+def _longest(max_step: Any) -> float:
+    if isinstance(max_step, float) and max_step == np.inf:
+        return np.inf
+    return _checks.number("max_step", max_step, positive=True, unit="units of time")
+
+
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[float, float]:
     """The relative and the absolute tolerance of the length of a state."""
     relative = _checks.numbers("rtol", rtol, positive=True)
@@ -274,7 +286,8 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[float, float]:
         warnings.warn(
             f"rtol: {least:g} is too small for numbers of 53 bits, so it is {LEAST_RELATIVE:.3g}", ToleranceWarning, stacklevel=3
         )
-    return max(least, LEAST_RELATIVE), float(np.sqrt(n) * absolute.min())
+    with np.errstate(over="ignore"):
+        return max(least, LEAST_RELATIVE), float(np.sqrt(n) * absolute.min())
 
 
 def _is_several(events: Any) -> bool:

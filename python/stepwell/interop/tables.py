@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array, Shape
-from ..errors import ArgumentError, ShapeError
+from ..errors import ArgumentError, DTypeError, ShapeError
 from .missing import imported
 
 if TYPE_CHECKING:
@@ -39,10 +39,15 @@ def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, 
         variables["work"] = members, run.work
     if run.paces is not None:
         variables |= {name: (members, getattr(run.paces, name)) for name in ("accepted", "rejected", "evaluations")}
+    if coords is not None and not isinstance(coords, Mapping):
+        raise DTypeError(f"coords: expected coordinates by name, got {_checks.short(coords)} ({type(coords).__name__})")
     given = dict(coords or {})
     if clash := [name for name in given if name in variables or name == TIME]:
         raise ArgumentError(f"coords: expected names of their own, got {', '.join(clash)}, which the run has")
-    return xarray.Dataset(variables, coords={TIME: run.t, **given}, attrs=_attributes(run))
+    try:
+        return xarray.Dataset(variables, coords={TIME: run.t, **given}, attrs=_attributes(run))
+    except (ValueError, TypeError) as error:  # of the run itself it has no doubt
+        raise ArgumentError(f"coords: expected coordinates that fit the axes {', '.join((TIME, *members))}: {error}") from None
 
 
 def to_dataframe(run: Run, dims: Sequence[str] | None = None) -> Any:
