@@ -257,7 +257,7 @@ class System(Fixed, Value, ABC):
 
     def stepped_by(self, method: Method) -> Self:
         """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
-        between = method.needs_acceleration
+        between = method.needs_acceleration or method.family == "Taylor"
         if getattr(self.control, "between", between) == between or self.control is None:
             return self
         return changed(self, control=changed(self.control, between=between))

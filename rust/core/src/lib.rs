@@ -24,6 +24,7 @@ pub mod number;
 pub mod pace;
 pub mod program;
 pub mod run;
+pub mod series;
 pub mod signal;
 pub mod spec;
 pub mod system;

@@ -290,6 +290,8 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
             Entry::Add(..) => ("add", 0.0),
             Entry::Sub(..) => ("subtract", 0.0),
             Entry::Scale(by, _) => ("scale", by),
+            Entry::SeriesV(order, ..) => ("series of v", f64::from(order)),
+            Entry::SeriesY(order, ..) => ("series of y", f64::from(order)),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
     };

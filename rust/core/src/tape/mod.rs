@@ -315,11 +315,12 @@ impl Tape {
                         return x;
                     }
                 }
-                if let Neg(x) = self.op(b) {
-                    return self.shorten(Sub(a, x));
-                }
-                if let Neg(x) = self.op(a) {
-                    return self.shorten(Sub(b, x));
+                // −x + −y is −x − y, whichever comes first.
+                match (self.op(a), self.op(b)) {
+                    (Neg(x), Neg(y)) if y < x => return self.shorten(Sub(b, x)),
+                    (_, Neg(y)) => return self.shorten(Sub(a, y)),
+                    (Neg(x), _) => return self.shorten(Sub(b, x)),
+                    _ => {}
                 }
                 // (0 + x) + y: the zero matters only if x is −0, and then y alone decides, unless it is −0 too.
                 for (x, y) in [(a, b), (b, a)] {
