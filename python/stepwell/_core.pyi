@@ -143,6 +143,9 @@ class Tape:
     def step(self) -> Symbol: ...
     def time(self) -> Symbol: ...
     def number(self, x: float) -> Symbol: ...
+    def value(self, id: int) -> Symbol:
+        """The value that the operation of that number makes."""
+
     def sample(self, table: int, t: _Value) -> Symbol: ...
     def trace(self, model: ModelSpec, what: str) -> list[Symbol]:
         """What the core makes of a model: "step", "attempt", "start 0", "finish 0", or "record" with a quantity behind it."""
@@ -159,8 +162,11 @@ class Tape:
         dy: list[Symbol] | None = None,
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
+        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]]]] = ...,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
+
+        ``functions`` are values with, for each that they depend on, the derivative by it.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """
@@ -226,5 +232,5 @@ def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, lis
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
 
     Names are "v", "y", "dv" and "dy" (with the time, as a share of the step; operands are v and y), "velocity", "add",
-    "subtract", and "scale" (with the factor).
+    "subtract", "scale" (with the factor), "series of v" and "series of y" (with the order of the coefficient).
     """

@@ -300,7 +300,7 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
-    given = plan.system.parameters(plan.batch)
+    given = plan.system.parameters(plan.batch, series=plan.method.family == "Taylor")
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if not plan.record and not plan.fused:

@@ -280,17 +280,52 @@ def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any
     return book.functions[key]
 
 
+def has_rule(mark: Mark) -> bool:
+    """Whether a marked value is treated as a function. Roots and squares are operations like others."""
+    from ..derivatives import rules  # which differentiate with the functions of this package
+
+    return mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square")
+
+
+def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
+    """The derivatives of a function by its arguments, as symbols or as series; None for those that are not wanted or zero.
+
+    That of xᵖ by x is p·xᵖ/x here, which needs no further power.
+    """
+    from ..derivatives import rules
+
+    if mark.name != "power":
+        return rules.of_function(mark, value, wanted)
+    x, p = mark.arguments
+    by_exponent = value * rules.function("log", mark.function)(x) if wanted[1] else None
+    return p * (value / x) if wanted[0] else None, by_exponent
+
+
+def operation(book: Book, name: str, of: list[Any], given: int) -> Any:
+    """An operation of a tape, on series and numbers."""
+    from .fused import MEANING
+    from .replayed import OF_SYMBOLS
+
+    if not any(isinstance(each, (Series, Truth)) for each in of):
+        if any(hasattr(each, "xor_bits") for each in of):
+            return OF_SYMBOLS[name](*of)
+        return np.asarray(MEANING[name](*of, given))[()]
+    if name == "choose" and not isinstance(of[0], Truth):
+        return Truth(book, of[0]).choose(*of[1:])
+    if name == "exclusive or":
+        return ~of[0] if isinstance(of[0], Truth) else ~of[1]
+    return OF_SYMBOLS[name](*of)
+
+
 def of_function(mark: Mark, start: Any, book: Book) -> Series:
     """Y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + …. ``start`` is y at the start of the step."""
-    factors: list[Any] = []
+    by: list[Any] = []
 
     def rule(k: int) -> Term:
-        if not factors:
-            from ..derivatives import rules  # which differentiate with the functions of this package
-
-            factors.extend(rules.of_function(mark, made, [isinstance(each, Series) for each in mark.arguments]))
+        if not by:
+            by.extend(factors(mark, made, [isinstance(each, Series) for each in mark.arguments]))
         total = None
-        for argument, factor in zip(mark.arguments, factors, strict=True):
+        for argument, factor in zip(mark.arguments, by, strict=True):
             for j in range(1, k + 1) if factor is not None else ():
                 slope = _product(float(j), argument.terms[j])
                 of_factor = factor.terms[k - j] if isinstance(factor, Series) else (factor if j == k else None)

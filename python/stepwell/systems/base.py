@@ -151,8 +151,11 @@ class System(Fixed, Value, ABC):
             given |= self.given_around()
         return given
 
-    def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes."""
+    def parameters(self, batch: Shape, *, series: bool = False) -> Given:
+        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes.
+
+        A system of own equations tells more of them to a method that needs the ``series`` of a solution.
+        """
         return flat(self.all_given(batch), batch)
 
     def named(self, name: str, index: Shape) -> str:
