@@ -12,10 +12,10 @@ import numpy as np
 import own_systems
 import pytest
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS
+from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell import _core, engine
 from stepwell.reference.traced import Tracer
-from test_tracing import ABLE, CONTROLS, METHODS, fits, made
+from test_tracing import ABLE, CONTROLS, METHODS, made
 
 #: Bodies whose graphs are compared with one method of each kind alone: they have tens of thousands of operations.
 MANY = 100

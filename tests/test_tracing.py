@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS
+from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell._value import changed
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
@@ -34,10 +34,6 @@ def made(name: str) -> tuple[sw.System, Any, Any]:
     v, y = (0.5 * rng.normal(size=(*shape, MEMBERS)) for shape in (system.v_shape, system.y_shape))
     system = changed(system, batch=(MEMBERS,))
     return system, v, y
-
-
-def fits(system: sw.System, method: sw.Method) -> bool:
-    return not method.needs_acceleration or (system.second_order and system.velocity_term is None)
 
 
 def numbers(system: sw.System, tape: Tape, symbols: list[Symbol], *state: Any, h: float = H, budget: float = 0.0) -> list[Any]:

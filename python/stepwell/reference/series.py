@@ -178,7 +178,7 @@ class Truth:
         return Series(self.book, self._one_of(_start(yes), _start(no)), rule)
 
     def _one_of(self, yes: Any, no: Any) -> Any:
-        return self.value.choose(yes, no) if hasattr(self.value, "choose") else (yes if self.value else no)
+        return self.value.choose(yes, no) if hasattr(self.value, "xor_bits") else (yes if self.value else no)
 
     def __and__(self, other: Any) -> Truth:
         return Truth(self.book, self.value & _held(other))

@@ -86,6 +86,8 @@ pub struct Traced {
     pub recorded: usize,
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
+    /// Whether steps are made by a series, which is one tape however long.
+    pub series: bool,
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
@@ -328,11 +330,25 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
             let controls = if controls::is_given(given) { 2 } else { 1 };
             let contacts = contact::operations(given, shape);
-            let evaluations = attempt.unwrap_or_else(|| method.program()).evaluations();
+            let program = attempt.unwrap_or_else(|| method.program());
+            // The coefficient k of a product is a sum of k + 1 products.
+            let order = program.series_order() as usize;
+            let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
             (controls * rates, controls * rates * evaluations + contacts)
         }
     })
 }
+
+/// Whether steps are made by a series of the solution.
+fn has_series(how: &How) -> Result<bool, Error> {
+    Ok(match how {
+        How::Method { name, .. } | How::Attempts { name } => method(name)?.program().series_order() > 0,
+        How::Matrix { .. } => false,
+    })
+}
+
+/// The most operations, approximately, of a step by a series: it is one tape in any case, and takes some ten nanoseconds a byte to compile.
+const MAX_SERIES_OPERATIONS: usize = 100_000;
 
 impl Scene {
     /// What is known of it, or was found before.
@@ -343,6 +359,10 @@ impl Scene {
             let operations = operations(&self.given, &self.how, shape)?;
             if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
+            }
+            let series = has_series(&self.how)?;
+            if series && operations.1 > MAX_SERIES_OPERATIONS {
+                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_SERIES_OPERATIONS });
             }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
@@ -356,13 +376,15 @@ impl Scene {
                 shape,
                 tally,
                 carries,
+                series,
                 recorded: recorded(&self.given, &self.record)?,
                 operations,
                 tapes: OnceLock::new(),
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            Ok((traced, operations.1.min(4 * MAX_TAPE_OPERATIONS)))
+            let most = if series { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            Ok((traced, operations.1.min(most)))
         })
     }
 }
