@@ -252,7 +252,7 @@ MOST_IN_SERIES = 60
 
 def fits(system: sw.System, method: sw.Method) -> bool:
     """Whether the method can step the system."""
-    if method.family == "Taylor" and int(np.prod(system.y_shape)) > MOST_IN_SERIES:
+    if method.has_series and int(np.prod(system.y_shape)) > MOST_IN_SERIES:
         return False
     return not method.needs_acceleration or (system.second_order and system.velocity_term is None)
 

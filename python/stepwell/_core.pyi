@@ -40,6 +40,10 @@ class Equations:
     def reads_v(self) -> bool:
         """Whether a rate of v depends on v."""
 
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+
 @final
 class ModelSpec:
     """What to step: a system, what is given for it, and a method.
@@ -54,6 +58,8 @@ class ModelSpec:
 
     ``matrix`` is the nodes and the number of rows in the v slot, for the transition-matrix form of the system "matrix": ``n`` and
     ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
+
+    ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length.
     """
 
     def __new__(
@@ -65,6 +71,7 @@ class ModelSpec:
         matrix: tuple[list[float], int] | None = None,
         record: list[str] = ...,
         fused: bool = False,
+        order: int = 0,
     ) -> ModelSpec: ...
 
 @final

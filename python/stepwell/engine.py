@@ -32,7 +32,10 @@ Looped = tuple[Array, Array, Blocks, Whole]
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇."""
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
+
+    ``order`` is that of a series with adaptive steps.
+    """
 
     system: System
     method: Method
@@ -50,6 +53,7 @@ class Plan(NamedTuple):
     record: tuple[str, ...] = ()
     fused: bool = False
     force: Array | None = None
+    order: int = 0
 
     @property
     def saves(self) -> Whole:
@@ -176,7 +180,7 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
         case "step":
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
-            symbols = tracer.attempt(plan.method)
+            symbols = tracer.attempt(plan.method, plan.order)
         case _:
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))
@@ -300,12 +304,13 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
-    given = plan.system.parameters(plan.batch, series=plan.method.family == "Taylor")
+    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
-    if not plan.record and not plan.fused:
+    if not plan.record and not plan.fused and not plan.order:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
+    options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
 
 
 def _rust(
@@ -566,6 +571,17 @@ def pace_of(numbers: Array) -> Pace:
     return adaptive.Pace(*numbers)
 
 
+def _attempt(method: Method, order: int) -> Any:
+    """An attempt at an adaptive step: a function of a system, the axes of its blocks, a pace, a budget and a state."""
+    from .reference import adaptive, series_pace
+
+    steps: Any = method.steps
+    if method.has_series:
+        return partial(series_pace.attempt, order or steps.ORDER)
+    assert method.error_order is not None
+    return partial(adaptive.attempt, steps, method.error_order)
+
+
 def _fused_attempt(plan: Plan, budget: int) -> Any:
     """An attempt at an adaptive step."""
     made = _fused(plan, "attempt", budget)
@@ -584,10 +600,8 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
     if plan.backend == "numpy":
         if plan.fused:
             return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
-        pair: Any = plan.method.steps
-        assert plan.method.error_order is not None
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
-        attempt = partial(adaptive.attempt, pair, system, plan.method.error_order, plan.block_axes)
+        attempt = partial(_attempt(plan.method, plan.order), system, plan.block_axes)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members

@@ -14,7 +14,7 @@ import numpy as np
 from . import _checks, _core, _encounters, _memory, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
-from .control import AnyControl, a_control
+from .control import AnyControl, EnergyControl, a_control
 from .errors import (
     ArgumentError,
     DivergenceWarning,
@@ -355,6 +355,8 @@ def _adapt(
     if system.contacts:
         raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
     control = a_control(control)
+    if how.has_series:
+        _has_series(system, control)
     not_of_a_step(system.keeper if control is None else control)
     if at is None or (tolerance is None) == (went is None):
         if at is not None and went is not None:
@@ -407,7 +409,9 @@ def _adapt(
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
         pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
         pace = pace._replace(work=np.zeros(batch))
+        plan = plan._replace(order=_order(how, pace))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
+    attempts = plan.order or how.attempt_evaluations
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
     run = Run(
         t=times,
@@ -423,7 +427,7 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.attempt_evaluations * (accepted + rejected + extra_steps)),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, attempts * (accepted + rejected + extra_steps)),
         stand=AdaptiveState(
             out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
         ),
@@ -435,6 +439,29 @@ def _adapt(
     _warn_of_stops(run)
     _warn_of_lost(run, out.pace)
     return run, None if carry is not None else (v, y)
+
+
+def _has_series(system: System, control: Any) -> None:
+    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
+    instead = "use another method, such as dop853"
+    if system.samples[0] < np.inf:
+        raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
+    if isinstance(control or system.control, EnergyControl):
+        raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
+    if system.chooses:
+        raise UnsupportedError(
+            f"tolerance: {system!r} chooses between values (np.where, abs, minimum, floor, …), and a series does not see that "
+            f"another one is chosen within a step; {instead}"
+        )
+
+
+def _order(method: Method, pace: Pace) -> int:
+    """The order of a series for the smallest tolerance of all members; 0 of a method that has one order."""
+    if not method.has_series:
+        return 0
+    from .reference import series_pace  # only such runs need it
+
+    return series_pace.order_of(float(pace.relative.min(initial=1.0)))
 
 
 def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:

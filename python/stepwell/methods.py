@@ -82,6 +82,11 @@ class Method(Fixed):
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
 
+    @property
+    def has_series(self) -> bool:
+        """Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work."""
+        return self.family == "Taylor"
+
     def start_choice(self, start: str | None) -> int:
         """The number of a start, for the core."""
         if start is None:

@@ -348,6 +348,7 @@ def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tup
     found = [
         each for rate, block in zip(rates, blocks, strict=True) for each in np.broadcast_to(_objects(rate), block.shape).flat
     ]
+    zero = t.number(0.0) if hasattr(t, "number") else 0.0
     made = []
     for k in range(order):
         book.advance(k)
@@ -358,7 +359,7 @@ def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tup
             seed.terms.append(terms[-1])
         for time, length in lengths:
             time.terms.append(length if k == 0 else None)
-        numbers = [0.0 if term is None else term for term in terms]
+        numbers = [zero if term is None else term for term in terms]
         made.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
     return made
 

@@ -231,13 +231,20 @@ class OwnSystem(System):
     def parameters(self, batch: Shape, *, series: bool = False) -> Given:
         """The operations of the function, and parameters by name, as the core takes them; more of its functions for ``series``."""
         bound = self._retraced()
-        rates = bound._core
-        if series:
-            if bound._with_functions is None or bound._with_functions[0] is not rates:
-                bound._with_functions = rates, bound._rates({})
-            rates = bound._with_functions[1]
+        rates = bound._series_rates() if series else bound._core
         given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
         return [(RATES, rates), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        return bool(self._retraced()._series_rates().chooses)
+
+    def _series_rates(self) -> Any:
+        """The rates as operations, with the derivatives of the functions among them."""
+        if self._with_functions is None or self._with_functions[0] is not self._core:
+            self._with_functions = self._core, self._rates({})
+        return self._with_functions[1]
 
     def _retraced(self) -> OwnSystem:
         """With its operations, which an unpickled copy lacks."""

@@ -61,6 +61,16 @@ fn half_turn<N: Number>(r: N, y: N) -> N {
     sine.xor_bits(y.shift_up(63))
 }
 
+/// exp x to eight digits, which is enough for the length of a step: 2ᵏ·exp(r), |r| ≤ ½·ln 2.
+#[inline(always)]
+pub fn rough_exp<N: Number>(x: N) -> N {
+    let magic = x * N::of(std::f64::consts::LOG2_E) + N::of(MAGIC);
+    let r = x - (magic - N::of(MAGIC)) * N::of(std::f64::consts::LN_2);
+    let one = N::of(1.0);
+    let value = (1..=7).rev().fold(one, |value, k| one + (r * N::of(1.0 / f64::from(k))) * value);
+    value * magic.shift_up(52).add_bits(1023 << 52)
+}
+
 /// ln 2 in two parts; the first has 33 bits, so that its product with k is exact.
 const LN2: [f64; 2] = [6.93147180369123816490e-01, 1.90821492927058770002e-10];
 /// ln((1 + s)/(1 − s)) = 2s + s·(L₀z + L₁z² + …), z = s²

@@ -240,11 +240,20 @@ pub fn judge<N: Number>(pace: &Pace<N>, order: u32, old: [N; 2], made: &[N], out
     pace.decided(order > LOW, r2, new, outlook)
 }
 
+/// An error over what is tolerated. A block that is zero, as it has always been, tolerates no error and has none.
+pub(crate) fn share<N: Number>(error: N, tolerated: N) -> N {
+    let zero = N::of(0.0);
+    N::choose(error.at_most(zero), zero, error / tolerated)
+}
+
+/// The larger of two lengths.
+pub(crate) fn longer<N: Number>(a: N, b: N) -> N {
+    N::choose(a.below(b), b, a)
+}
+
 /// The square of the error over what is tolerated, from squares of lengths of one or two estimates of both blocks.
 fn over_tolerance<N: Number>(estimates: &[N], tolerated: [N; 2]) -> N {
     let zero = N::of(0.0);
-    // A block that is zero, as it has always been, tolerates no error and has none.
-    let share = |error: N, tolerated: N| N::choose(error.at_most(zero), zero, error / tolerated);
     let over = |estimate: &[N]| share(estimate[0], tolerated[0]) + share(estimate[1], tolerated[1]);
     let r2 = over(&estimates[..2]);
     if estimates.len() < 4 {
@@ -258,7 +267,6 @@ impl<N: Number> Pace<N> {
     /// Squares of the errors that are tolerated in both blocks, from squares of their lengths before and after a step.
     fn tolerated(&self, step: N, old: [N; 2], new: [N; 2]) -> [N; 2] {
         let zero = N::of(0.0);
-        let longer = |a: N, b: N| N::choose(a.below(b), b, a);
         // A block at zero so far on which a force sets in counts as long as that force would have made it in a part of the time since.
         let since = N::of(PUSHED) * ((self.t + step - self.begin) / step);
         let since2 = longer(N::of(1.0), since * since);

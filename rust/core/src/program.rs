@@ -293,7 +293,7 @@ impl Program {
 }
 
 /// The Taylor coefficients of v and y around a state, from the first on; NaN of numbers, which have none.
-fn coefficients<N: Number>(
+pub(crate) fn coefficients<N: Number>(
     s: &dyn System<N>,
     order: u32,
     [t, h]: [N; 2],

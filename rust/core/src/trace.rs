@@ -17,6 +17,7 @@ use crate::{
     pace::{Attempted, Pace, Stretched, attempt},
     program::Program,
     run::stage::Stage,
+    series_pace,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
     systems::linear::products,
@@ -37,6 +38,8 @@ pub enum How {
     Attempts {
         /// The method's name.
         name: String,
+        /// The order of its series, if it is one; 0 for that of a step of fixed length.
+        order: u32,
     },
     /// The transition-matrix form (Appendix B): s ← P·s + Σ Q·u, with the inputs at these nodes, by the bits of each.
     Matrix {
@@ -143,7 +146,7 @@ pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
             let (n, v) = (given.whole("n"), given.whole("n_v").min(given.whole("n")));
             Ok(Shape { v, y: n - v })
         }
-        How::Method { name, .. } | How::Attempts { name } => kind(given)?.fit(given, method(name)?),
+        How::Method { name, .. } | How::Attempts { name, .. } => kind(given)?.fit(given, method(name)?),
     }
 }
 
@@ -177,13 +180,21 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
             Ok(Steps { tape, next, shape, tally })
         }
-        How::Attempts { name } => {
+        How::Attempts { name, order } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
             if contact::is_given(given) {
                 return Err(given.unknown("contact_0"));
             }
-            let (tape, next) = record(tape, || attempts(kind, given, shape, &program, estimate.order));
+            let series = match program.series_order() {
+                0 => None,
+                own if *order == 0 => Some(own),
+                _ => Some(*order),
+            };
+            let (tape, next) = record(tape, || match series {
+                Some(order) => series_attempts(kind, given, shape, order),
+                None => attempts(kind, given, shape, &program, estimate.order),
+            });
             Ok(Steps { tape, next, shape, tally: false })
         }
     }
@@ -226,9 +237,25 @@ fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: 
     let one = parameters(given, Symbol::of(1.0));
     let projected = if controls::pushes(given) { plain } else { controls::wrap(&one, plain, Symbol::of(0.0)) };
     let system = Attempted { rates: &rates, projected: projected.as_ref() };
-    let numbers: [Symbol; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
     let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = attempt(program, &system, order, Pace::of(numbers), budget, &v, &y);
+    let (pace, v, y) = attempt(program, &system, order, pace(shape), budget, &v, &y);
+    let mut next = ids([&v, &y]);
+    next.extend(pace.numbers().map(|symbol| symbol.0));
+    next
+}
+
+/// The pace as a part of the state, behind v and y.
+fn pace(shape: Shape) -> Pace<Symbol> {
+    Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32))))
+}
+
+/// Steps by a series of that order.
+fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> Vec<Id> {
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let one = parameters(given, Symbol::of(1.0));
+    let (plain, projected) = ((kind.symbols)(&one), controls::wrap(&one, (kind.symbols)(&one), Symbol::of(0.0)));
+    let budget = Symbol::new(Op::Param(BUDGET));
+    let (pace, v, y) = series_pace::attempt(order, plain.as_ref(), projected.as_ref(), pace(shape), budget, &v, &y);
     let mut next = ids([&v, &y]);
     next.extend(pace.numbers().map(|symbol| symbol.0));
     next
@@ -288,13 +315,13 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
     let unknown = || Error::Options { system: given.system.clone(), options: format!("trace {what} {which}") };
     let name = match how {
-        How::Method { name, .. } | How::Attempts { name } => name.as_str(),
+        How::Method { name, .. } | How::Attempts { name, .. } => name.as_str(),
         How::Matrix { .. } => "",
     };
     let choice = which.parse().unwrap_or(0);
     match what {
         "step" => trace_step(tape, given, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
-        "attempt" => trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next)),
+        "attempt" if matches!(how, How::Attempts { .. }) => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
@@ -323,7 +350,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let products = n * (n + given.whole("inputs") * nodes.len());
             (2 * products, 2 * products)
         }
-        How::Method { name, .. } | How::Attempts { name } => {
+        How::Method { name, .. } | How::Attempts { name, .. } => {
             let rates = (kind(given)?.operations)(given);
             let method = method(name)?;
             let attempt = if matches!(how, How::Attempts { .. }) { method.attempt() } else { None };
@@ -332,7 +359,10 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let contacts = contact::operations(given, shape);
             let program = attempt.unwrap_or_else(|| method.program());
             // The coefficient k of a product is a sum of k + 1 products.
-            let order = program.series_order() as usize;
+            let order = match how {
+                How::Attempts { order, .. } if *order > 0 && program.series_order() > 0 => *order as usize,
+                _ => program.series_order() as usize,
+            };
             let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
             (controls * rates, controls * rates * evaluations + contacts)
         }
@@ -342,7 +372,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
 /// Whether steps are made by a series of the solution.
 fn has_series(how: &How) -> Result<bool, Error> {
     Ok(match how {
-        How::Method { name, .. } | How::Attempts { name } => method(name)?.program().series_order() > 0,
+        How::Method { name, .. } | How::Attempts { name, .. } => method(name)?.program().series_order() > 0,
         How::Matrix { .. } => false,
     })
 }
@@ -368,7 +398,7 @@ impl Scene {
             if let How::Method { name, .. } = &self.how {
                 (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
             }
-            if let How::Attempts { name } = &self.how {
+            if let How::Attempts { name, .. } = &self.how {
                 controls::only_fixed(&self.given)?;
                 method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
             }

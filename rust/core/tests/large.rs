@@ -276,7 +276,7 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
         let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
         let spec = spec(&given, &parameters, 13);
         for record in RECORDS.iter().filter(|record| record.estimate.is_some()) {
-            let scene = scene(&given, How::Attempts { name: record.name.to_owned() });
+            let scene = scene(&given, How::Attempts { name: record.name.to_owned(), order: 0 });
             let traced = scene.traced().unwrap();
             let (level, shape) = (Level::choose().unwrap(), traced.shape);
             let state = numbers(shape.v + shape.y, 98);

@@ -267,7 +267,8 @@ impl Tape {
     /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, or of a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
-        let traced = trace::trace(before.clone(), &model.given, &model.how, what);
+        let how = if what == "attempt" { model.attempts() } else { model.how.clone() };
+        let traced = trace::trace(before.clone(), &model.given, &how, what);
         let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
         *lock(&self.0) = tape;
         Ok(next.into_iter().map(|id| Symbol { tape: Arc::clone(&self.0), id }).collect())

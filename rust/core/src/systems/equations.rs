@@ -2,7 +2,10 @@
 //!
 //! They come from a function that was run once with symbols. Evaluated over any kind of number, they are a system like others.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::{
+    collections::HashMap,
+    hash::{DefaultHasher, Hash, Hasher},
+};
 
 use crate::{
     error::Error,
@@ -148,6 +151,32 @@ impl Equations {
     pub fn reads_v(&self) -> bool {
         let needed = self.needed(&self.dv);
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
+    }
+
+    /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not count.
+    pub fn chooses(&self) -> bool {
+        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by)| (*value, by)).collect();
+        let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
+        for op in &self.ops {
+            let (operands, n) = op.operands();
+            varies.push(matches!(op, Op::State(_) | Op::Time) || operands[..n].iter().any(|id| varies[*id as usize]));
+        }
+        let mut seen = vec![false; self.ops.len()];
+        let mut open: Vec<Id> = self.dv.iter().chain(self.dy.iter().flatten()).copied().collect();
+        while let Some(id) = open.pop() {
+            if std::mem::replace(&mut seen[id as usize], true) || !varies[id as usize] {
+                continue;
+            }
+            let op = self.ops[id as usize];
+            let (operands, n) = op.operands();
+            match functions.get(&id) {
+                Some(by) if by.is_empty() => return true, // as floor and sign, whose derivative is zero between jumps
+                Some(by) => open.extend(by.iter().flat_map(|(of, factor)| [*of, *factor])),
+                None if matches!(op, Op::Select(truth, ..) if varies[truth as usize]) => return true,
+                None => open.extend(&operands[..n]),
+            }
+        }
+        false
     }
 
     /// Whether a rate depends on the step, as the limited form of a control does.
