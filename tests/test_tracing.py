@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
+from stepwell import engine
 from stepwell._value import changed
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
@@ -150,9 +151,10 @@ def test_every_attempt(name: str) -> None:
     for method in ABLE:
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
-        s, steps = adaptive.Attempted(system.scaled(1.0, system.batch)), method.steps
+        s = adaptive.Attempted(system.scaled(1.0, system.batch))
         with np.errstate(all="ignore"):
-            outcomes = [adaptive.attempt(steps, s, method.error_order, axes, each, 9.0, v, y) for each in paces]  # type: ignore[arg-type]
+            attempt = engine.attempts(method, s, axes)
+            outcomes = [attempt(each, 9.0, v, y) for each in paces]
         for each, (after, v1, y1) in zip(paces, outcomes, strict=True):
             assert_computes(numbers(system, tape, symbols, v, y, *each, budget=9.0), v1, y1, *after)
 

@@ -571,15 +571,15 @@ def pace_of(numbers: Array) -> Pace:
     return adaptive.Pace(*numbers)
 
 
-def _attempt(method: Method, order: int) -> Any:
-    """An attempt at an adaptive step: a function of a system, the axes of its blocks, a pace, a budget and a state."""
+def attempts(method: Method, system: Any, block_axes: tuple[int, int], order: int = 0) -> Any:
+    """An attempt at an adaptive step by the reference: a function of a pace, a budget, v and y."""
     from .reference import adaptive, series_pace
 
     steps: Any = method.steps
     if method.has_series:
-        return partial(series_pace.attempt, order or steps.ORDER)
+        return partial(series_pace.attempt, order or steps.ORDER, system, block_axes)
     assert method.error_order is not None
-    return partial(adaptive.attempt, steps, method.error_order)
+    return partial(adaptive.attempt, steps, system, method.error_order, block_axes)
 
 
 def _fused_attempt(plan: Plan, budget: int) -> Any:
@@ -601,7 +601,7 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
         if plan.fused:
             return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
-        attempt = partial(_attempt(plan.method, plan.order), system, plan.block_axes)
+        attempt = attempts(plan.method, system, plan.block_axes, plan.order)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members

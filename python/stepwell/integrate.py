@@ -28,7 +28,7 @@ from .methods import method as find_method
 from .methods import methods as every_method
 from .reference.types import Whole
 from .result import AdaptiveState, Collision, Paces, Run, Status
-from .systems import NBody, Sampled, System
+from .systems import NBody, Sampled, Sinusoid, System
 from .systems.base import TINY, a_system
 
 if TYPE_CHECKING:
@@ -182,6 +182,10 @@ def integrate(
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
     control = a_control(control)
+    if form != "direct" and how.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
+        raise UnsupportedError(
+            f"form: {how.name} takes the derivatives of inputs too, and the transition matrix takes values only; use form='direct'"
+        )
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
@@ -456,12 +460,19 @@ def _has_series(system: System, control: Any) -> None:
 
 
 def _order(method: Method, pace: Pace) -> int:
-    """The order of a series for the smallest tolerance of all members; 0 of a method that has one order."""
-    if not method.has_series:
+    """The order of a series for the tolerance; 0 of a method that has one order."""
+    if not method.has_series or not pace.relative.size:
         return 0
     from .reference import series_pace  # only such runs need it
 
-    return series_pace.order_of(float(pace.relative.min(initial=1.0)))
+    least, most = float(pace.relative.min()), float(pace.relative.max())
+    order = series_pace.order_of(least)
+    if series_pace.order_of(most) != order:
+        raise UnsupportedError(
+            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got {least:g} "
+            f"(order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
+        )
+    return order
 
 
 def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:

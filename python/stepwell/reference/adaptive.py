@@ -245,7 +245,7 @@ def run(
 
 
 def attempt(
-    pair: Pair, order: int, system: Attempted, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
+    pair: Pair, system: Attempted, order: int, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
 ) -> tuple[Pace, Array, Array]:
     """One attempt at a step: the state advances, projected, if the error is tolerated, and if there is a step to try.
 

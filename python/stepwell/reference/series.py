@@ -171,7 +171,7 @@ class Truth:
 
         def rule(k: int) -> Term:
             terms = [each.terms[k] if isinstance(each, Series) else None for each in (yes, no)]
-            if terms == [None, None]:
+            if terms[0] is None and terms[1] is None:
                 return None
             return self._one_of(*(0.0 if term is None else term for term in terms))
 
@@ -341,7 +341,9 @@ def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tup
     book = Book()
     v, y = np.asarray(v), np.asarray(y)
     blocks = [_filled([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
-    times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(t)
+    # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
+    each_its_own = np.broadcast_arrays(t, h)[0] if np.ndim(h) else t
+    times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(each_its_own)
     lengths = [(each, length) for each, length in np.broadcast(times, h)]
     rates = s.dv(times, *blocks), s.dy(times, *blocks)
     seeds = [each for block in blocks for each in block.flat]

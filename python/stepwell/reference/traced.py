@@ -125,7 +125,7 @@ class Tracer:
         if method.has_series:
             following, v, y = series_pace.attempt(order or steps.ORDER, system, axes, pace, self.tape.budget(), v, y)
         else:
-            following, v, y = adaptive.attempt(steps, method.error_order, system, axes, pace, self.tape.budget(), v, y)
+            following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following)
 
     def record(self, names: Sequence[str]) -> list[Any]:

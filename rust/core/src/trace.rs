@@ -387,12 +387,12 @@ impl Scene {
         Cache::find(CACHE.get_or_init(Mutex::default), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
-            if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
-                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
-            }
             let series = has_series(&self.how)?;
             if series && operations.1 > MAX_SERIES_OPERATIONS {
                 return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_SERIES_OPERATIONS });
+            }
+            if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
