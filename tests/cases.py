@@ -254,8 +254,8 @@ def fits(system: sw.System, method: sw.Method) -> bool:
     """Whether the method can step the system."""
     if method.has_series and int(np.prod(system.y_shape)) > MOST_IN_SERIES:
         return False
-    if method.has_series and isinstance(system.control, sw.EnergyControl) and not system.control.between:
-        return False
+    if method.has_series and (getattr(system, "push", None) or not getattr(system.control, "between", True)):
+        return False  # a series of what a control pushes would not be that of the motion
     return not method.needs_acceleration or (system.second_order and system.velocity_term is None)
 
 

@@ -133,7 +133,8 @@ def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend:
     """Alone, among many, at the very end of a step, or as the last: the same bits, and the same steps."""
     system, state = kepler(np.array([0.3, 0.7, 0.0]))
     times = np.sort(np.random.default_rng(3).uniform(0.0, 20.0, 40))
-    ask: dict[str, Any] = {"tolerance": np.array([1e-2, 1e-4, 1e-9]), "backend": backend} | state
+    tolerance = 1e-4 if sw.method(method).has_series else np.array([1e-2, 1e-4, 1e-9])  # a series has one order for all members
+    ask: dict[str, Any] = {"tolerance": tolerance, "backend": backend} | state
     many = sw.integrate(system, method, at=times, **ask)
     for i in (0, 7, 21, 39):
         alone = sw.integrate(system, method, at=times[[i]], **ask)
@@ -264,7 +265,7 @@ def test_errors_are_relative_to_the_motion(method: str, amplitude: float) -> Non
     )
 
 
-@pytest.mark.parametrize("method", ABLE)
+@pytest.mark.parametrize("method", [method for method in ABLE if not sw.method(method).has_series])  # it refuses samples
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
 @pytest.mark.parametrize("rest", [0.0, 0.25 / 0.49])
 def test_what_is_pushed_out_of_a_rest(rest: float, tolerance: float, method: str) -> None:

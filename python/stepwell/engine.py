@@ -561,7 +561,8 @@ def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, a
     wide = np.zeros(plan.batch) if absolute is None else absolute
     first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
     tolerance = relative, wide, 1.0 if absolute is None else 0.0
-    return adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    pace = adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    return pace._replace(before=pace.h) if plan.method.has_series else pace
 
 
 def pace_of(numbers: Array) -> Pace:

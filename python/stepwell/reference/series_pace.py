@@ -66,7 +66,11 @@ def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
 
 
 def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]) -> Any:
-    """How far the series is as good as is tolerated."""
+    """How far the series is as good as is tolerated.
+
+    In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
+    does not count, for it is made once more and must be the same.
+    """
 
     def lengths(blocks: Sequence[Array]) -> list[Any]:
         return [length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)]
@@ -76,7 +80,7 @@ def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Arra
     # A block at zero counts as long as its rate would have made it in the last step.
     for longest, now, rate in zip((pace.longest_v, pace.longest_y), present, first, strict=True):
         counts = where(less(0.0, pace.lasts), longest, now)
-        length = pace.absolute + pace.relative * np.sqrt(longer(counts, rate * (pace.h * pace.h)))
+        length = pace.absolute + pace.relative * np.sqrt(longer(counts, rate * (pace.before * pace.before)))
         tolerated.append(length * length)
 
     def logarithm(k: int) -> Any:
@@ -87,7 +91,7 @@ def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Arra
 
     one, other = logarithm(order - 1), logarithm(order)
     far = rough_exp(where(less(one, other), one, other) - MARGIN / (order - 1))
-    most = MAX_GROWTH * pace.h
+    most = MAX_GROWTH * pace.before
     return where(less(most, far), most, far)
 
 
@@ -112,6 +116,7 @@ def decided(pace: Pace, far: Any, new: Sequence[Any], is_extra: Any, runs: Any) 
         h=where(takes | holds, far, where(fails, 0.0, pace.h)),
         extra=where(is_extra, 0.0, pace.extra),
         held=where(holds, 1.0, pace.held),
+        before=where(takes, far, pace.before),
         longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
         longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
         accepted=pace.accepted + where(takes, 1.0, 0.0),

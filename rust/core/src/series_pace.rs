@@ -51,7 +51,8 @@ fn value<'a, N: Number>(start: &'a Block<N>, terms: impl DoubleEndedIterator<Ite
     rest.map_or_else(|| start.clone(), |rest| start.zip_map(&rest, |start, rest| start + step * rest))
 }
 
-/// How far the series is as good as is tolerated.
+/// How far the series is as good as is tolerated. In `before` the pace has the length of the last step that was taken; a held one does not
+/// count, for it is made once more and must be the same.
 fn reach<N: Number>(order: u32, pace: &Pace<N>, start: [&Block<N>; 2], terms: &[(Block<N>, Block<N>)]) -> N {
     let of = |k: u32| {
         let (v, y) = &terms[k as usize - 1];
@@ -61,7 +62,7 @@ fn reach<N: Number>(order: u32, pace: &Pace<N>, start: [&Block<N>; 2], terms: &[
     // A block at zero counts as long as its rate would have made it in the last step.
     let tolerated = [0, 1].map(|i| {
         let counts = N::choose(N::of(0.0).below(pace.lasts), pace.longest[i], present[i]);
-        let length = pace.absolute + pace.relative * longer(counts, first[i] * (pace.h * pace.h)).sqrt();
+        let length = pace.absolute + pace.relative * longer(counts, first[i] * (pace.before * pace.before)).sqrt();
         length * length
     });
     let logarithm = |k: u32| {
@@ -71,7 +72,7 @@ fn reach<N: Number>(order: u32, pace: &Pace<N>, start: [&Block<N>; 2], terms: &[
     };
     let (one, other) = (logarithm(order - 1), logarithm(order));
     let reach = rough_exp(N::choose(one.below(other), one, other) - N::of(MARGIN / f64::from(order - 1)));
-    let most = N::of(MAX_GROWTH) * pace.h;
+    let most = N::of(MAX_GROWTH) * pace.before;
     N::choose(most.below(reach), most, reach)
 }
 
@@ -89,6 +90,7 @@ fn decided<N: Number>(pace: &Pace<N>, reach: N, new: [N; 2], is_extra: N::Truth,
         h: N::choose(takes | holds, reach, N::choose(fails, number(0.0), pace.h)),
         extra: N::choose(is_extra, number(0.0), pace.extra),
         held: N::choose(holds, number(1.0), pace.held),
+        before: N::choose(takes, reach, pace.before),
         longest: [longest(0), longest(1)],
         accepted: pace.accepted + count(takes),
         rejected: pace.rejected + count(fails),

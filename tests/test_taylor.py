@@ -1,0 +1,219 @@
+"""Taylor series of solutions: their coefficients against known ones, their steps, what they refuse."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core, engine
+from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.reference import series, series_pace
+from stepwell.reference.traced import Tracer
+from test_graphs import assert_one_graph
+
+TAYLOR = sw.method("taylor")
+EPS = 2.0**-52
+
+#: Rates that are functions of the time alone, as NumPy and as mpmath have them; p is a polynomial with values between 0.2 and 0.6.
+FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "product": (lambda p: p * p * (p + 1.0), lambda p: p * p * (p + 1)),
+    "quotient": (lambda p: (p + 1.0) / (p * p + 2.0), lambda p: (p + 1) / (p * p + 2)),
+    "reciprocal": (lambda p: 2.0 / p, lambda p: 2 / p),
+    "root": (np.sqrt, mpmath.sqrt),
+    "negative": (lambda p: -p * (1.0 - p), lambda p: -p * (1 - p)),
+    "sin": (np.sin, mpmath.sin),
+    "cos": (np.cos, mpmath.cos),
+    "tan": (np.tan, mpmath.tan),
+    "arcsin": (np.arcsin, mpmath.asin),
+    "arccos": (np.arccos, mpmath.acos),
+    "arctan": (np.arctan, mpmath.atan),
+    "arctan2": (lambda p: np.arctan2(p, p + 1.0), lambda p: mpmath.atan(p / (p + 1))),
+    "sinh": (np.sinh, mpmath.sinh),
+    "cosh": (np.cosh, mpmath.cosh),
+    "tanh": (np.tanh, mpmath.tanh),
+    "exp": (np.exp, mpmath.exp),
+    "expm1": (np.expm1, mpmath.expm1),
+    "log": (np.log, mpmath.log),
+    "log1p": (np.log1p, mpmath.log1p),
+    "cbrt": (np.cbrt, mpmath.cbrt),
+    "hypot": (lambda p: np.hypot(p, 2.0 * p + 1.0), lambda p: mpmath.sqrt(p * p + (2 * p + 1) ** 2)),
+    "whole power": (lambda p: p**3, lambda p: p**3),
+    "power": (lambda p: p**0.3, lambda p: p ** mpmath.mpf(0.3)),
+    "exponent": (lambda p: 1.7**p, lambda p: mpmath.mpf(1.7) ** p),
+    "both": (lambda p: p**p, lambda p: p**p),
+    "abs": (lambda p: abs(-p), lambda p: p),
+}
+
+
+def polynomial(t: Any) -> Any:
+    return 0.4 + t * (0.25 + t * (-0.125 + t * 0.5))
+
+
+def of_time(name: str) -> sw.System:
+    function = FUNCTIONS[name][0]
+
+    @sw.system(order=1)
+    def rate(t: Any, y: Any) -> Any:
+        return function(polynomial(t)) + 0.0 * y
+
+    return rate().sized(None, np.zeros(()))
+
+
+def coefficients(system: sw.System, order: int, v: Any, y: Any) -> list[Any]:
+    with np.errstate(all="ignore"):
+        return series.coefficients(system.alone(1.0, ()), order, 0.0, 1.0, np.asarray(v), np.asarray(y))
+
+
+def assert_known(name: str) -> None:
+    """The coefficients of a function of a polynomial, within roundings.
+
+    One of order k is a sum of products of lower ones. With the polynomial's |cⱼ| ≤ ½·ρ⁻ʲ and functions that are analytic where
+    |t| < ρ, roundings grow as ρ⁻ᵏ: they are allowed 40 units of the largest of the coefficients so far for each order.
+    """
+    found = [float(y) for _, y in coefficients(of_time(name), 13, np.zeros(0), 0.0)]
+    with mpmath.workdps(60):
+        true = [float(mpmath.re(c)) for c in mpmath.taylor(lambda t: FUNCTIONS[name][1](polynomial(t)), 0, 12, method="quad", radius=0.2)]
+    size = 1.0
+    for k in range(13):
+        size = max(size, abs(true[k]))
+        assert abs(found[k] * (k + 1) - true[k]) <= 40 * (k + 1) * EPS * size, (name, k)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_coefficients_of_functions(name: str) -> None:
+    assert_known(name)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_core_and_reference_are_one_graph(name: str) -> None:
+    system, tape = of_time(name), _core.Tape()
+    for what, of in (("step", Tracer(system, tape).step), ("attempt", Tracer(system, tape).attempt)):
+        model = engine.model(engine.Plan(system, TAYLOR, (), 0.1))
+        assert_one_graph(tape, tape.trace(model, what), of(TAYLOR))
+
+
+def _wrong_product(a: Any, b: Any, k: int) -> Any:
+    return series._product(a[k], b[0]) if k else None
+
+
+MISTAKES: dict[str, tuple[str, Any, str]] = {
+    "a product of the newest terms only": ("_convolved", _wrong_product, "product"),
+    "a difference for a sum": ("_sum", lambda a, b: series._difference(a, b), "quotient"),
+    "a sum for a difference": ("_difference", lambda a, b: b if a is None else (a if b is None else a + b), "root"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_wrong_recurrence_is_noticed(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, wrong, of = MISTAKES[mistake]
+    monkeypatch.setattr(series, name, wrong)
+    with pytest.raises(AssertionError):
+        assert_known(of)
+
+
+def test_a_wrong_derivative_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from stepwell.derivatives import rules
+
+    monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -f("cos")(x),))
+    with pytest.raises(AssertionError):
+        assert_known("sin")
+
+
+def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
+    """Of ẏ = y², y(0) = 1: 1/(1 − t) = Σ tᵏ. Every power and every sum is rounded: some 40 times in all, each term below 1.3."""
+
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y * y
+
+    for h in (0.1, 0.2):
+        run = sw.integrate(growth, "taylor", y=1.0, dt=h, steps=1)
+        assert abs(run.y[-1] - sum(h**k for k in range(9))) < 40 * EPS
+        assert abs(run.y[-1] - sum(h**k for k in range(8))) > 0.5 * h**8
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
+    """Of ẏ = y the coefficients are y/k!, so the step is known: the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)).
+
+    τ is the tolerance times the larger of y and of what ẏ makes in the step before. The core's exponential has an error below 1e-8.
+    """
+
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y
+
+    order = math.ceil(1.0 - 0.5 * math.log(tolerance))
+    assert series_pace.order_of(tolerance) == order
+    run = sw.integrate(growth, "taylor", y=1.0, tolerance=tolerance, at=[5.0])
+    assert run.paces is not None
+    reach = 0.01  # of the time in which y changes, to begin with
+    for _ in range(int(run.paces.accepted) + 1):
+        tolerated = tolerance * max(1.0, reach)
+        reach = min((tolerated * math.factorial(k)) ** (1.0 / k) for k in (order - 1, order)) * math.exp(-0.7 / (order - 1))
+    assert abs(run.paces.h / reach - 1.0) < 1e-7
+    assert run.paces.evaluations == order * (run.paces.accepted + 2)  # the held step twice, and one to the saved time
+    assert abs(run.y[-1] / math.exp(5.0) - 1.0) < (5.0 / reach + 1.0) * (2.0 * tolerance + 10 * EPS)
+
+
+def test_saved_states_are_on_the_series() -> None:
+    """At any times: as near to the true circle as the tolerance says, and steps do not depend on them."""
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-12}
+    times = np.sort(np.random.default_rng(1).uniform(0.0, 20.0, 200))
+    many, last = (sw.integrate(sw.Oscillator(), "taylor", at=at, **ask) for at in (times, times[-1:]))
+    assert many.paces is not None
+    assert last.paces is not None
+    assert many.paces.accepted == last.paces.accepted
+    assert np.array_equal(many.y[-1], last.y[-1])
+    # A step errs by less than the tolerance of the lengths of v and y, which are 1; twenty units of time have so many steps.
+    assert np.abs(many.y - np.cos(times)).max() < (many.paces.accepted + 1) * 2e-12
+
+
+def test_energy_at_rounding_level() -> None:
+    """A hundred orbits of e = 0.5 at a tolerance of half a rounding: errors are roundings, which add up at random (Brouwer 1937).
+
+    A step changes the energy by a few roundings of its largest part, the potential energy at the perihelion, here 2. With n steps
+    the sum is some √n of these; 10·√n is allowed, and a drift of one rounding a step would be n.
+    """
+    y = np.array([[0.0, 0.0], [0.5, 0.0]])
+    v = np.array([[0.0, 0.0], [0.0, math.sqrt(3.0)]])
+    system = sw.NBody([1.0, 0.0], force="newton")
+    run = sw.integrate(system, "taylor", v=v, y=y, tolerance=1e-16, at=2.0 * np.pi * np.arange(1, 101))
+    assert run.paces is not None
+    speed, place = run.v[:, 1], run.y[:, 1]
+    energy = 0.5 * (speed**2).sum(axis=1) - 1.0 / np.sqrt((place**2).sum(axis=1))
+    assert np.abs(energy + 0.5).max() < 10 * math.sqrt(float(run.paces.accepted)) * 2 * EPS
+
+
+def test_motion_without_forces_is_exact_however_long_the_step() -> None:
+    """All terms above the first vanish, so nothing but the growth of the step bounds it."""
+    run = sw.integrate(sw.NBody([1.0]), "taylor", v=[[1.0, 2.0]], y=[[0.5, 0.0]], tolerance=1e-6, at=[1024.0])
+    assert np.array_equal(run.y[-1], [[1024.5, 2048.0]])
+
+
+def test_what_is_refused() -> None:
+    samples = sw.Oscillator(x=sw.Sampled(np.arange(5.0), 0.1))
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0]}
+    with pytest.raises(UnsupportedError, match=r"samples of an input .* dop853"):
+        sw.integrate(samples, "taylor", **ask)
+
+    @sw.system
+    def bouncing(t: Any, v: Any, y: Any) -> Any:
+        return np.where(y < 0.0, -100.0 * y, 0.0) - 1.0
+
+    with pytest.raises(UnsupportedError, match=r"bouncing.* chooses between values"):
+        sw.integrate(bouncing, "taylor", **ask)
+    with pytest.raises(UnsupportedError, match=r"one order for all members"):
+        sw.integrate(sw.Oscillator(), "taylor", **ask | {"tolerance": np.array([1e-3, 1e-9])})
+    with pytest.raises(UnsupportedError, match=r"derivatives of inputs"):
+        sw.integrate(sw.Oscillator(x=sw.Sinusoid(1.0, 1.0)), "taylor", v=0.0, y=1.0, dt=0.1, steps=3, form="matrix")
+    bodies = sw.NBody(np.ones(40))
+    state = np.random.default_rng(0).normal(size=(40, 2))
+    with pytest.raises(ArgumentError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
+        sw.integrate(bodies, "taylor", v=0.0 * state, y=state, dt=0.01, steps=3)
+    assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
