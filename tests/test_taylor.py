@@ -19,7 +19,7 @@ from test_graphs import assert_one_graph
 TAYLOR = sw.method("taylor")
 EPS = 2.0**-52
 
-#: Rates that are functions of the time alone, as NumPy and as mpmath have them; p is a polynomial with values between 0.2 and 0.6.
+#: Rates that are functions of the time alone, as NumPy and as mpmath have them; p is a polynomial, about 0.4.
 FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
     "product": (lambda p: p * p * (p + 1.0), lambda p: p * p * (p + 1)),
     "quotient": (lambda p: (p + 1.0) / (p * p + 2.0), lambda p: (p + 1) / (p * p + 2)),
@@ -139,9 +139,10 @@ def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
-    """Of ẏ = y the coefficients are y/k!, so the step is known: the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)).
+    """Of ẏ = y the coefficients are y/k!, so the step is known.
 
-    τ is the tolerance times the larger of y and of what ẏ makes in the step before. The core's exponential has an error below 1e-8.
+    It is the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)), where τ is the tolerance times the larger of y and of
+    what ẏ makes in the step before. The core's exponential has an error below 1e-8.
     """
 
     @sw.system(order=1)

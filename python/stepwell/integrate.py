@@ -184,7 +184,8 @@ def integrate(
     control = a_control(control)
     if form != "direct" and how.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
         raise UnsupportedError(
-            f"form: {how.name} takes the derivatives of inputs too, and the transition matrix takes values only; use form='direct'"
+            f"form: {how.name} takes the derivatives of inputs too, and the transition matrix their values only; "
+            f"use form='direct'"
         )
     if form == "power":
         _goes_on_by_a_rule(system)
@@ -469,8 +470,8 @@ def _order(method: Method, pace: Pace) -> int:
     order = series_pace.order_of(least)
     if series_pace.order_of(most) != order:
         raise UnsupportedError(
-            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got {least:g} "
-            f"(order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
+            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
+            f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
         )
     return order
 

@@ -101,7 +101,11 @@ class Rates:
             if line not in needed:
                 needed.add(line)
                 mark = self.functions.get(line)
-                of = self.operations.lines[line][1] if mark is None else [each for each in mark.arguments if isinstance(each, _Line)]
+                of = (
+                    self.operations.lines[line][1]
+                    if mark is None
+                    else [each for each in mark.arguments if isinstance(each, _Line)]
+                )
                 waiting += of
         return sorted(needed)
 
@@ -132,7 +136,7 @@ class Rates:
         for line in self.needed:
             name, of, given = self.operations.lines[line]
             mark = self.functions.get(line)
-            if mark is not None:
+            if mark is not None and mark.function is not None:
                 arguments = [made[each] if isinstance(each, _Line) else each for each in mark.arguments]
                 made[line] = series.function(mark.name, mark.function, mark.function, arguments)
             elif name in ("state", "parameter"):

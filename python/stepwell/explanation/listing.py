@@ -105,11 +105,11 @@ class Named(Tracer):
         s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
         return s
 
-    def attempt(self, method: Any) -> list[Any]:
+    def attempt(self, method: Any, order: int = 0) -> list[Any]:
         """The state and the pace after an attempt, whose increments are as long as its step."""
         _, _, more = self.state()
         self._length = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields)).outlook(self.tape.budget()).step
-        return super().attempt(method)
+        return super().attempt(method, order)
 
     def _note(self, name: str, block: Any) -> None:
         block = np.asarray(block, dtype=object)

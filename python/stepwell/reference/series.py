@@ -88,7 +88,9 @@ class Series:
         if not isinstance(other, Series):
             if _is(other, 1.0):
                 return self
-            return -self if _is(other, -1.0) else Series(self.book, self.terms[0] * other, lambda k: _product(self.terms[k], other))
+            return (
+                -self if _is(other, -1.0) else Series(self.book, self.terms[0] * other, lambda k: _product(self.terms[k], other))
+            )
         if other.opposite is not None:
             return -(self * other.opposite)
         return Series(self.book, self.terms[0] * other.terms[0], lambda k: _convolved(self.terms, other.terms, k))
@@ -250,7 +252,7 @@ def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
 
 
 def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series) -> Series:
-    """c = a/b: from c·b = a."""
+    """C = a/b: from c·b = a."""
     over: list[Any] = []
 
     def rule(k: int) -> Term:

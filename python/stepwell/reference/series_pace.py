@@ -85,7 +85,8 @@ def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Arra
 
     def logarithm(k: int) -> Any:
         of_v, of_y = (
-            where(at_most(square, 0.0), 0.0, square / weight) for square, weight in zip(lengths(terms[k - 1]), tolerated, strict=True)
+            where(at_most(square, 0.0), 0.0, square / weight)
+            for square, weight in zip(lengths(terms[k - 1]), tolerated, strict=True)
         )
         return log(held(longer(of_v, of_y), *BOUNDS)) * (-0.5 / k)
 

@@ -229,7 +229,7 @@ class OwnSystem(System):
         return made if self.push is None else made | self.push.given()
 
     def parameters(self, batch: Shape, *, series: bool = False) -> Given:
-        """The operations of the function, and parameters by name, as the core takes them; more of its functions for ``series``."""
+        """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
         rates = bound._series_rates() if series else bound._core
         given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}

@@ -150,7 +150,8 @@ impl Series {
             }
             Op::Sqrt(a) => {
                 let over = *self.reciprocals.entry(id).or_insert_with(|| Symbol::of(0.5) / Symbol(id));
-                let pairs = (1..k.div_ceil(2)).rev().fold(None, |total, j| sum(total, product(self.term(id, j), self.term(id, k - j))));
+                let pairs =
+                    (1..k.div_ceil(2)).rev().fold(None, |total, j| sum(total, product(self.term(id, j), self.term(id, k - j))));
                 let twice = sum(pairs, pairs);
                 let middle = if k.is_multiple_of(2) { product(self.term(id, k / 2), self.term(id, k / 2)) } else { None };
                 difference(self.term(a, k), sum(middle, twice)).map(|rest| rest * over)
