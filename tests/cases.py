@@ -235,7 +235,7 @@ class Case:
         v, y = (rng.normal(size=(*shape, b)) for shape in (system.v_shape, system.y_shape))
         # Springs of hardly any length turn so fast that their series do not converge within a step.
         if system.constraint == "length" or (sw.method(self.method).has_series and self.system.startswith("springs")):
-            v, y = 0.02 * v, 0.15 * y + _apart(system)  # v along a rod would shorten it until it has no direction
+            v, y = 0.02 * v, (0.15 if system.constraint else 0.03) * y + _apart(system)  # v along a rod would shorten it until it has no direction
         return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
 
     def run(self, b: int, seed: int = 0, **options: Any) -> sw.Run:

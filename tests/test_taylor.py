@@ -141,8 +141,8 @@ def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
 def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
     """Of ẏ = y the coefficients are y/k!, so the step is known.
 
-    It is the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)), where τ is the tolerance times the larger of y and of
-    what ẏ makes in the step before. The core's exponential has an error below 1e-8.
+    It is the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)), where τ is the tolerance times the larger of y and
+    of what ẏ makes in the step before. The core's exponential has an error below 1e-8.
     """
 
     @sw.system(order=1)
