@@ -195,7 +195,7 @@ class Brute:
         """The cheapest with a tolerance, of those that cost no more than ``most``."""
         found: list[Try] = []
         for method in sw.methods():
-            if method.error_order is None or self.scene.control is not None:
+            if method.error_order is None or method.has_series or self.scene.control is not None:
                 continue
             kept = self._adaptive.setdefault(method.name, [])
             while not kept or kept[-1].cost <= most or kept[-1].error == math.inf:
