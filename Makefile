@@ -12,8 +12,11 @@ SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o
 # Files that build.rs finds, so that cargo does not tell rustfmt of them.
 LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs")
 
+# What `make wheels` builds for. zig links for a glibc of 2014 (manylinux2014) on any machine, and for AArch64 as well.
+WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
+
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long wheel dev bench lint rust-test python-test format clean
+.PHONY: help demo test test-long test-wheels wheel wheels release dev bench lint rust-test python-test format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +28,20 @@ test: lint rust-test python-test ## set up, and run the tests: Rust, Python, exa
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
+
+release: .venv/release ## build wheel and sdist into dist/, check both, install and try each in an environment of its own
+	rm -rf dist
+	$(BIN)/maturin build --release --quiet --out dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/twine check --strict dist/*
+	@for file in dist/*; do $(BIN)/python tests/installed.py $$file || exit 1; done
+	@echo "ready: $(BIN)/twine upload dist/*"
+
+wheels: .venv/wheels ## build the release wheels for Linux on x86-64 and AArch64 into dist/wheels/
+	@ls -l dist/wheels/*.whl
+
+test-wheels: .venv/wheels ## build them, and run this machine's in a clean environment
+	$(PYTHON) tests/wheels.py dist/wheels
 
 dev: .venv/test ## install in place, for work on the code; run again after a change in rust/
 	$(BIN)/maturin develop --release --quiet
@@ -54,6 +71,7 @@ python-test: .venv/test
 
 test-long: .venv/test ## run what `test` leaves out for its time: every family of tests in full
 	$(PYTEST) -m long --durations=20
+	STEPWELL_EMULATED=12000 cargo test --release -p stepwell-core --test aarch64 --quiet
 
 format: .venv/test ## format Rust and Python
 	cargo fmt --all
@@ -77,8 +95,23 @@ clean: ## remove everything that was built
 	@touch $@
 
 .venv/wheel: .venv/maturin $(SOURCES)
-	rm -rf dist
+	rm -f dist/*.whl
 	$(BIN)/maturin build --release --quiet --out dist
+	@touch $@
+
+.venv/release: .venv/maturin
+	$(BIN)/pip install --quiet --disable-pip-version-check 'twine>=6'
+	@touch $@
+
+.venv/zig: .venv/maturin
+	$(BIN)/pip install --quiet --disable-pip-version-check 'ziglang>=0.13'
+	@touch $@
+
+.venv/wheels: .venv/zig $(SOURCES)
+	@command -v rustup > /dev/null || { echo "the standard library of Rust for other CPUs comes by rustup: https://rustup.rs"; exit 1; }
+	rustup target add $(WHEELS)
+	rm -rf dist/wheels
+	for target in $(WHEELS); do PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --zig --target $$target --out dist/wheels || exit 1; done
 	@touch $@
 
 # The wheel with the extra that a target asks for.

@@ -105,6 +105,13 @@ SYSTEMS: dict[str, Make] = {
     "pendulum in space": lambda r, b: sw.Pendulum3D(r.uniform(0.5, 2.0, b), r.uniform(0.5, 2.0, b)),
     "pendulum in space, length control": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.LengthControl(0.5), (b,)),
     "pendulum in space, length projection": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.Projection("length"), (b,)),
+    "pendulum in space, at a wall and a ball": lambda r, b: sw.Pendulum3D(
+        r.uniform(0.7, 1.5, b),
+        floor=[sw.Floor(r.uniform(0.3, 1.0, b), 0.2, normal=(1, 0, 0), offset=0.8), sw.Sphere((0, 0, -1), 0.3, friction=0.3)],
+    ).under(sw.Projection("length"), (b,)),
+    "pendulum in space, over a slope": lambda r, b: sw.Pendulum3D(
+        1.0, 2.0, floor=sw.Floor(0.5, normal=(0.2, 0.1, 1), offset=-0.7)
+    ),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
     "springs: a triangle": lambda r, b: sw.Springs(
@@ -187,6 +194,19 @@ SYSTEMS: dict[str, Make] = {
     "rods, two between anchors, length projection": lambda r, b: sw.Rods(
         [1.0, 1.5], [(0, (-1.0, 0.0)), (0, 1), (1, (1.5, 0.5))], [1.0, 1.2, 0.8], gravity=r.uniform(0.5, 2.0, b)
     ).under(sw.Projection("length"), (b,)),
+    "rods, a dumb-bell on a rough floor, length projection": lambda r, b: sw.Rods(
+        r.uniform(0.5, 2.0, (2, b)), [(0, 1)], 1.0, gravity=3.0, floor=sw.Floor(r.uniform(0.0, 1.0, b), 0.4, offset=-0.3), dim=3
+    ).under(sw.Projection("length"), (b,)),
+    "rods, two hanging over a floor, length control": lambda r, b: sw.Rods(
+        [1.0, 2.0],
+        [((0.0, 0.5), 0), (0, 1)],
+        1.0,
+        gravity=r.uniform(1.0, 3.0, b),
+        floor=[sw.Floor(0.5, 0.3), sw.Floor(normal=(1, 0))],
+    ).under(sw.LengthControl(0.4), (b,)),
+    "rods, two apart in a bowl": lambda r, b: sw.Rods(
+        [1.0, 2.0, 0.5, 1.0], [(0, 1), (3, 2)], 1.0, gravity=2.0, floor=sw.Sphere((0.1, 0.0), r.uniform(1.0, 1.5, b), inside=True)
+    ),
     "rods, a triangle": lambda r, b: sw.Rods(r.uniform(0.5, 2.0, (3, b)), [(0, 1), (1, 2), (2, 0)], 1.0, dim=3),
     "own: Duffing": lambda r, b: own.duffing(beta=r.uniform(0.1, 1.0, b), omega=_omega(r, b)).sized(),
     "own: Lorenz": lambda r, b: own.lorenz(rho=r.uniform(0.5, 1.5, b)).sized(),

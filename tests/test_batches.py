@@ -194,8 +194,7 @@ def test_a_sample_is_not_missed_by_rounding() -> None:
 def test_a_run_says_what_it_is() -> None:
     run = sw.integrate(FREE, "false_euler", v=0.0, y=1.0, dt=0.3, steps=2)
     assert repr(run) == (
-        "<run of Oscillator(omega=1.0, form='canonical') by false_euler: 2 steps of 0.3 from t = 0.6, 1 saved, "
-        "1 member(s), 0 diverged>"
+        "<run of Oscillator(omega=1.0, form='canonical') by false_euler: 2 steps of 0.3, t = 0 to 0.6, 1 saved, 1 member: finite>"
     )
 
 

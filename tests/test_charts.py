@@ -108,6 +108,15 @@ def test_no_ladder_is_so_long_that_it_takes_minutes(monkeypatch):
     assert chart.curves[0].points[-1].steps == 5000
 
 
+def test_large_nets_have_steps_below_their_limit():
+    """A step of a net takes as long as it has springs, not pairs of particles."""
+    scene = sw.scenes.cloth()
+    longest = scene.system.safe_step("false_euler")
+    ladder = LADDER._ladder(scene)
+    assert sum(scene.horizon / n < longest for n in ladder) > 10
+    assert len(LADDER._ladder(sw.scenes.cloth(n=64))) < len(ladder)
+
+
 def test_a_wrong_exact_solution_is_seen():
     """There is no slope if the system is not the one that was solved: here its frequency is a thousandth off."""
     scene = dataclasses.replace(sw.scenes.oscillator(), exact=sw.scenes.oscillator(omega=1.001).exact)
@@ -299,9 +308,31 @@ def test_the_front_is_a_front(charts, error, cost):
         assert all(a[0] < b[0] and a[1] > b[1] for a, b in itertools.pairwise(ends))
         for curve in chart.curves:
             for spent, point in zip(curve.costs(cost), curve.points, strict=True):
-                if point.usable and math.isfinite(point.error(error)):
+                if point in curve.dependable(error, chart.floor) and math.isfinite(point.error(error)):
                     assert any(c <= spent and e <= point.error(error) for c, e in ends)
         assert bool(front) == (error != "phase_error" or chart.scene.period is not None)
+
+
+def test_a_step_that_is_right_by_luck_is_not_on_the_front(charts):
+    """One of a curve's errors is a thousandth of what it was, as if that step met an impact just right."""
+    chart = charts["clover"]
+    curve = max(chart.curves, key=lambda each: len(each.usable))
+    place = next(i for i, point in enumerate(curve.points) if point.usable) + 2
+    lucky = dataclasses.replace(curve.points[place], state_error=1e-3 * curve.points[place].state_error)
+    points = (*curve.points[:place], lucky, *curve.points[place + 1 :])
+    curve = dataclasses.replace(curve, points=points)
+    assert lucky.usable
+    assert lucky not in curve.dependable()
+    changed = dataclasses.replace(chart, curves=(curve,))
+    assert lucky.state_error not in [row["error"] for row in changed.front()]
+    assert curve.cheapest(lucky.state_error) > lucky.cost
+    # An unstable window a little below: the same.
+    window = dataclasses.replace(curve.points[place + 2], unstable=True)
+    curve = dataclasses.replace(curve, points=(*points[: place + 2], window, *points[place + 3 :]))
+    assert curve.points[place + 1] not in curve.dependable()
+    # Rounding errors that grow with the number of steps are no luck: 3 rungs are twice as many.
+    grown = [dataclasses.replace(lucky, state_error=1e-12 * 10 ** (i / LADDER.RUNGS_PER_DECADE)) for i in range(6)]
+    assert dataclasses.replace(curve, points=tuple(grown)).dependable() == tuple(grown)
 
 
 def test_the_front_is_in_the_table_and_the_best_is_of_it(charts):

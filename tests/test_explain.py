@@ -49,14 +49,14 @@ def lines(explained: sw.Explanation) -> list[str]:
         (
             "rk4",
             [
-                "a1  = Φ·y    (−dv1)",
-                "dy1 = Φ·v",
-                "a2  = Φ·(y + 0.5·dy1)    (−dv2)",
-                "dy2 = Φ·(v − 0.5·a1)",
-                "a3  = Φ·(y + 0.5·dy2)    (−dv3)",
-                "dy3 = Φ·(v − 0.5·a2)",
-                "v'  = v + 0.16666666666666666·(−a1 − 2·a2 − 2·a3 − Φ·(y + dy3))",
-                "y'  = y + 0.16666666666666666·(dy1 + 2·dy2 + 2·dy3 + Φ·(v − a3))",
+                "a1  = 0.5·(Φ·y)",
+                "a2  = 0.5·(Φ·v)",
+                "a3  = Φ·(y + a2)    (−dv2)",
+                "dy2 = Φ·(v − a1)",
+                "a4  = Φ·(y + 0.5·dy2)    (−dv3)",
+                "dy3 = Φ·(v − 0.5·a3)",
+                "v'  = v + 0.16666666666666666·(2·(−a1 − a3 − a4) − Φ·(y + dy3))",
+                "y'  = y + 0.16666666666666666·(Φ·(v − a4) + 2·(dy3 + (a2 + dy2)))",
             ],
         ),
     ],
@@ -121,6 +121,19 @@ def beside(explained: sw.Explanation) -> dict[str, list[str]]:
     return {section.when: [f"{line.name} = {line.formula}" for line in section.lines] for section in explained.beside}
 
 
+@pytest.mark.parametrize(
+    ("method", "step"),
+    [
+        ("leapfrog", ["v_half' = fma(−Φ, y, v_half)", "y'      = fma(Φ, v_half', y)"]),
+        # c1 is ½Φ: both increments of a block have one factor, which is multiplied last.
+        ("standard_heun", ["v2 = fma(−Φ, y, v)", "v' = fma(−c1, y + fma(Φ, v, y), v)", "y' = fma(c1, v + v2, y)"]),
+    ],
+)
+def test_increments_of_a_fused_step_are_multiplied_last(method: str, step: list[str]) -> None:
+    told = lines(sw.explain(sw.Oscillator(), method, fused=True))
+    assert told[told.index("in each step") + 1 :] == step
+
+
 def test_both_ends_of_what_is_carried() -> None:
     """Verlet starts by y − Φv + ½ of the increment of the increment, as a Taylor series, or by y − Φv; v is made from it so."""
     assert beside(sw.explain(sw.Oscillator(), "verlet")) == {
@@ -132,7 +145,7 @@ def test_both_ends_of_what_is_carried() -> None:
         "finish": ["v = (y − y_prev)/(h·omega)"],
     }
     fused = beside(sw.explain(sw.Oscillator(), "leapfrog", fused=True))
-    assert fused == {"start": ["v_half = fma(0.5, h·omega·y, v)"], "finish": ["v = fma(−0.5, h·omega·y, v_half)"]}
+    assert fused == {"start": ["v_half = fma(0.5·(h·omega), y, v)"], "finish": ["v = fma(−0.5·(h·omega), y, v_half)"]}
     assert sw.explain(sw.Oscillator(), "rk4").beside == ()
     text = str(sw.explain(sw.Oscillator(), "verlet"))
     assert "at the start of a run, y_prev from v\n  Φ      = h·omega\n" in text
@@ -498,11 +511,12 @@ def level() -> str:
 
 @pytest.mark.skipif(len(sw.isa_levels()) < 2, reason="no machine code here")
 def test_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("STEPWELL_KERNELS", "avx2")
+    asked, width, registers = ("neon", 2, 32) if "neon" in sw.isa_levels() else ("avx2", 4, 16)
+    monkeypatch.setenv("STEPWELL_KERNELS", asked)
     explained = sw.explain(sw.Oscillator(), "false_euler", members=1000)
     code = explained.code
     assert code is not None
-    assert (explained.level, explained.interpreted_because, code.width, code.registers) == ("avx2", None, 4, 16)
+    assert (explained.level, explained.interpreted_because, code.width, code.registers) == (asked, None, width, registers)
     assert explained.lanes == code.width * code.vectors * code.turns
     assert code.resident
     assert code.size > 50

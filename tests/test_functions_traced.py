@@ -9,7 +9,8 @@ import pytest
 import symbols
 from stepwell import _core
 from stepwell.reference import functions as fn
-from stepwell.reference.fused import MEANING, Evaluated, Operation
+from stepwell.reference.fused import MEANING, Evaluated
+from stepwell.reference.tape import Operation
 from true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
 
 NAMES = [*OF_ONE, *OF_TWO]

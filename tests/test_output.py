@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[list[str], str, str, str | None]] = {
         "a.json",
         None,
     ),
+    "explore": (["explore", "--scene", "oscillator", "--only"], "stepwell.cli.explore.explore", "page.html", None),
     "criteria": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.md", None),
     "criteria json": (["criteria", "rk4"], "stepwell.cli.criteria.criteria", "c.json", None),
     "chart": (["chart", "oscillator", "--methods", "false_euler"], "stepwell.cli.chart.work_precision", "", "oscillator.csv"),

@@ -280,7 +280,7 @@ def test_a_zero_quaternion_is_told() -> None:
 
 def test_they_say_what_they_are() -> None:
     body = sw.RigidBody([1.0, 2.0, 3.0], [None, 0.1, None], damping=0.2, weight=2.0, centre=[0.0, 0.0, 1.0])
-    said = "RigidBody([1.0, 2.0, 3.0], torque[1]=Sampled(1 values, interval=1.0, start=0.0), damping=0.2, weight=2.0, "
+    said = "RigidBody([1.0, 2.0, 3.0], torque[1]=constant(0.1), damping=0.2, weight=2.0, "
     assert repr(body) == said + "centre=[0.0, 0.0, 1.0])"
     kept = sw.RigidBody([1.0, 2.0, 3.0]).under(sw.NormControl(0.5), ())
     assert repr(kept) == "RigidBody([1.0, 2.0, 3.0], NormControl(0.5))"

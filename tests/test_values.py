@@ -83,6 +83,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         sw.Pendulum3D,
         lambda: sw.Pendulum3D(2.0),
         lambda: sw.Pendulum3D(gravity=[1.0, 2.0]),
+        lambda: sw.Pendulum3D(floor=sw.Floor(offset=-0.5)),
         lambda: (
             sw.integrate(sw.Pendulum3D(), "rk4", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=1, control=sw.LengthControl(0.1)).system
         ),
@@ -110,6 +111,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0),
         lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], 1.0),
         lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], [1.0, 2.0], gravity=0.0),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(0.5)),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor([0.5, 0.6])),
     ],
     "Chain": [
         lambda: sw.Chain(3),
@@ -209,6 +212,11 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.explain(FREE, "rk4", fused=True),
         lambda: sw.explain(FREE, "merson", attempt=True),
         lambda: sw.explain(sw.Chain(1000), "rk4"),
+    ],
+    "Explorer": [
+        lambda: sw.explore("oscillator", methods=["rk4"]),
+        lambda: sw.explore("oscillator", methods=["verlet"]),
+        lambda: sw.explore(["oscillator", "pendulum"], methods=["rk4"]),
     ],
     "ExportedStep": [
         lambda: sw.export(FREE, "rk4", "c"),

@@ -3,7 +3,7 @@
 ``integrate`` steps one trajectory or a hundred thousand; ``World`` is the real-time loop. ``methods`` and ``method`` describe
 the methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``jacobian``,
 ``equilibria`` and ``lyapunov`` describe a system near its states. ``scenes`` and ``charts`` show the cost and error of each
-method and where it becomes unstable; ``advise`` recommends one.
+method and where it becomes unstable; ``advise`` recommends one. ``explore`` shows scenes in a browser.
 """
 
 from __future__ import annotations
@@ -36,11 +36,25 @@ from .systems import (
 from .world import World
 
 if TYPE_CHECKING:
-    from . import advice, charts, derivatives, dynamics, equations, explanation, exports, paper, quaternion, scenes, stability
+    from . import (
+        advice,
+        charts,
+        derivatives,
+        dynamics,
+        equations,
+        explanation,
+        explorer,
+        exports,
+        paper,
+        quaternion,
+        scenes,
+        stability,
+    )
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
     from .explanation import Explanation, explain
+    from .explorer import Explorer, explore
     from .exports import ExportedStep, export
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
@@ -57,6 +71,7 @@ __all__ = [
     "DivergenceWarning",
     "EnergyControl",
     "Explanation",
+    "Explorer",
     "ExportedStep",
     "Floor",
     "LengthControl",
@@ -83,6 +98,7 @@ __all__ = [
     "System",
     "ToleranceWarning",
     "World",
+    "__version__",
     "advice",
     "advise",
     "analyse",
@@ -95,6 +111,8 @@ __all__ = [
     "errors",
     "explain",
     "explanation",
+    "explore",
+    "explorer",
     "export",
     "exports",
     "integrate",
@@ -118,12 +136,21 @@ def isa() -> str:
     """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
 
     At ``baseline`` steps are interpreted (``STEPWELL_KERNELS=interpret``); at the others they become machine code.
+
+    Example:
+        >>> sw.isa() in sw.isa_levels()
+        True
     """
     return _core.isa()
 
 
 def isa_levels() -> list[str]:
-    """The CPU levels that this machine has."""
+    """The CPU levels that this machine has.
+
+    Example:
+        >>> "baseline" in sw.isa_levels()
+        True
+    """
     return _core.isa_levels()
 
 
@@ -142,6 +169,9 @@ _LATER = {
     "lyapunov": "dynamics.lyapunov",
     "explain": "explanation.explain",
     "explanation": "explanation",
+    "Explorer": "explorer.Explorer",
+    "explore": "explorer.explore",
+    "explorer": "explorer",
     "ExportedStep": "exports.ExportedStep",
     "equations": "equations",
     "export": "exports.export",
@@ -158,11 +188,17 @@ _LATER = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _LATER:
-        raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
-    import importlib
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
-    module, _, attribute = _LATER[name].partition(".")
-    found = importlib.import_module(f"stepwell.{module}")
-    return getattr(found, attribute) if attribute else found
+
+if not TYPE_CHECKING:  # to which any name would else be one of the package
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LATER:
+            raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+        import importlib
+
+        module, _, attribute = _LATER[name].partition(".")
+        found = importlib.import_module(f"stepwell.{module}")
+        return getattr(found, attribute) if attribute else found

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from errno import EISDIR
 from math import isfinite
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 Shape = tuple[int, ...]
+
+Word = TypeVar("Word", bound=str)
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
@@ -37,15 +39,15 @@ MOST_AXES = 24
 PATH = 1000
 
 
-def known(argument: str, name: object, names: Iterable[str]) -> str:
+def known(argument: str, name: object, names: Iterable[Word]) -> Word:
     """Return ``name`` if it is one of ``names``; otherwise say which is the nearest."""
     if type(name) is str and type(names) is tuple and name in names:
-        return name
+        return cast(Word, name)
     names = tuple(names)
     if isinstance(name, np.ndarray) and name.ndim == 0 and name.dtype.kind == "U":
         name = name.item()  # a word that was read from a file of arrays
     if isinstance(name, str) and name in names:
-        return str(name)
+        return cast(Word, str(name))
     import difflib  # a mistake may take its time; the import of stepwell may not
 
     near = difflib.get_close_matches(short(name).strip("'").lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)

@@ -1,20 +1,87 @@
-"""The progress bar of a long run, by rich."""
+"""The progress of a long run: a bar of rich in a terminal, or one line of text without rich; an element of a page in a notebook.
+
+In a pipe nothing is shown.
+"""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
+from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+#: A notebook and a line of text are written anew at most so often, in seconds.
+MIN_SECONDS_BETWEEN = 0.1
+
+#: The length of a bar of text.
+BAR_LENGTH = 30
 
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[[float], object]]:
-    """Show a bar; yields the function that takes the share that is done."""
+    """Show a bar; yields the function that takes the share that is done, from 0 to 1."""
+    if in_notebook():
+        yield from _in_a_page(title)
+        return
+    try:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    except ImportError:
+        yield from _in_a_line(title)
+        return
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
     # On stderr and removed at the end, so that the output of a program is not changed.
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(title, total=1.0)
         yield lambda share: progress.update(task, completed=share)
         progress.update(task, completed=1.0)
+
+
+def in_notebook() -> bool:
+    """Whether this is the kernel of a notebook; IPython in a terminal is none."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
+def _in_a_page(title: str) -> Iterator[Callable[[float], object]]:
+    """An element that the kernel changes; needs no widgets."""
+    from IPython.display import HTML, display
+
+    def element(share: float) -> Any:
+        return HTML(f'{escape(title)} <progress value="{share:.3f}" max="1"></progress> {100 * share:.0f} %')
+
+    handle = display(element(0.0), display_id=True)
+    yield _at_intervals(lambda share: handle.update(element(share)))
+    handle.update(HTML(""))
+
+
+def _in_a_line(title: str) -> Iterator[Callable[[float], object]]:
+    """A line of a terminal that is written over, and removed at the end."""
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+
+    def line(share: float) -> None:
+        full = round(BAR_LENGTH * share)
+        print(f"\r{title} {'━' * full}{'·' * (BAR_LENGTH - full)} {100 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+
+    line(0.0)
+    try:
+        yield _at_intervals(line)
+    finally:
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+def _at_intervals(show: Callable[[float], object]) -> Callable[[float], object]:
+    """Show only what comes later than the last by a tenth of a second."""
+    last = time.monotonic()
+
+    def told(share: float) -> None:
+        nonlocal last
+        if (now := time.monotonic()) - last >= MIN_SECONDS_BETWEEN:
+            last = now
+            show(min(1.0, max(0.0, share)))
+
+    return told

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from ._brief import one_line
 from .errors import FixedError
 
 Kind = TypeVar("Kind")
@@ -19,7 +20,16 @@ DONE = "_done"
 
 
 class Value:
-    """Equal to another of its class if all that it holds is equal, arrays number by number; NaN equals NaN."""
+    """Equal to another of its class if all that it holds is equal, arrays number by number; NaN equals NaN.
+
+    What has no repr of its own is shown in one line; that of a dataclass would print all of its arrays.
+    """
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Set the repr before ``dataclass`` would."""
+        super().__init_subclass__(**options)
+        if cls.__repr__ is object.__repr__:
+            cls.__repr__ = one_line  # type: ignore[method-assign]
 
     def _held(self) -> dict[str, Any]:
         """What counts, by name: the fields of a dataclass (and not what it has cached), or else all attributes."""
@@ -52,6 +62,8 @@ def by_value(kind: type[Kind]) -> type[Kind]:
     methods = {"__eq__": equal, "__ne__": unequal, "__hash__": digest}
     for name, method in methods.items():
         setattr(kind, name, method)
+    if kind.__repr__.__module__ == "collections":  # that of any named tuple, which prints all of its arrays
+        kind.__repr__ = one_line  # type: ignore[method-assign]
     return kind
 
 

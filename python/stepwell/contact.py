@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from . import _checks
+from ._brief import brief
 from ._checks import Array, Shape
 from ._value import Fixed, Value, changed
 from .errors import ArgumentError, DTypeError, ShapeError
 
+if TYPE_CHECKING:
+    from ._words import ContactWay
+
 #: Arguments with components along their first axis.
 VECTORS = ("normal", "centre")
 
-WAYS = ("safe", "restitution", "flip", "spring")
+WAYS: tuple[ContactWay, ...] = ("safe", "restitution", "flip", "spring")
 
 
 class Surface(Fixed, Value, ABC):
@@ -26,7 +30,7 @@ class Surface(Fixed, Value, ABC):
     kind: ClassVar[str]
     own: ClassVar[tuple[str, ...]]
 
-    def __init__(self, restitution: Any, friction: Any, way: str, omega: Any) -> None:
+    def __init__(self, restitution: Any, friction: Any, way: ContactWay, omega: Any) -> None:
         self.way = _checks.known("way", way, WAYS)
         self.restitution = _checks.not_negative("restitution", restitution)
         if (self.restitution > 1.0).any():
@@ -83,7 +87,7 @@ class Surface(Fixed, Value, ABC):
         names = (*self.own, "restitution", "friction", "way", "omega")
         values = {name: getattr(self, name) for name in names}
         said = (
-            f"{name}={value.tolist() if isinstance(value, np.ndarray) and value.size < 4 else value!r}"
+            f"{name}={brief(value)}"
             for name, value in values.items()
             if value is not None and not (name == "restitution" and value.ndim == 0 and value == 1.0)
         )
@@ -116,6 +120,7 @@ class Floor(Surface):
 
     Example:
         >>> sw.Particles(floor=sw.Floor(restitution=0.8))
+        Particles(masses=1.0, gravity=9.81, floor=Floor(offset=0.0, restitution=0.8, way='safe'))
     """
 
     kind = "plane"
@@ -128,7 +133,7 @@ class Floor(Surface):
         *,
         normal: Any = None,
         offset: Any = 0.0,
-        way: str = "safe",
+        way: ContactWay = "safe",
         omega: Any = None,
     ) -> None:
         super().__init__(restitution, friction, way, omega)
@@ -168,6 +173,7 @@ class Sphere(Surface):
 
     Example:
         >>> sw.Particles(floor=sw.Sphere((0.0, 0.0), 1.0, inside=True))
+        Particles(masses=1.0, gravity=9.81, floor=Sphere(centre=[0.0, 0.0], radius=1.0, inside=True, way='safe'))
     """
 
     kind = "sphere"
@@ -181,7 +187,7 @@ class Sphere(Surface):
         inside: bool = False,
         restitution: Any = 1.0,
         friction: Any = None,
-        way: str = "safe",
+        way: ContactWay = "safe",
         omega: Any = None,
     ) -> None:
         super().__init__(restitution, friction, way, omega)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from ._value import Fixed, Value, changed
 from .errors import ArgumentError, ControlWarning, DTypeError
 from .reference import control as reference
 
-FORMS = ("limited", "printed")
+if TYPE_CHECKING:
+    from ._words import ControlForm
+
+FORMS: tuple[ControlForm, ...] = ("limited", "printed")
 
 
 class EnergyControl(Fixed, Value):
@@ -35,9 +38,15 @@ class EnergyControl(Fixed, Value):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> bodies = sw.scenes.energy_control()
+        >>> run = bodies.run("standard_euler", steps=300, control=sw.EnergyControl(0.3))
+        >>> bool(run.work < 0.0)
+        True
     """
 
-    def __init__(self, gain: Any = None, form: str = "limited", *, relative: Any = None, target: Any = None) -> None:
+    def __init__(self, gain: Any = None, form: ControlForm = "limited", *, relative: Any = None, target: Any = None) -> None:
         if (gain is None) == (relative is None):
             raise ArgumentError("gain, relative: expected one of them, got " + ("neither" if gain is None else "both"))
         self.form = _checks.known("form", form, FORMS)
@@ -114,10 +123,19 @@ class Control(Fixed, Value):
         ArgumentError: what is wrong with which argument.
 
     Example:
-        >>> sw.integrate(pendulum(), "standard_euler", v=0.0, y=1.0, dt=0.01, steps=1000, control=sw.Control("energy", 1.0))
+        >>> @sw.system
+        ... def pendulum(t, v, y):
+        ...     return -np.sin(y)
+        >>> @pendulum.invariant
+        ... def energy(v, y):
+        ...     return 0.5 * v * v - np.cos(y)
+        >>> control = sw.Control("energy", 1.0)
+        >>> run = sw.integrate(pendulum, "standard_euler", v=0.0, y=1.0, dt=0.01, steps=1000, control=control)
+        >>> run.system.keeper.gain
+        array(1.)
     """
 
-    def __init__(self, invariant: str, gain: Any, form: str = "limited", *, target: Any = None) -> None:
+    def __init__(self, invariant: str, gain: Any, form: ControlForm = "limited", *, target: Any = None) -> None:
         if not isinstance(invariant, str):
             raise DTypeError(f"invariant: expected a name, got {type(invariant).__name__}")
         self.invariant = invariant
@@ -185,6 +203,12 @@ class LengthControl(ConstraintControl):
 
     Raises:
         ArgumentError: what is wrong with ``c``.
+
+    Example:
+        >>> rods = sw.scenes.double_pendulum()
+        >>> run = rods.run("rk4", steps=100, control=sw.LengthControl(0.5))
+        >>> run.system.keeper
+        LengthControl(0.5)
     """
 
     constraint = "length"
@@ -204,6 +228,12 @@ class NormControl(ConstraintControl):
 
     Raises:
         ArgumentError: what is wrong with ``k``.
+
+    Example:
+        >>> body = sw.scenes.dzhanibekov()
+        >>> run = body.run("rk4", steps=100, control=sw.NormControl(0.5))
+        >>> float(round(np.linalg.norm(run.y[-1]), 6))
+        0.999947
     """
 
     constraint = "norm"
@@ -229,6 +259,12 @@ class Projection(Fixed, Value):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> bodies = sw.scenes.energy_control()
+        >>> run = bodies.run("standard_euler", steps=300, every=300, control=sw.Projection("scaling"))
+        >>> bool(abs(run.energy[-1] - run.energy[0]) < 1e-12)
+        True
     """
 
     def __init__(self, way: str = "scaling", *, target: Any = None) -> None:

@@ -7,7 +7,15 @@ from __future__ import annotations
 
 
 class StepwellError(Exception):
-    """The base class of every error that stepwell raises intentionally."""
+    """The base class of every error that stepwell raises intentionally.
+
+    Example:
+        >>> try:
+        ...     sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.0, steps=10)
+        ... except sw.StepwellError as error:
+        ...     print(error)
+        dt: expected numbers above zero in units of time, got 0
+    """
 
 
 class ArgumentError(StepwellError, ValueError):
@@ -54,19 +62,52 @@ class FixedError(StepwellError, AttributeError):
 
 
 class DivergenceWarning(UserWarning):
-    """Some members left the range of finite numbers. ``Run.first_bad_step`` says when; the others are not affected."""
+    """Some members left the range of finite numbers. ``Run.first_bad_step`` says when; the others are not affected.
+
+    Example:
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.DivergenceWarning)
+        ...     run = sw.integrate(sw.Oscillator(30.0), "false_euler", v=0.0, y=1.0, dt=0.1, steps=1000)
+        >>> str(caught[0].message)
+        '1 of 1 member(s) diverged; first the only member at step 369 (t = 36.9), by false_euler with dt = 0.1'
+    """
 
 
 class ToleranceWarning(UserWarning):
     """Some members stopped before the last output time: out of steps, or their steps became too short to change the time.
 
     It is also given if an absolute tolerance is so large that the motion is lost in it.
+
+    Example:
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.ToleranceWarning)
+        ...     run = sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[99.0], max_steps=9)
+        >>> bool(run.status == sw.Status.BUDGET)
+        True
     """
 
 
 class ControlWarning(UserWarning):
-    """A control is so strong that it overshoots."""
+    """A control is so strong that it overshoots.
+
+    Example:
+        >>> bodies = sw.scenes.energy_control()
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.ControlWarning)
+        ...     run = bodies.run("standard_euler", steps=1, control=sw.EnergyControl(1e3, "printed"))
+        >>> caught[0].category.__name__
+        'ControlWarning'
+    """
 
 
 class AccuracyWarning(UserWarning):
-    """A run stayed finite, but its numbers are known to be meaningless."""
+    """A run stayed finite, but its numbers are known to be meaningless.
+
+    Example:
+        >>> bodies = sw.scenes.pythagorean()
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.AccuracyWarning)
+        ...     run = bodies.run("rk4", bodies.horizon / 30_000)
+        >>> str(caught[0].message)[:44]
+        '1 of 1 member(s) have another energy at the '
+    """

@@ -32,10 +32,11 @@ from .systems import NBody, Sampled, Sinusoid, System
 from .systems.base import TINY, a_system
 
 if TYPE_CHECKING:
+    from ._words import Backend, RunForm
     from .reference.adaptive import Pace
 
-BACKENDS = ("rust", "numpy")
-FORMS = ("direct", "matrix", "power")
+BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
+FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
 
 #: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final
 #: state), and so many bytes for each saved time (its step number and the time).
@@ -56,31 +57,34 @@ def integrate(
     y: Any,
     dt: float | None = None,
     steps: int | None = None,
+    every: int | None = None,
     tolerance: Any = None,
     at: Any = None,
-    max_steps: int | None = None,
-    every: int | None = None,
+    control: AnyControl | None = None,
+    force: Any = None,
     record: str | Sequence[str] | None = (),
+    form: RunForm = "direct",
+    fused: bool = False,
     t0: float = 0.0,
-    start_step: int = 0,
     start: str | None = None,
+    max_steps: int | None = None,
+    progress: bool = False,
+    threads: int | None = None,
+    backend: Backend = "rust",
+    start_step: int = 0,
     carry: Any = None,
     carried_by: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
-    control: AnyControl | None = None,
-    form: str = "direct",
-    force: Any = None,
-    fused: bool = False,
-    threads: int | None = None,
-    backend: str = "rust",
-    progress: bool = False,
 ) -> Run:
     """Step a system, or a batch of it.
 
     Every parameter of the system and both blocks broadcast; batch axes come last. A member that diverges does not affect the
     others. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
     in a batch, in one piece or in several.
+
+    Most runs need ``v``, ``y``, ``dt``, ``steps`` and ``every``, or ``tolerance`` and ``at``. The last five, from
+    ``start_step`` on, are those of a run that continues another: ``**run.resume`` gives them, and they are not written by hand.
 
     Args:
         system: what to step.
@@ -91,6 +95,7 @@ def integrate(
             to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
             time from rest.
         steps: number of steps, one or more.
+        every: save the state every so many steps, and at the first and the last; None saves the last alone.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
             each stays below this. The error of a block is relative to the largest length (norm) of the block so far, so that the
             units of v and y do not matter. A tuple (relative, absolute) allows relative·length + absolute instead, the absolute
@@ -99,13 +104,23 @@ def integrate(
             ``error_order``: merson, fehlberg, fehlberg_5, dop853.
         at: with a tolerance, the times at which to save the state, ascending, from t0 on. Steps do not depend on them: a state
             within a step is computed by one extra step from its start.
-        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
-        every: save the state every so many steps, and at the first and the last; None saves the last alone.
+        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
+            tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
+        force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
+            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
         record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
+        form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
+            which make any number of steps at once and need inputs that are constants or sinusoids.
+        fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
+            same on every machine and with either backend. For steps of up to some 4000 operations.
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
-        start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         start: how to start a method that has several ways; see ``method(…).starts``.
+        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        progress: show a progress bar, in a terminal or in a notebook.
+        threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
+        backend: ``"rust"``, or ``"numpy"`` for the reference.
+        start_step: number of the first step. A run in pieces (``run.resume``) equals the run in one piece to the bit.
         carry: what a method carries in place of v, from ``run.resume``; ``v`` is then not used. With a tolerance, the state of
             the step-size controller.
         carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
@@ -113,17 +128,6 @@ def integrate(
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
-        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
-            tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
-        form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
-            which make any number of steps at once and need inputs that are constants or sinusoids.
-        force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
-            per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
-        fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
-            same on every machine and with either backend. For steps of up to some 4000 operations.
-        threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
-        backend: ``"rust"``, or ``"numpy"`` for the reference.
-        progress: show a progress bar (needs rich).
 
     Returns:
         A ``Run``.
@@ -141,6 +145,11 @@ def integrate(
             sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
             (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+
+    Example:
+        >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
+        >>> run.y.round(6)
+        array([ 1.      ,  0.283658, -0.839075])
     """
     how = find_method(method)
     system = a_system(system).sized(v, y)
@@ -634,10 +643,8 @@ def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Arr
 
 
 def _bar(title: str) -> Any:
-    try:
-        from ._progress import bar
-    except ImportError:
-        raise UnsupportedError("progress: a progress bar needs rich; pip install 'stepwell[progress]'") from None
+    from ._progress import bar
+
     return bar(title)
 
 

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, Protocol, cast
 
 from . import _checks, _core
+from ._brief import facts
 from ._value import Fixed
 from .errors import ArgumentError
 from .reference.types import Array, Blocks, Scaled
@@ -27,7 +28,15 @@ class Steps(Protocol):
 
 
 class Method(Fixed):
-    """A method with its metadata, read from its record in the core."""
+    """A method with its metadata, read from its record in the core.
+
+    Example:
+        >>> rk4 = sw.method("rk4")
+        >>> rk4
+        <method rk4: Runge-Kutta 4, order 4, 4 function evaluations per step>
+        >>> rk4.order, rk4.evaluations, round(rk4.limit, 4)
+        (4, 4, 2.8284)
+    """
 
     #: The name by which it is chosen.
     name: str
@@ -98,7 +107,7 @@ class Method(Fixed):
     def _text(self) -> str:
         limit = f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"
         lines = [
-            f"{self.title}: order {self.order}, {self.evaluations} function evaluation(s) per step.",
+            f"{self.title}: order {self.order}, {self._costs()} per step.",
             "",
             self.about,
             "",
@@ -114,7 +123,26 @@ class Method(Fixed):
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return f"<method {self.name}: {self.title}, order {self.order}, {self.evaluations} evaluation(s) per step>"
+        return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
+
+    def _costs(self) -> str:
+        return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(
+            f"{self.title} ({self.name})",
+            [
+                ("order", self.order),
+                ("costs", f"{self._costs()} per step"),
+                ("undamped oscillator stable", f"Φ = ω₀·dt < {self.limit:.10g}" if self.limit else "never"),
+                ("adaptive steps", "no" if self.error_order is None else "yes (tolerance=)"),
+                ("also called", "; ".join(self.other_names)),
+                ("not to be taken for", "; ".join(self.false_friends)),
+                ("source", f"{self.section}; {self.reference}"),
+            ],
+            self.about,
+        )
 
 
 def _section(method: Method) -> int:
@@ -130,7 +158,12 @@ def _catalogue() -> dict[str, Method]:
 
 
 def methods() -> tuple[Method, ...]:
-    """Every method, in the order of the document."""
+    """Every method, in the order of the document.
+
+    Example:
+        >>> [method.name for method in sw.methods() if method.error_order is not None]
+        ['fehlberg', 'merson', 'fehlberg_5', 'dop853']
+    """
     return tuple(_catalogue().values())
 
 
@@ -149,11 +182,27 @@ def choice(methods: Any) -> list[Method]:
 def method(name: str | Method) -> Method:
     """The method of that name.
 
+    Args:
+        name: its name, or any other of its record, in any spelling: ``"false_euler"``, ``"symplectic Euler"`` or
+            ``"Euler-Cromer"``.
+
+    Returns:
+        The ``Method``, with its record.
+
     Raises:
-        UnknownNameError: if there is none; the message names the nearest.
+        UnknownNameError: if there is none, or more than one. The message names the nearest; of the name of another method that is
+            easily confused with one of these (``"RK45"``), it says what that is.
+
+    Example:
+        >>> sw.method("velocity Verlet").name
+        'leapfrog'
     """
     if isinstance(name, Method):
         return name
     if type(name) is str and (known := _catalogue().get(name)) is not None:
         return known
+    if isinstance(name, str):
+        from ._method_names import resolved  # other names may take their time; the import of stepwell may not
+
+        return resolved(str(name), _catalogue())
     return _catalogue()[_checks.known("method", name, _catalogue())]

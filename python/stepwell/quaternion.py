@@ -33,7 +33,7 @@ def from_axis_angle(axis: Any, angle: Any) -> Array:
         ArgumentError: what is wrong with which argument.
 
     Example:
-        >>> from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)  # a quarter of a turn about the third axis
+        >>> sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)  # a quarter of a turn about the third axis
         array([0.70710678, 0.        , 0.        , 0.70710678])
     """
     axis = _along("axis", axis, 3)
@@ -67,6 +67,11 @@ def product(p: Any, q: Any) -> Array:
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> quarter = sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)
+        >>> sw.quaternion.product(quarter, quarter).round(12)  # half a turn about the third axis
+        array([0., 0., 0., 1.])
     """
     p, q = _along("p", p, 4), _along("q", q, 4)
     rest = _checks.batch_shape({"p": p.shape[1:], "q": q.shape[1:]})
@@ -94,6 +99,11 @@ def matrix(q: Any) -> Array:
 
     Raises:
         ArgumentError: what is wrong with ``q``.
+
+    Example:
+        >>> quarter = sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)
+        >>> (sw.quaternion.matrix(quarter) @ [1.0, 0.0, 0.0]).round(12)  # the first axis is turned into the second
+        array([0., 1., 0.])
     """
     q = _along("q", q, 4)
     largest = np.abs(q).max(axis=0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _checks
+from ._brief import MAX_LINE, facts, shortened
 from ._checks import Array
 from ._encounters import Encounter
 from ._value import Value, by_value
@@ -17,9 +19,18 @@ from .methods import Method
 from .reference.types import Whole
 from .systems import System
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 class Status(IntEnum):
-    """How a member ended."""
+    """How a member ended.
+
+    Example:
+        >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=10)
+        >>> bool(run.status == sw.Status.OK)
+        True
+    """
 
     OK = 0
     #: It left the range of finite numbers.
@@ -110,6 +121,15 @@ class Run(Value):
         force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
+
+    Example:
+        >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
+        >>> run
+        <run of Oscillator(omega=1.0, form='canonical') by rk4: 100 steps of 0.1, t = 0 to 10, 3 saved, 1 member: finite>
+        >>> run.t
+        array([ 0.,  5., 10.])
+        >>> run.y.shape, run.energy.shape
+        ((3,), (3,))
     """
 
     def __init__(
@@ -258,15 +278,79 @@ class Run(Value):
             state["force"] = self.force
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
 
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw the motion and its energy error, and write the picture to ``path`` if given.
+
+        For errors of the state see ``stepwell.charts.run_picture``, which knows the exact solution of a scene.
+
+        Args:
+            path: the file; its ending says in which format.
+
+        Returns:
+            The figure; a notebook shows it.
+
+        Raises:
+            ArgumentError: if the run is of a batch, fewer than two states were saved, or there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
+        Example:
+            >>> import stepwell as sw
+            >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=1)
+            >>> figure = run.plot()
+        """
+        from .charts.runs import own_picture
+
+        return own_picture(self).plot(path)
+
+    def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
+        """Write an animation of the motion; its frames are the saved states.
+
+        Args:
+            path: the file, ending in .gif, .mp4 or .html.
+            seconds: how long it lasts, above zero.
+            fps: frames a second, above zero; fewer if fewer states were saved.
+
+        Raises:
+            ArgumentError: if the run is of a batch, fewer than two states were saved, or an argument is wrong.
+            UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
+        """
+        from .charts.runs import own_picture
+
+        own_picture(self).animate(path, seconds=seconds, fps=fps)
+
     def __repr__(self) -> str:
-        bad = int(np.count_nonzero(self.status))
-        if self.paces is not None:
-            steps, rejected = int(self.paces.accepted.sum()), int(self.paces.rejected.sum())
-            return (
-                f"<run of {self.system!r} by {self.method.name} with a tolerance: {len(self.t)} saved from t = {self.t[0]:g} to "
-                f"{self.t[-1]:g}, {self.status.size} member(s), {steps} steps, {rejected} rejected, {bad} stopped early>"
-            )
-        return (
-            f"<run of {self.system!r} by {self.method.name}: {self.steps} steps of {self.dt:g} from t = {self.t[0]:g}, "
-            f"{len(self.t)} saved, {self.status.size} member(s), {bad} diverged>"
-        )
+        told = dict(self._told())
+        how = "" if self.paces is None else " with a tolerance"
+        steps = f"{told['steps']}, t = {told['time']}"
+        end = f"{told['saved states']} saved, {told['members']}: {told['verdict']}"
+        return shortened(f"<run of {self.system!r} by {self.method.name}{how}: {steps}, {end}>", MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(f"{type(self.system).__name__} by {self.method.title}", [("system", repr(self.system)), *self._told()])
+
+    def _told(self) -> list[tuple[str, str]]:
+        """What it is, by name: steps, time, saved states, members, and how they ended."""
+        members, bad = self.status.size, int(np.count_nonzero(self.status))
+        if self.paces is None:
+            steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
+            first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
+            how, number = "diverged", int(self.first_bad_step[self.status != 0].min()) if bad else None
+        else:
+            rejected = int(self.paces.rejected.sum())
+            steps = f"{_counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
+            first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
+        at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
+        verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        return [
+            ("steps", steps + (", fused" if self.fused else "")),
+            ("time", f"{first:g} to {last:g}"),
+            ("saved states", str(len(self.t))),
+            ("members", _counted(members, "member")),
+            ("verdict", verdict),
+        ]
+
+
+def _counted(number: int, what: str) -> str:
+    """A number and what is counted."""
+    return f"{number} {what}{'s' * (number != 1)}"

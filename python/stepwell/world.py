@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import copy
+from math import prod
 from typing import Any
 
 import numpy as np
 
 from . import _checks, _core, engine
+from ._brief import MAX_LINE, shortened
 from ._checks import Array
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
@@ -169,6 +171,12 @@ class World:
             state["force"] = self._force.copy()
         carry = self._core.carry() if self._method.carry is not None else None
         return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
+
+    def __repr__(self) -> str:
+        members = self._y.shape[len(self._system.y_shape) :]
+        many = f", {prod(members)} members" if members else ""
+        where = f"dt = {self._dt:g}, step {self.step_number}, t = {self.t:g}{many}"
+        return shortened(f"<world of {self._system!r} by {self._method.name}: {where}>", MAX_LINE)
 
     def __copy__(self) -> World:
         return World(self._given, self._method, dt=self._dt, **self.resume)

@@ -11,6 +11,7 @@ import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from typing import TYPE_CHECKING, TypeVar
 
 from .. import _checks
 from ..charts.measure import TIMED_STEP
@@ -25,11 +26,16 @@ from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed
 from .motion import Grid, motion_of
 from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
-from .trials import Trial, Trials, step_times, tried_times
+from .trials import Times, Trial, Trials, step_times, tried_times
+
+if TYPE_CHECKING:
+    from .._words import Cost
+
+Kind = TypeVar("Kind")
 
 __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
 
-COSTS = ("time", "evaluations")
+COSTS: tuple[Cost, ...] = ("time", "evaluations")
 
 #: A larger budget in seconds is refused: the age of the universe is half of it.
 MOST_SECONDS = 1e18
@@ -51,7 +57,7 @@ def advise(
     budget: float | None = None,
     methods: Iterable[Method | str] | None = None,
     *,
-    cost: str = "time",
+    cost: Cost = "time",
     fixed: bool = False,
 ) -> Advice:
     """Find the cheapest method and step that are accurate enough for a scene.
@@ -69,7 +75,8 @@ def advise(
             Without a frame, seconds per unit of time, or no bound. If the cost of frames differs, the most expensive must fit.
         methods: names, or what ``stepwell.method`` returns; all if None.
         cost: ``"time"`` ranks by measured time, ``"evaluations"`` by function (rate) evaluations, which are repeatable. If the
-            cost of frames differs, their mean counts.
+            cost of frames differs, their mean counts. Of methods whose costs differ by less than the noise of the measurement the
+            one with the smallest error comes first.
         fixed: leave out adaptive steps, which a ``World`` cannot take.
 
     Returns:
@@ -77,6 +84,11 @@ def advise(
 
     Raises:
         ArgumentError: what was given and what was expected, or that the true motion of the scene is not known for any time.
+
+    Example:
+        >>> advice = sw.advise("figure_eight", methods=["leapfrog", "rk4"], cost="evaluations")
+        >>> advice
+        <advice for figure_eight: leapfrog, dt = 0.00833333, error 0.0039>
     """
     scene, chosen = _named(scene) if isinstance(scene, str) else find_scene(scene), choice(methods)
     tolerance = _checks.number("tolerance", tolerance, positive=True)
@@ -116,7 +128,8 @@ def advise(
             else:
                 rejected.append(Rejected(method.name, "refused", why, candidate.by))
 
-    times = _times(scene, candidates)
+    times, noise = _times(scene, candidates)
+    noise = noise if cost == "time" else 0.0
     prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
     search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + adaptive.work)
     found, missed = search.run(candidates)
@@ -132,7 +145,9 @@ def advise(
         missed = {name: why for name, why in missed.items() if name not in again}
     enough = [each for each in candidates if each.name in found]
     fits = [each for each in enough if spent.fits(each, found[each.name].k, budget)]
-    fits.sort(key=lambda each: search.cost(each, found[each.name].k))
+    fits = by_cost_and_error(
+        fits, [search.cost(each, found[each.name].k) for each in fits], [found[each.name].trial.error for each in fits], noise
+    )
     for each in candidates:
         if each.name in missed:
             rejected.append(_missed(each, missed[each.name], search))
@@ -145,7 +160,7 @@ def advise(
     ranked = tuple(_row(trials, each, found[each.name], spent, budget, fastest) for each in fits)
     shortfall = None if ranked else _shortfall(candidates, found, spent, budget)
     made = trials.made + adaptive.made
-    return Advice(trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut)
+    return Advice(trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut, noise)
 
 
 def _refusal(scene: Scene, candidate: Candidate) -> str | None:
@@ -167,11 +182,29 @@ def _refusal(scene: Scene, candidate: Candidate) -> str | None:
     return None
 
 
-def _times(scene: Scene, candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Nanoseconds per step, by the candidate's name."""
+def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, float], float]:
+    """Nanoseconds per step, by the candidate's name, and by which share they may differ without a meaning."""
     steps = step_times(scene, [each.method for each in candidates if each.by == "step"])
     tried = tried_times(scene, [each.method for each in candidates if each.by == "tolerance"])
-    return {each.name: (steps if each.by == "step" else tried)[each.method.name] for each in candidates}
+    noise = max((each.noise for each in (steps, tried) if isinstance(each, Times)), default=0.0)
+    return {each.name: (steps if each.by == "step" else tried)[each.method.name] for each in candidates}, noise
+
+
+def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors: Sequence[float], noise: float) -> list[Kind]:
+    """Candidates in the order of their costs; of those that cost the same but for the noise, the smaller error first.
+
+    The first group is the cheapest and all that cost at most that share more; the next begins with the cheapest of the others.
+    Errors that are equal in two digits are taken to be equal: those of one motion in two ways differ by roundings.
+    """
+    errors = [float(f"{error:.1e}") for error in errors]
+    order = sorted(range(len(candidates)), key=lambda i: (costs[i], errors[i]))
+    ranked: list[int] = []
+    while order:
+        most = costs[order[0]] * (1.0 + noise)
+        group = [i for i in order if costs[i] <= most]
+        ranked += sorted(group, key=lambda i: (errors[i], costs[i]))
+        order = order[len(group) :]
+    return [candidates[i] for i in ranked]
 
 
 class _Spending:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _checks
+from .._brief import one_line, table
 from .._checks import Array
 from ..charts.data import finite
 from ..errors import ArgumentError
@@ -87,6 +88,8 @@ class Row:
     rejected_steps: int = 0
     worst_evaluations: int | None = None
 
+    __repr__ = one_line
+
     @property
     def by(self) -> str:
         """``"step"`` for fixed steps, ``"tolerance"`` for adaptive ones."""
@@ -132,6 +135,8 @@ class Rejected:
         by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
     """
 
+    __repr__ = one_line
+
     method: str
     kind: str
     reason: str
@@ -156,6 +161,8 @@ class Shortfall:
         tolerance: to which the steps of the least error are chosen, or None.
     """
 
+    __repr__ = one_line
+
     least_error: float
     method: str | None
     substeps: int | None
@@ -174,11 +181,13 @@ class Advice:
         tolerance: the largest state error that is allowed.
         budget: seconds that may be used in a frame (in a unit of time without one), or None for any.
         cost: by what ``ranked`` is ordered, ``"time"`` or ``"evaluations"``.
-        ranked: what is good enough and fits, the cheapest first.
+        ranked: what is good enough and fits, the cheapest first; of those whose costs differ by ``cost_noise`` or less, the one
+            with the smallest error.
         rejected: the other methods, and why.
         shortfall: what would have to give; None if something fits.
         runs: how many runs were made to find it.
         cut: whether the scene's horizon is longer, and its true motion not known so far.
+        cost_noise: the share by which measured times may differ without a meaning; 0 for evaluations.
     """
 
     scene: Scene
@@ -191,6 +200,7 @@ class Advice:
     shortfall: Shortfall | None
     runs: int
     cut: bool = False
+    cost_noise: float = 0.0
 
     @property
     def best(self) -> Row | None:
@@ -212,6 +222,7 @@ class Advice:
             "shortfall": asdict(self.shortfall) if self.shortfall else None,
             "runs": self.runs,
             "cut": self.cut,
+            "cost_noise": self.cost_noise,
         }
         found: dict[str, Any] = finite(whole)
         return found
@@ -267,15 +278,27 @@ class Advice:
         ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
         worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
-        lines.append(f"Cost {per}: {evaluations:.4g} function evaluations{worst}; {ns:.3g} ns measured in a batch on one thread.")
+        counted = f"{evaluations:.4g} function evaluation{'s' * (evaluations != 1)}{worst}"
+        lines.append(f"Cost {per}: {counted}; {ns:.2g} ns measured in a batch on one thread.")
+        lines += self._as_cheap(best)
         if best.objects is not None:
-            lines.append(
-                f"The budget of {self.budget:.3g} s {per} suffices for {best.objects} such objects{', also then' * bool(worst)}."
-            )
+            objects = f"{about(best.objects)} such object{'s' * (best.objects != 1)}{', also then' * bool(worst)}"
+            lines.append(f"The budget of {self.budget:.3g} s {per} suffices for {objects}.")
         lines.append(_margin(best))
         if not best.is_robust:
             lines.append(self._uneven(best))
         return lines
+
+    def _as_cheap(self, best: Row) -> list[str]:
+        """Which others cost the same as far as it was measured; the best has the smallest error of them."""
+        if self.cost != "time":
+            return []
+        alike = best.seconds_per_time * (1.0 + self.cost_noise)
+        same = [row.name for row in self.ranked[1:] if row.seconds_per_time <= alike and row.error >= best.error]
+        if not same:
+            return []
+        said = f"{', '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
+        return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {said}."]
 
     def _cut(self) -> list[str]:
         if not self.cut:
@@ -321,8 +344,8 @@ class Advice:
                     f"{row.error:.2g}",
                     "–" if row.predicted is None else f"{row.predicted:.2g}",
                     f"{row.evaluations_per_frame if framed else row.evaluations_per_time:.4g}",
-                    f"{1e9 * ((row.seconds_per_frame or 0.0) if framed else row.seconds_per_time):.3g}",
-                    "–" if row.objects is None else f"{row.objects:.3g}",
+                    f"{1e9 * ((row.seconds_per_frame or 0.0) if framed else row.seconds_per_time):.2g}",
+                    "–" if row.objects is None else about(row.objects).removeprefix("about "),
                     _blows(row),
                 )
             )
@@ -367,12 +390,28 @@ class Advice:
             lines += ["", *self.rejections(REASONS)]
         return "\n".join(lines)
 
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return table(self.title, COLUMNS, self.table(), [*self.summary(), *self.rejections(REASONS)])
+
     def __repr__(self) -> str:
         best = self.best
         if best is None:
             return f"<advice for {self.scene.name}: nothing fits>"
         how = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
         return f"<advice for {self.scene.name}: {best.method.name}, {how}, error {best.error:.2g}>"
+
+
+def about(number: int) -> str:
+    """A number that follows from a measured time, to the digits that mean something: ``"about 7·10⁷"``, and small ones as is."""
+    if number < 100:
+        return str(number)
+    digits = f"{number:.0e}" if number >= 10_000 else f"{float(f'{number:.1g}'):.0f}"
+    mantissa, _, exponent = digits.partition("e")
+    if not exponent:
+        return f"about {mantissa}"
+    power = str(int(exponent)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"about {mantissa}·10{power}"
 
 
 def named(method: str, by: str) -> str:

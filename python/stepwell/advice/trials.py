@@ -6,7 +6,7 @@ import copy
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +45,21 @@ ASYMPTOTIC_ERROR = 0.3
 #: LOST_RATIO times what is allowed, the rest is left out: no more can be learned from it. The ratio is more than the search looks
 #: at (IRREGULAR_RISE times IRREGULAR_ERROR_RATIO there). If an error near LOST is allowed, it must be above twice that.
 PIECES, LOST, LOST_RATIO = 12, 1.0, 16.0
+
+
+#: Two timings that differ by less than this share are taken to be equal even if repeats agree better: the place of code and
+#: arrays in memory makes such differences. What repeats say counts up to the second number, above which they say nothing.
+MIN_COST_NOISE, MAX_COST_NOISE = 0.05, 0.25
+
+
+class Times(dict[str, float]):
+    """Measured nanoseconds by method.
+
+    Attributes:
+        noise: the share by which two of them may differ without a meaning, from the spread of the repeats.
+    """
+
+    noise: float = 0.0
 
 
 class Trial(NamedTuple):
@@ -192,7 +207,7 @@ def _part(run: Run, places: np.ndarray[Any, np.dtype[np.int64]]) -> Run:
     return part
 
 
-def step_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
+def step_times(scene: Scene, methods: Sequence[Method]) -> Times:
     """Nanoseconds per step of one member of a batch, on one thread, by method; the methods take turns."""
     v, y, members = _batch(scene)
 
@@ -205,7 +220,7 @@ def step_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
     return _in_turns(methods, timed, members)
 
 
-def tried_times(scene: Scene, methods: Sequence[Method]) -> dict[str, float]:
+def tried_times(scene: Scene, methods: Sequence[Method]) -> Times:
     """Nanoseconds per step that is tried in a run with a tolerance, rejected ones counted; otherwise as ``step_times``."""
     batch_v, batch_y, members = _batch(scene)
 
@@ -250,12 +265,12 @@ def _batch(scene: Scene) -> tuple[Array, Array, int]:
     return v, y, members
 
 
-def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[float, int]], members: int) -> dict[str, float]:
+def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[float, int]], members: int) -> Times:
+    sizes, repeats = {}, {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         warnings.simplefilter("ignore", ToleranceWarning)
         warnings.simplefilter("ignore", AccuracyWarning)
-        sizes, found = {}, {}
         begun = time.perf_counter()
         for method in methods:
             n, (seconds, steps) = 1, timed(method, 1)
@@ -263,11 +278,22 @@ def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[fl
             while seconds < MUCH * TIMED_SECONDS and min(seconds, timed(method, n)[0]) < TIMED_SECONDS:
                 n *= 2
                 seconds, steps = timed(method, n)
-            sizes[method.name], found[method.name] = n, 1e9 * seconds / (steps * members)
+            sizes[method.name], repeats[method.name] = n, [1e9 * seconds / (steps * members)]
         for _ in range(REPEATS):
             if time.perf_counter() - begun > SLOW_SECONDS:
                 break
             for method in methods:
                 seconds, steps = timed(method, sizes[method.name])
-                found[method.name] = min(found[method.name], 1e9 * seconds / (steps * members))
+                repeats[method.name].append(1e9 * seconds / (steps * members))
+    found = Times({name: min(each) for name, each in repeats.items()})
+    found.noise = cost_noise(repeats.values())
     return found
+
+
+def cost_noise(repeats: Iterable[Sequence[float]]) -> float:
+    """By which share the least of some repeats may be wrong: how far the second least is above it, of the worst method."""
+    repeats = list(repeats)
+    if not repeats:
+        return 0.0
+    spreads = [sorted(each)[1] / min(each) - 1.0 for each in repeats if len(each) > 1]
+    return min(MAX_COST_NOISE, max(MIN_COST_NOISE, *spreads, 0.0))

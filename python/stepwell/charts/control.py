@@ -217,6 +217,11 @@ def control(
 
     Raises:
         ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> chart = sw.charts.control("energy_control", ["standard_euler"], relative=[0.1, 0.3], evaluations=[500], horizon=5.0)
+        >>> [row["kind"] for row in chart.summary()]
+        ['none', 'limited', 'printed', 'scaling', 'nacozy']
     """
     if isinstance(scene, str):
         scene = find_scene(scene)

@@ -91,6 +91,11 @@ class Point(Value):
         return not self.unstable and self.state_error <= 1.0
 
 
+#: A point is right by luck if one of the next so many is more than so many times as wrong. Rounding errors grow at most with the
+#: number of steps, by a factor of 2 within three rungs of the ladder.
+LATER, LUCKY = 3, 4.0
+
+
 @dataclass(frozen=True, eq=False)
 class Curve(Value):
     """One method with all steps, or all tolerances; or a peer.
@@ -150,9 +155,25 @@ class Curve(Value):
         """The points that are usable, from the largest step to the smallest."""
         return tuple(point for point in self.points if point.usable)
 
+    def dependable(self, kind: str = "state_error", floor: float = 0.0) -> tuple[Point, ...]:
+        """The usable points that were not right by luck: none of the next three is far more wrong, by the error of that kind.
+
+        A step may meet an impact just right, or lie in a narrow window of stability; a slightly shorter one does not. Errors
+        below ``floor`` count as ``floor``.
+        """
+
+        def error(point: Point) -> float:
+            return max(point.error(kind), floor) if point.usable else math.inf
+
+        return tuple(
+            point
+            for i, point in enumerate(self.points)
+            if point.usable and not any(error(later) > LUCKY * error(point) for later in self.points[i + 1 : i + 1 + LATER])
+        )
+
     def cheapest(self, error: float) -> float:
-        """The least cost of the usable points with at most that state error; infinite if there is none."""
-        return min((point.cost for point in self.usable if point.state_error <= error), default=math.inf)
+        """The least cost of the dependable points with at most that state error; infinite if there is none."""
+        return min((point.cost for point in self.dependable() if point.state_error <= error), default=math.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +223,7 @@ class WorkPrecision(Drawn, Value):
     def front(self, error: str = "state_error", cost: str = "evaluations") -> list[dict[str, Any]]:
         """The Pareto front: the points than which none is both as cheap and as right, from the cheapest to the most right.
 
-        Of points that are usable, with an error not below ``floor``.
+        Of points that are usable and not right by luck (``Curve.dependable``), with an error not below ``floor``.
 
         Args:
             error: one of ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
@@ -219,8 +240,12 @@ class WorkPrecision(Drawn, Value):
         found = [
             (spent, point.error(error), i, curve, point)
             for i, curve in enumerate(self.curves)
+            for dependable in [curve.dependable(error, self.floor)]
             for spent, point in zip(curve.costs(cost), curve.points, strict=True)
-            if point.usable and math.isfinite(spent) and math.isfinite(point.error(error)) and point.error(error) >= self.floor
+            if point in dependable
+            and math.isfinite(spent)
+            and math.isfinite(point.error(error))
+            and point.error(error) >= self.floor
         ]
         rows: list[dict[str, Any]] = []
         least = math.inf
@@ -256,7 +281,7 @@ class WorkPrecision(Drawn, Value):
         rows: list[dict[str, Any]] = []
         for curve in self.curves:
             costs = {f"cost_at_error_{error:g}": curve.cheapest(error) for error in TARGETS}
-            best = {"least_error": min((point.state_error for point in curve.usable), default=math.inf)}
+            best = {"least_error": min((point.state_error for point in curve.dependable()), default=math.inf)}
             rows.append(
                 {"scene": self.scene.name, "method": curve.name, "title": curve.title}
                 | costs

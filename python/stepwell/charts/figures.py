@@ -245,6 +245,11 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
 
     Warns:
         DivergenceWarning: if samples leave the finite numbers.
+
+    Example:
+        >>> chart = sw.charts.figures(["rk4"])
+        >>> chart.summary()[0]["kind"]
+        'damped oscillation'
     """
     chosen = choice(methods)
     phi = within("phi", _checks.number("phi", phi, positive=True, unit="rad"))

@@ -228,6 +228,11 @@ def stability_map(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step a damped oscillator.
+
+    Example:
+        >>> chart = sw.charts.stability_map("rk4", size=16)
+        >>> chart.method.name
+        'rk4'
     """
     how = find_method(method)
     low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")

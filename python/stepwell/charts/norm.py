@@ -154,7 +154,8 @@ def norm(
         UnsupportedError: if a method cannot step a rigid body.
 
     Example:
-        >>> sw.charts.norm(["standard_euler"]).plot("norm.png")
+        >>> chart = sw.charts.norm(["standard_euler"])
+        >>> figure = chart.plot("norm.png")
     """
     chosen = choice(METHODS if methods is None else methods)
     phi = _checks.number("phi", phi, positive=True, unit="rad")

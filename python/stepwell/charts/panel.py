@@ -79,6 +79,11 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
 
     Raises:
         ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> chart = sw.charts.panel(["oscillator"], methods=["leapfrog"], steps=[500, 1000], tolerances=[])
+        >>> len(chart.charts)
+        1
     """
     chosen = [find_scene(each) for each in _checks.several("scenes", scenes, "scenes")]
     if not chosen:

@@ -4,39 +4,41 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from typing import TYPE_CHECKING
 
 from .panel import Panel
-from .picture import COUNTED, ERRORS, FRONT, draw_errors, known_to, look_of
+from .picture import COUNTED, ERRORS, draw_errors, known_to, name_curves, title_of
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Subplots in a row, and the height of one, of the title and of a line of the legend, in inches.
-ACROSS, EACH, HEAD, LINE = 3, 4.3, 1.0, 0.27
+#: Subplots in a row, and the height of one, and of the title, in inches.
+ACROSS, EACH, HEAD = 3, 4.3, 1.0
 #: Where each scene has two.
 ACROSS_PAIRS = 4
 
-WIDTH, COLUMNS = 16.0, 5
+WIDTH = 16.0
+
+#: What is not named.
+PALE_IS = "Pale: never the cheapest."
+
+#: Errors for which it is counted who is the cheapest.
+DIGITS = range(1, 13)
 
 
 def draw(panel: Panel, error: str) -> Figure:
     """Draw the charts on a new figure."""
-    entries: dict[str, Any] = {}
-    for chart in panel.charts:
-        for curve in chart.curves:
-            entries.setdefault(curve.title, look_of(chart, curve))
     # A right energy does not make a motion right: the energy error has the state error beside it.
     kinds = ("energy_error", "state_error") if error == "energy_error" else (error,)
     each = [(chart, kind) for chart in panel.charts for kind in kinds]
     across = min(ACROSS_PAIRS if len(kinds) > 1 else ACROSS, len(each))
     down = math.ceil(len(each) / across)
-    foot = 0.75 + LINE * math.ceil((len(entries) + 1) / COLUMNS)
+    foot = 0.75
     height = HEAD + EACH * down + foot
     figure = new_figure(WIDTH, height)
     from matplotlib import rc_context
-    from matplotlib.lines import Line2D
 
     with rc_context(FONT):
         grid = figure.add_gridspec(
@@ -49,19 +51,26 @@ def draw(panel: Panel, error: str) -> Figure:
                 line.set_markersize(0.75 * line.get_markersize())
                 line.set_linewidth(line.get_linewidth() * 0.8)
             axes.minorticks_off()
+            name_curves(axes, chart, kind, "evaluations", 10.5, all_of_them=False)
             note = f"t up to {chart.scene.horizon:.4g}{known_to(chart)}"
             note = f"{kind.replace('_', ' ')}, {note}" if len(kinds) > 1 else note
             axes.set_title(f"{chart.scene.title}\n", size=14, weight="bold", loc="left")
             axes.text(0.0, 1.02, note, transform=axes.transAxes, size=11, color=GREY)
-        figure.text(0.012, 1.0 - 0.42 / height, "What an error costs, scene by scene", size=20, weight="bold")
-        bottom = (foot - 0.42) / height
+        figure.text(0.012, 1.0 - 0.42 / height, f"{leader(panel)}: what an error costs, scene by scene", size=20, weight="bold")
+        bottom = 0.12 / height
+        figure.text(0.012, bottom, PALE_IS, size=12, color=GREY)
         figure.text(0.52, bottom, COUNTED, ha="center", size=14)
         figure.text(
             0.012, 0.5, textwrap.fill(" and ".join(ERRORS[kind] for kind in kinds), 60), rotation=90, va="center", size=14
         )
-        handles = [Line2D([], [], **style) for style in entries.values()] + [Line2D([], [], **FRONT)]
-        labels = [*entries, "the cheapest of all for its error"]
-        figure.legend(
-            handles, labels, loc="lower center", ncols=COLUMNS, frameon=False, handlelength=3.0, bbox_to_anchor=(0.5, 0.0)
-        )
     return figure
+
+
+def leader(panel: Panel) -> str:
+    """Which method is the cheapest most often, of all scenes and all numbers of digits that any method reaches."""
+    best = [chart.best(10.0**-digits) for chart in panel.charts for digits in DIGITS]
+    names = [row["method"].split(",")[0] for row in best if row is not None]
+    if not names:
+        return "No method has a digit right"
+    first, times = Counter(names).most_common(1)[0]
+    return f"{title_of(first)} is the cheapest in {times} of {len(names)} cases"

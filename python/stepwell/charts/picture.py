@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import textwrap
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..methods import Method
 from ..methods import methods as every_method
 from .data import Curve, WorkPrecision
+from .labels import Label, beside
 from .peers import Peer
-from .style import FONT, GREY, look, new_figure, peer_look
+from .style import FONT, GREY, PALE, look, new_figure, peer_look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,9 +23,11 @@ if TYPE_CHECKING:
 #: Orders for which a slope is drawn.
 SLOPES = (1, 2, 4)
 
-#: Where the panels end and the legend begins, as a share of the width.
-PANELS, LEGEND = 0.717, 0.727
+#: Letters in a line below the panels.
+NOTE = 190
 
+#: The strip of runs without a right digit, as a share of the height of the panels.
+STRIP = 0.1
 
 #: What the errors are called on an axis.
 ERRORS = {
@@ -34,7 +40,7 @@ COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
 #: Under the curves, the points than which none is both as cheap and as right.
-FRONT: dict[str, Any] = {"color": "#f2c14e", "linewidth": 9.0, "alpha": 0.75, "solid_capstyle": "round", "zorder": 1.0}
+FRONT: dict[str, Any] = {"color": "#e4e4e4", "linewidth": 10.0, "solid_capstyle": "round", "zorder": 0.8}
 
 
 def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
@@ -43,9 +49,8 @@ def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
     from matplotlib import rc_context
 
     with rc_context(FONT):
-        _panels(figure, chart, error, time)
-        _legend(figure, chart)
-        _text(figure, chart, time)
+        unnamed = _panels(figure, chart, error, time)
+        _text(figure, chart, time, unnamed)
     return figure
 
 
@@ -60,22 +65,22 @@ def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
     return own | {"markerfacecolor": "white", "linestyle": "-."} if curve.by == "tolerance" else own
 
 
-def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> None:
+def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> list[str]:
     """Below, what has a digit right: error against cost. Above, one row for each method, what has none.
 
     A right energy does not make a motion right, so the energy error has the state error beside it, and not the measured time.
+    Returns the names for which there was no room.
     """
     beside = error == "energy_error"
     other_error, other_cost = ("state_error", "evaluations") if beside else (error, time)
-    strip = 0.026 * (len(chart.curves) + 1)
     grid = figure.add_gridspec(
         2,
         2,
-        height_ratios=(strip, 1.0 - strip),
+        height_ratios=(STRIP, 1.0 - STRIP),
         width_ratios=(1.0, 1.0) if beside else (1.1, 1.0),
         left=0.092,
-        right=PANELS,
-        bottom=0.165,
+        right=0.985,
+        bottom=0.175,
         top=0.88,
         hspace=0.0,
         wspace=0.24 if beside else 0.07,
@@ -102,24 +107,20 @@ def _panels(figure: Figure, chart: WorkPrecision, error: str, time: str) -> None
     else:
         measured.set_xlabel(f"measured ns per unit of time, {TIMES[time]}")
         measured.tick_params(labelleft=False)
-    for row, curve in enumerate(chart.curves):
-        style = look_of(chart, curve) | {
-            "linestyle": "",
-            "clip_on": False,
-            "transform": above_counted.get_yaxis_transform(),
-        }
-        above_counted.plot([-0.02], [row], **style)
-    above_counted.set_ylabel("no digit right:\n○ bounded\n× unstable", rotation=0, ha="right", va="center", labelpad=16, size=12)
+    above_counted.set_ylabel(
+        "no digit right:\n○ bounded\n× unstable", rotation=0, ha="right", va="top", y=0.98, labelpad=10, size=10.5
+    )
+    return name_curves(counted, chart, error, "evaluations", 11.5)
 
 
 def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None:
     """The curves, and the front under them."""
     axes.set(xscale="log", yscale="log")
+    front = chart.front(error, cost)
     for i, curve in enumerate(chart.curves):
         y = [point.error(error) if point.usable else math.nan for point in curve.points]
         # Markers at different rungs, so that curves that fall together are still seen to be two.
-        axes.plot(curve.costs(cost), y, markevery=(2 * i % 5, 5), **look_of(chart, curve))
-    front = chart.front(error, cost)
+        axes.plot(curve.costs(cost), y, markevery=(2 * i % 5, 5), **muted(chart, curve, front))
     axes.plot([row["cost"] for row in front], [row["error"] for row in front], **FRONT)
     errors = [point.error(error) for curve in chart.curves for point in curve.usable if point.error(error) > 0.0]
     low = min(errors, default=0.1) / 3.0
@@ -130,9 +131,51 @@ def draw_errors(axes: Axes, chart: WorkPrecision, error: str, cost: str) -> None
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
 
 
+def muted(chart: WorkPrecision, curve: Curve, front: list[dict[str, Any]]) -> dict[str, Any]:
+    """Keywords for a line: in its colour if it is somewhere the cheapest for its error, else pale and thin."""
+    style = look_of(chart, curve)
+    if curve.name in {row["method"] for row in front}:
+        return style | {"linewidth": 2.2, "zorder": 3.0}
+    return style | {"color": PALE, "linewidth": 1.0, "markersize": 4.5, "zorder": 2.0}
+
+
+def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: float, *, all_of_them: bool = True) -> list[str]:
+    """The names of the curves of the front, or of all, beside them; returned are those for which there was no room."""
+    front = chart.front(error, cost)
+    leading = {row["method"] for row in front}
+    labels = []
+    for curve in sorted(chart.curves, key=lambda curve: curve.name not in leading):
+        y = [point.error(error) if point.usable else math.nan for point in curve.points]
+        first = curve.name in leading
+        style = {"color": look_of(chart, curve)["color"] if first else GREY, "weight": "bold" if first else "normal"}
+        points = np.array([curve.costs(cost), y], dtype=np.float64).T
+        if (first or all_of_them) and np.isfinite(points).all(axis=1).any():
+            labels.append(Label(curve.title.replace(", ", "\n"), points, style | {"size": size if first else size - 1.5}))
+    return [name.replace("\n", ", ") for name in beside(axes, labels)]
+
+
+def finding(chart: WorkPrecision) -> str:
+    """What the front says: the method that is the cheapest for most digits, and for which."""
+    cheapest: list[str] = []
+    while (row := chart.best(10.0 ** -(len(cheapest) + 1))) is not None:
+        cheapest.append(title_of(row["method"].split(",")[0]))
+    if not cheapest:
+        return "no method has a digit right"
+    runs = [(title, len(list(same))) for title, same in itertools.groupby(cheapest)]
+    longest = max(range(len(runs)), key=lambda i: runs[i][1])
+    title, number = runs[longest]
+    first = 1 + sum(length for _, length in runs[:longest])
+    last = first + number - 1
+    digits = "one digit" if first == last == 1 else f"{first} digits" if first == last else f"{first} to {last} digits"
+    return f"{title} is the cheapest for {digits}"
+
+
 def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:
     """The least and the greatest measured time, at the end of each curve."""
+    leading = {row["method"] for row in chart.front("state_error", time)}
     for curve in chart.curves:
+        if curve.name not in leading:
+            continue
         usable = [i for i, point in enumerate(curve.points) if point.usable]
         for i in usable[-1:]:
             spent = curve.time(i, time)
@@ -143,15 +186,15 @@ def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:
 def _wrong(strip: Axes, chart: WorkPrecision, cost: str) -> None:
     """A mark at each step that leaves no digit right, and the method's own marker where it becomes unstable."""
     for row, curve in enumerate(chart.curves):
-        style = look_of(chart, curve) | {"linestyle": ""}
+        style = look_of(chart, curve) | {"linestyle": "", "markersize": 5.0}
         costs = list(zip(curve.costs(cost), curve.points, strict=True))
-        for marker, size, unstable in (("x", 5.0, True), ("o", 3.5, False)):
+        for marker, size, unstable in (("x", 3.0, True), ("o", 2.4, False)):
             x = [spent for spent, point in costs if not point.usable and point.unstable == unstable]
-            mark = {"marker": marker, "markersize": size, "markerfacecolor": "none", "markeredgewidth": 1.0}
+            mark = {"marker": marker, "markersize": size, "markerfacecolor": "none", "markeredgewidth": 0.8}
             strip.plot(x, [row] * len(x), **(style | mark))
         if 0.0 < curve.largest_stable_step < math.inf:
             strip.plot([_at_edge(curve, cost)], [row], **style)
-    strip.set_ylim(len(chart.curves) + 0.3, -0.7)  # below the last row there is room for the first label of the errors
+    strip.set_ylim(len(chart.curves), -1.0)
     strip.set_yticks([])
     strip.tick_params(labelbottom=False, bottom=False)
     strip.grid(axis="x", color="#dddddd", linewidth=0.8)
@@ -178,50 +221,34 @@ def _slopes(axes: Axes) -> None:
         axes.annotate(f"order {order}", (to_x, to_y), (5, -4), textcoords="offset points", size=11, color=GREY)
 
 
-def _legend(figure: Figure, chart: WorkPrecision) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], **look_of(chart, curve)) for curve in chart.curves] + [Line2D([], [], **FRONT)]
-    labels = [_label(curve) for curve in chart.curves] + ["the cheapest of all for its error"]
-    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (LEGEND, 0.89)}
-    legend = figure.legend(
-        handles, labels, frameon=False, fontsize=11.0, handlelength=2.6, labelspacing=0.6, borderpad=0.0, **place
-    )
-    figure.draw_without_rendering()
-    bottom = legend.get_window_extent().transformed(figure.transFigure.inverted()).y0
-    refusals = [f"{title_of(name)} is refused: {reason}." for name, reason in chart.refused.items()]
-    text = "\n\n".join(textwrap.fill(refusal, 52) for refusal in refusals)
-    figure.text(LEGEND + 0.003, bottom - 0.02, text, size=10.0 if len(refusals) > 1 else 11.5, color=GREY, va="top")
-
-
 def title_of(name: str) -> str:
     """The title of a method, or the name of a peer."""
     first, *kinds = name.split(", ")
     return ", ".join([next((method.title for method in every_method() if method.name == first), first), *kinds])
 
 
-def _label(curve: Curve) -> str:
-    method, limit = curve.method, curve.largest_stable_step
-    if isinstance(method, Peer) or curve.by == "tolerance" or curve.fused:  # its limit is that of the other curve
-        return curve.title
-    # A method without a limit on the oscillator grows at every step; how far it gets depends on the horizon.
-    up_to = "stable dt <" if method.limit else "fails dt >"
-    stable = "" if limit == math.inf else f", {up_to} {limit:#.3g}" if limit else ", never stable"
-    return f"{method.title}, order {method.order}{stable}"
-
-
-def _text(figure: Figure, chart: WorkPrecision, time: str) -> None:
+def _text(figure: Figure, chart: WorkPrecision, time: str, unnamed: list[str]) -> None:
     scene = chart.scene
-    figure.text(0.012, 0.955, f"{scene.title}: what each method costs and how wrong it is", size=20, weight="bold")
+    figure.text(0.012, 0.955, f"{scene.title}: {finding(chart)}", size=20, weight="bold")
     system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)} ({scene.section})"
     figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
     what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"
+    reasons: dict[str, list[str]] = {}
+    for name, reason in chart.refused.items():
+        reasons.setdefault(reason, []).append(title_of(name))
+    refusals = " ".join(
+        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} refused: {reason}." for reason, names in reasons.items()
+    )
+    not_named = f" Not named: {', '.join(unnamed)}." if unnamed else ""
     notes = (
-        f"Error 1, no digit right: {scene.error}." + (" Grey: not known." if chart.floor else ""),
+        f"In colour: cheapest for some error.{not_named} Error 1, no digit right: {scene.error}."
+        + (" Grey: not known." if chart.floor else ""),
         "Unstable: not finite, or no digit right and a growing amplitude; a method's own marker is where that begins.",
         f"Time: {what}, one thread, {chart.isa}; median of {chart.repeats} runs, the bar at a curve's end spans them.",
     )
-    figure.text(0.012, 0.018, "\n".join(notes), size=12, color=GREY, linespacing=1.4)
+    shortened = textwrap.shorten(refusals, 2 * NOTE, placeholder=" …")
+    lines = [*(textwrap.shorten(note, NOTE, placeholder=" …") for note in notes), *textwrap.wrap(shortened, NOTE)]
+    figure.text(0.012, 0.012, "\n".join(lines), size=10.5, color=GREY, linespacing=1.25)
 
 
 def known_to(chart: WorkPrecision) -> str:

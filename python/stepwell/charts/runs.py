@@ -162,6 +162,12 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
 
     Raises:
         ArgumentError: if the run is not of that scene, or keeps too little.
+
+    Example:
+        >>> clover = sw.scenes.clover()
+        >>> picture = sw.charts.run_picture(clover, clover.run("leapfrog", every=1))
+        >>> float(picture.state_error.max().round(3))
+        0.243
     """
     scene = find_scene(scene)
     if not isinstance(run, Run):
@@ -174,6 +180,23 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
         raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
     energy_error, scale = _energy_error(scene, run)
     return RunPicture(scene, run, energy_error, scale, None if scene.exact is None else scene.state_error(run))
+
+
+def own_picture(run: Run) -> RunPicture:
+    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state.
+
+    Raises:
+        ArgumentError: if the run is of a batch, or too little was saved.
+    """
+    if run.status.ndim:
+        raise ArgumentError(f"run: expected a run of one member, got a batch of shape {run.status.shape}; integrate one of them")
+    if len(run.t) < 2:
+        raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
+    system = run.system.uncontrolled
+    title = type(system).__name__
+    horizon = float(run.t[-1] - run.t[0])
+    scene = Scene(system, v=run.v[0], y=run.y[0], dt=run.dt, horizon=horizon, name=title, title=title)
+    return run_picture(scene, run)
 
 
 def _begins(scene: Scene, run: Run) -> bool:

@@ -1,4 +1,4 @@
-"""The look of a method in every picture: the same marker and colour everywhere; in grey, marker and line distinguish it."""
+"""The look of a method in every picture: the colour of its family and its own marker; the line shows its order."""
 
 from __future__ import annotations
 
@@ -16,23 +16,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MARKERS = "osD^vPh*<>pdX8H"
-COLOURS = (
-    "#000000",
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#cc3d8f",
-    "#8a6d00",
-    "#3a9bdc",
-    "#7a3fbf",
-    "#8c4a2f",
-    "#5f6b6d",
-    "#a3003f",
-    "#3b7d23",
-    "#b58900",
-    "#264653",
-    "#e07a9b",
-)
+#: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
+#: cones: tests/test_looks.py measures them.
+FAMILIES = {
+    "Euler": "#efb02e",
+    "leapfrog": "#25a985",
+    "Heun": "#c75a22",
+    "Runge-Kutta": "#175ca6",
+    "PEFRL": "#74194f",
+    "Dormand-Prince": "#10123a",
+}
+COLOURS = tuple(FAMILIES.values())
+#: What is not the finding.
+PALE = "#b8b8b8"
 PEERS = "1234+|"
 #: The line shows the order: the higher, the more solid.
 LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
@@ -46,12 +42,19 @@ def look(method: Method) -> dict[str, Any]:
     """Keywords for a line of that method."""
     i = [m.name for m in every_method()].index(method.name)
     return {
-        "color": COLOURS[i % len(COLOURS)],
+        "color": FAMILIES[family(method)],
         "marker": MARKERS[i % len(MARKERS)],
         "linestyle": LINES.get(method.order, "-"),
         "linewidth": 1.6,
         "markersize": 7.5,
     }
+
+
+def family(method: Method) -> str:
+    """Which of ``FAMILIES`` a method belongs to; one of which nothing else is known is a Runge-Kutta method."""
+    known = {"verlet": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
+    last = method.name.rsplit("_", 1)[-1]
+    return {"euler": "Euler", "heun": "Heun", "leapfrog": "leapfrog"}.get(last, known.get(method.name, "Runge-Kutta"))
 
 
 def named(method: Method) -> str:

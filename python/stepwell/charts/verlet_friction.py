@@ -122,6 +122,11 @@ def verlet_friction(dt: Any = 1 / 60) -> VerletFriction:
 
     Raises:
         ArgumentError: what is wrong with ``dt``.
+
+    Example:
+        >>> chart = sw.charts.verlet_friction()
+        >>> type(chart).__name__
+        'VerletFriction'
     """
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     if not 40.0 / MAX_STEPS <= dt <= 0.1:

@@ -13,6 +13,7 @@ from ..errors import ArgumentError, UnsupportedError
 from ..methods import Method, choice
 from ..scenes import Scene
 from ..scenes import scene as find_scene
+from ..systems import NBody
 from . import measure
 from .data import Curve, WorkPrecision
 from .known import chartable
@@ -28,7 +29,7 @@ EXTRA_RUNGS = 2
 #: The most steps of a run of the ladder; more would take minutes.
 MAX_STEPS = 2_000_000
 
-#: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
+#: For blocks of more numbers than this it is divided by the ratio; for bodies by its square, as the number of their pairs grows.
 SMALL_BLOCK = 16
 
 #: Steps of the ladder per factor of ten.
@@ -73,6 +74,11 @@ def work_precision(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if a peer is not installed.
+
+    Example:
+        >>> chart = sw.charts.work_precision("oscillator", ["leapfrog", "rk4"], [500, 1000, 2000], tolerances=[])
+        >>> [curve.method.name for curve in chart.curves]
+        ['leapfrog', 'rk4']
     """
     whole, chosen = find_scene(scene), choice(methods)
     numbers = None
@@ -128,7 +134,8 @@ def work_precision(
 
 def _ladder(scene: Scene) -> list[int]:
     """Numbers of steps, evenly spread on a logarithmic scale."""
-    most = MAX_STEPS * min(1.0, SMALL_BLOCK / max(1, scene.y.size)) ** 2
+    share = min(1.0, SMALL_BLOCK / max(1, scene.y.size))
+    most = MAX_STEPS * (share**2 if isinstance(scene.system, NBody) else share)
     few, many = scene.horizon / (LARGEST * scene.dt), min(most, scene.horizon / (SMALLEST * scene.dt))
     few = max(4.0, few)
     gaps = round(RUNGS_PER_DECADE * np.log10(many / few))

@@ -175,6 +175,11 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
 
     Raises:
         ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> chart = sw.charts.stability(["rk4"])
+        >>> round(chart.summary()[0]["limit"], 4)
+        2.8284
     """
     chosen = choice(methods)
     angles = None if phi is None else _checks.numbers("phi", phi, positive=True, unit="rad")

@@ -16,7 +16,8 @@ from ..errors import StepwellError
 
 #: The commands, in the order of the help.
 COMMANDS = (
-    *("scenes", "methods", "run", "chart", "control", "criteria", "stability", "advise", "explain", "export", "figures", "paper"),
+    *("scenes", "methods", "run", "explore", "advise", "bench", "chart", "control", "criteria", "stability", "explain", "export"),
+    *("figures", "paper"),
 )
 
 #: Exit codes: what was asked for cannot be done; Ctrl-C, by the custom of shells.
@@ -31,9 +32,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         0, 2 after an error, 130 after Ctrl-C.
+
+    Without a word it lists the commands.
     """
-    args = _parser().parse_args(argv)
+    parser = _parser()
+    words = sys.argv[1:] if argv is None else list(argv)
     try:
+        if not words:
+            parser.print_help()
+            return 0
+        args = parser.parse_args(words)
         args.command(args)
         sys.stdout.flush()
     except BrokenPipeError:
@@ -49,16 +57,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
+    modules = {name: importlib.import_module(f"{__name__}.{name}") for name in COMMANDS}
+    texts = {name: (module.__doc__ or "").strip() for name, module in modules.items()}
+    widest = max(map(len, COMMANDS))
+    listed = "\n".join(f"  {name:{widest}}  {text.splitlines()[0].removesuffix('.')}" for name, text in texts.items())
     parser = argparse.ArgumentParser(
         prog="stepwell",
-        description="Simple integration algorithms: the cost of each method, its error, and where it becomes unstable.",
+        usage="stepwell [--version] COMMAND …",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Simple integration algorithms: what each method costs, how wrong\nit is and where it becomes unstable.",
+        epilog=f"commands:\n{listed}\n\nstepwell COMMAND --help says what a command takes.",
     )
     parser.add_argument("--version", action="version", version=f"stepwell {__version__}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for name in COMMANDS:
-        module = importlib.import_module(f"{__name__}.{name}")
-        text = (module.__doc__ or "").strip()
-        sub = commands.add_parser(name, help=text.splitlines()[0], description=text)
+    commands = parser.add_subparsers(prog="stepwell", required=True, metavar="COMMAND", help=argparse.SUPPRESS)
+    for name, module in modules.items():
+        sub = commands.add_parser(name, description=texts[name])
         module.arguments(sub)
         sub.set_defaults(command=module.command)
     return parser

@@ -1,4 +1,7 @@
-"""Advise on a scene: the cheapest method and step that are good enough, and how far they are from blowing up."""
+"""Advise on a scene: the cheapest method and step.
+
+That is, of those that are accurate enough; and how far they are from blowing up.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +45,6 @@ def command(args: argparse.Namespace) -> None:
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
     if args.output is not None:
         _checks.file("-o", args.output, (".json",))
-    if not args.json:
-        show.need_rich()
 
     found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed)
     written = show.Written()
@@ -55,7 +56,7 @@ def command(args: argparse.Namespace) -> None:
     elif found.ranked:
         show.table(found.title, COLUMNS, found.table(), [*found.summary(), "", *rejected, *written.notes()])
     else:
-        print("\n".join([found.title, *found.summary(), "", *rejected, *written.notes()]))
+        show.paragraphs([found.title, *found.summary(), "", *rejected, *written.notes()])
     written.close()
 
 

@@ -1,4 +1,7 @@
-"""Chart error against cost: a picture and a table of numbers for each scene, or one for all, and a summary."""
+"""Chart the error of methods against their cost.
+
+A picture and a table of numbers for each scene, or one for all, and a summary.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +43,6 @@ def command(args: argparse.Namespace) -> None:
     # All names and requirements are checked before any work.
     chosen = [scene(name) for name in args.scenes]
     methods = None if args.methods is None else [method(name.strip()) for name in args.methods.split(",")]
-    if not args.json:
-        show.need_rich()
     names = ["panel"] if args.panel else [one.name for one in chosen]
     _checks.folder("-o", args.output, [name + ending for name in names for ending in (".png", ".csv", ".json")])
     new_figure(1.0, 1.0)  # raises if there can be no picture

@@ -1,4 +1,7 @@
-"""Chart what a control does to what it keeps and to the motion, over its gain: of the energy of bodies, or of rods' lengths."""
+"""Chart what a control does, over its gain.
+
+To what it keeps and to the motion: the energy of bodies, or the lengths of rods.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +42,6 @@ def command(args: argparse.Namespace) -> None:
         given["relative"] = _numbers("--gains", args.gains, float)
     if args.evaluations is not None:
         given["evaluations"] = _numbers("--evaluations", args.evaluations, int)
-    if not args.json:
-        show.need_rich()
     name = f"{one.name}-control"
     _checks.folder("-o", args.output, [name + ending for ending in (".png", ".csv")])
     new_figure(1.0, 1.0)  # raises if there can be no picture

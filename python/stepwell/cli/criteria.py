@@ -1,4 +1,7 @@
-"""Answer the document's four criteria (§1) for methods: stability, frequency, operations and the largest step."""
+"""Answer the document's four criteria for methods.
+
+§1: stability, frequency, operations and the largest step.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +39,6 @@ def command(args: argparse.Namespace) -> None:
         raise ArgumentError("--markdown: expected either this or --json, got both")
     if args.output is not None:
         _checks.file("-o", args.output, (".json", ".md"))
-    if not (args.json or args.markdown):
-        show.need_rich()
 
     found = criteria(methods, phi=phi)
     written = show.Written()
@@ -63,5 +64,7 @@ def _tables(found: Criteria, notes: list[str]) -> None:
         ("Errors of the undamped oscillator at some Φ", range(series, costs), []),
         ("Operations of a step", range(costs, len(head)), notes),
     )
-    for title, columns, below in parts:
+    for number, (title, columns, below) in enumerate(parts):
+        if number:
+            print()
         show.table(title, [head[i] for i in (0, *columns)], [[row[i] for i in (0, *columns)] for row in rows], below)

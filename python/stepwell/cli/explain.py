@@ -1,4 +1,7 @@
-"""Explain a step: every operation by name, how often it is computed, and its machine code."""
+"""Explain a step: every operation, by name.
+
+With how often each is computed, and its machine code.
+"""
 
 from __future__ import annotations
 

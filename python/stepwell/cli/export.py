@@ -1,4 +1,7 @@
-"""Write a step as source code of C, JavaScript, Python or Rust, for use in an engine."""
+"""Write a step as C, JavaScript, Python or Rust.
+
+For use in an engine.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Draw the document's figures: the samples of each method on the undamped oscillator (§5 to §11), the harmonic cases of §4."""
+"""Draw the document's figures.
+
+The samples of each method on the undamped oscillator (§5 to §11), and the harmonic cases of §4.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,6 @@ def command(args: argparse.Namespace) -> None:
     methods = [method(name) for name in args.methods] or None
     _checks.folder("-o", args.output)
     new_figure(1.0, 1.0)  # raises if there can be no picture
-    if not args.json:
-        show.need_rich()
 
     chart = figures(methods, phi=args.phi, periods=args.periods)
     written = show.Written()

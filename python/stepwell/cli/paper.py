@@ -1,4 +1,7 @@
-"""Run the document (Hoffmann 2002) section by section: every statement, what it finds here, and every figure."""
+"""Run the document (Hoffmann 2002), section by section.
+
+Every statement, what it finds here, and every figure.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,6 @@ def command(args: argparse.Namespace) -> None:
     if args.output is not None:
         _checks.folder("-o", args.output)
         new_figure(1.0, 1.0)  # raises if there can be no picture
-    if not args.json:
-        show.need_rich()
 
     found = [entry.run() for entry in chosen]
     written = show.Written()

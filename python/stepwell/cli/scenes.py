@@ -1,4 +1,7 @@
-"""List the scenes: a system, its start, a step and the exact solution."""
+"""List the scenes.
+
+A scene is a system with its start, a step and, where there is one, the exact solution.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +13,24 @@ from . import show
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
+    show.output_option(parser)
     show.json_option(parser)
 
 
 def command(args: argparse.Namespace) -> None:
     """List the scenes."""
-    if args.json:
-        fields = ("name", "title", "section", "description", "error", "dt", "horizon")
-        show.print_json(
-            [
-                {field: getattr(scene, field) for field in fields}
-                | {"system": repr(scene.system), "exact": scene.exact is not None}
-                for scene in scenes()
-            ]
-        )
-        return
-    show.table(
+    fields = ("name", "title", "section", "description", "error", "dt", "horizon")
+    listed = scenes()
+    show.listing(
+        args,
         "Scenes",
         ("scene", "section", "dt>", "horizon>", "exact", "what it is"),
         [
             (s.name, s.section, f"{s.dt:.4g}", f"{s.horizon:.4g}", "no" if s.exact is None else "yes", s.description)
-            for s in scenes()
+            for s in listed
+        ],
+        [
+            {field: getattr(scene, field) for field in fields} | {"system": repr(scene.system), "exact": scene.exact is not None}
+            for scene in listed
         ],
     )

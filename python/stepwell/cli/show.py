@@ -1,4 +1,4 @@
-"""What the commands print: tables by rich, or JSON, which needs nothing."""
+"""What the commands print and write: tables, or JSON for programs."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import argparse
 import json
 import os
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+from .. import _checks
 from ..charts.data import finite
-from ..errors import UnsupportedError
-
-#: Width of a table that goes into a file or a pipe, where there is no terminal to ask.
-WIDTH = 120
+from ..charts.files import write_csv, write_json
+from .table import lines_of, width_of_terminal
 
 
 def json_option(parser: argparse.ArgumentParser) -> None:
@@ -28,31 +28,69 @@ def print_json(value: Any) -> None:
     print(json.dumps(finite(value), ensure_ascii=False, indent=1))
 
 
-def need_rich() -> None:
-    """Raise if a table cannot be printed, before any work is done."""
-    try:
-        import rich  # noqa: F401
-    except ImportError:
-        raise UnsupportedError("a table needs rich; pip install 'stepwell[chart]', or ask for --json") from None
+#: The files into which the table of a list is written.
+TABLE_FILES = (".csv", ".json", ".md")
+
+
+def output_option(parser: argparse.ArgumentParser) -> None:
+    """Let a command that lists something write the list."""
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"write the table: {', '.join(TABLE_FILES)}")
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Sequence[str] = ()) -> None:
     """Print a table; columns whose name ends in ``>`` are flush right."""
-    need_rich()
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+    bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+    print("\n".join(lines_of(title, columns, rows, notes, width=width_of_terminal(), bold=bold)))
 
-    piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    console = Console(width=WIDTH if piped else None, highlight=False)
-    printed = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in columns:
-        printed.add_column(column.removesuffix(">"), justify="right" if column.endswith(">") else "left")
-    for row in rows:
-        printed.add_row(*row)
-    console.print(printed)
-    for note in notes:
-        console.print(note, style="dim", markup=False)
+
+def paragraphs(lines: Iterable[str]) -> None:
+    """Print sentences, which a terminal's width wraps between words."""
+    width = width_of_terminal()
+    for line in lines:
+        print("\n".join(textwrap.wrap(line, width, break_long_words=False, break_on_hyphens=False)) if line else "")
+
+
+def listing(
+    args: argparse.Namespace,
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    data: list[dict[str, Any]],
+    notes: Sequence[str] = (),
+) -> None:
+    """Print a list as a table or as JSON, and write it if a file is asked for; ``data`` has all of it for programs."""
+    check_output(args)
+    written = Written()
+    if args.output is not None:
+        written.write(args.output, lambda path: _write(path, columns, rows, data))
+    if args.json:
+        print_json(data)
+    else:
+        table(title, columns, rows, [*notes, *written.notes()])
+    written.close()
+
+
+def check_output(args: argparse.Namespace) -> None:
+    """Raise if the list cannot be written, before any work is done."""
+    if args.output is not None:
+        _checks.file("-o", args.output, TABLE_FILES)
+
+
+def _write(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]], data: list[dict[str, Any]]) -> None:
+    if path.suffix == ".json":
+        write_json(data, path)
+    elif path.suffix == ".csv":
+        write_csv({name: [_cell(row[name]) for row in data] for name in data[0]}, path)
+    else:
+        names = [name.removesuffix(">") for name in columns]
+        sides = ["--:" if name.endswith(">") else "---" for name in columns]
+        cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+        path.write_text("".join(f"| {' | '.join(line)} |\n" for line in [names, sides, *cells]), encoding="utf-8")
+
+
+def _cell(value: Any) -> Any:
+    """A value in a file of commas: the parts of a list with semicolons between them."""
+    return "; ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
 
 
 class Written:
@@ -84,7 +122,6 @@ class Written:
 
 def progress(title: str) -> AbstractContextManager[Callable[[float], object]]:
     """A progress bar; gives the function that takes the share that is done."""
-    need_rich()
     from .._progress import bar
 
     return bar(title)

@@ -1,4 +1,7 @@
-"""Chart the stability of methods: the eigenvalues of a step, how much it grows or damps, and where it is stable."""
+"""Chart where methods are stable.
+
+The eigenvalues of a step, how much it grows or damps, and the largest stable steps.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +40,6 @@ def command(args: argparse.Namespace) -> None:
     if args.charts is not None and args.output is None:
         raise ArgumentError("-o: expected a folder for what --charts asks for")
     top = None if args.phi is None else within("--phi", _checks.number("--phi", args.phi, positive=True, unit="rad"))
-    if not args.json:
-        show.need_rich()
     if args.output is not None:
         _checks.folder("-o", args.output, ["stability.csv", *(f"stability-{kind}.png" for kind in kinds)])
         new_figure(1.0, 1.0)  # raises if there can be no picture

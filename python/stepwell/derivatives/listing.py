@@ -7,8 +7,8 @@ from typing import Any
 
 from .._core import Symbol, Tape
 from ..errors import UnsupportedError
-from ..reference.fused import Operation
 from ..reference.marks import Mark, Marks
+from ..reference.tape import Operation
 from .rules import MIN_ROUNDING_CONSTANT, NO_RULE, no_derivative, number
 
 #: How to write each operation again. Equal operations are on a tape only once, so the result is the symbol that was there.

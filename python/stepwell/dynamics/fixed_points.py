@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import MAX_LINE, brief, shortened, table
 from .._checks import Array
 from .._value import Value
 from ..errors import ArgumentError, ShapeError
@@ -85,7 +86,7 @@ class Equilibrium(Value):
 
     def __repr__(self) -> str:
         step = "" if self.analysis is None else f", step: {self.analysis.kind}"
-        return f"<equilibrium at v = {self.v.tolist()}, y = {self.y.tolist()}: {self.kind}{step}>"
+        return f"<equilibrium at v = {brief(self.v)}, y = {brief(self.y)}: {self.kind}{step}>"
 
 
 class Equilibria(Value):
@@ -112,8 +113,20 @@ class Equilibria(Value):
         return iter(self.found)
 
     def __repr__(self) -> str:
-        lines = [f"<{len(self.found)} equilibria of {self.system!r}, {len(self.lost)} start(s) led nowhere>"]
-        return "\n  ".join(lines + [repr(each) for each in self.found])
+        kinds = ", ".join(each.kind for each in self.found)
+        lost = f"; {len(self.lost)} start{'s' * (len(self.lost) != 1)} led nowhere" if self.lost else ""
+        what = "equilibrium" if len(self.found) == 1 else "equilibria"
+        return shortened(f"<{len(self.found)} {what} of {self.system!r}{': ' * bool(kinds)}{kinds}{lost}>", MAX_LINE)
+
+    def __str__(self) -> str:
+        return "\n  ".join([repr(self), *map(repr, self.found)])
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        rows = [
+            (brief(each.v), brief(each.y), each.kind, "" if each.analysis is None else each.analysis.kind) for each in self.found
+        ]
+        return table(repr(self)[1:-1], ("v", "y", "kind", "step"), rows)
 
 
 def equilibria(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _checks, _core, engine
 from ..control import AnyControl, a_control
@@ -24,6 +24,9 @@ from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of, written
 from .result import Explanation, MachineCode
 
+if TYPE_CHECKING:
+    from .._words import StepForm
+
 __all__ = ["Explanation", "Line", "MachineCode", "Section", "explain"]
 
 
@@ -35,7 +38,7 @@ def explain(
     control: AnyControl | None = None,
     fused: bool = False,
     attempt: bool = False,
-    form: str = "direct",
+    form: StepForm = "direct",
     start: str | None = None,
     record: str | Sequence[str] | None = (),
 ) -> Explanation:
@@ -44,15 +47,6 @@ def explain(
     ``print`` the result for a listing: each value with its formula, grouped by how often it is computed; the numbers of
     operations; the machine code, or why the step is interpreted. In a notebook it is a table. The values of parameters and the
     length of the step do not matter, only which parameters all members share: those are used once a run instead of once a member.
-
-    ::
-
-        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
-        once a run
-          Φ = h·omega
-        in each step
-          v' = v − Φ·y
-          y' = y + Φ·v'
 
     Args:
         system: the system to step. Arguments that are arrays over its batch differ from member to member.
@@ -75,6 +69,14 @@ def explain(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> print(sw.explain(sw.Oscillator(), "false_euler").listing)
+        once a run
+          Φ = h·omega
+        in each step
+          v' = v − Φ·y
+          y' = y + Φ·v'
     """
     how, system = find_method(method), a_system(system).sized()
     fits_together(system, how)
@@ -150,7 +152,9 @@ def _why(word: str) -> str:
     if word == "level":
         better = _core.isa_levels()[1:]
         asked = "STEPWELL_KERNELS or STEPWELL_ISA asks for it"
-        return asked if better else "there is no machine code for this CPU, which has neither AVX2 nor AVX-512"
+        return (
+            asked if better else "there is no machine code for this CPU, which has neither AVX2 nor AVX-512, nor NEON under Linux"
+        )
     if word == "pages":
         return "this system does not let a program execute code that it has written"
     return "there is no machine code for this step"

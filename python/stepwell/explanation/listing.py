@@ -19,8 +19,9 @@ import numpy as np
 from .. import _core
 from .._checks import Shape
 from ..engine import Plan
-from ..reference import adaptive
+from ..reference import adaptive, increments
 from ..reference.signal import Constant, Held, Sine
+from ..reference.tape import Operation, in_order, needed
 from ..reference.traced import Tracer
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
 
@@ -84,6 +85,7 @@ class Named(Tracer):
     def __init__(self, system: Any, tape: Any) -> None:
         super().__init__(system, tape)
         self.names: dict[int, str] = {}
+        self.called: list[tuple[Any, str]] = []
         self._taken: set[str] = set()
         self._length: Any = None
 
@@ -119,6 +121,7 @@ class Named(Tracer):
             if isinstance(block[index], _core.Symbol):
                 called = indexed(name, index)
                 self.names.setdefault(block[index].id, called)
+                self.called.append((block[index], called))
                 self.names.setdefault((-block[index]).id, f"−{called}")
         self._taken.add(name)
 
@@ -249,6 +252,30 @@ def _leaf(tape: Any, name: str, given: int) -> Any:
             return tape.time()
 
 
+def increments_last(tracer: Named, roots: Sequence[Any]) -> tuple[Any, dict[int, str], dict[int, str]]:
+    """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
+    listed, places = tracer.tape.operations([*roots, *(symbol for symbol, _ in tracer.called)])
+    lines = [Operation(name, tuple(of), given) for name, of, given in listed]
+    order = in_order(lines, places[: len(roots)])
+    kept, moved = needed(lines, places[: len(roots)])
+    work = increments.Rewriting(kept, moved)
+    work.run()
+    tape = _core.Tape()
+    symbols: list[Any] = []
+    for name, of, given in work.made:
+        bits = [work.made[each].given if work.made[each].name == "constant" else None for each in of]
+        symbols.append(again(tape, name, [symbols[each] for each in of], given, bits))
+    names: dict[int, str] = {}
+    left: dict[int, str] = {}
+    for (_, name), place in zip(tracer.called, places[len(roots) :], strict=True):
+        value = work.values[order[place]] if place in order else None
+        if isinstance(value, increments.Increment):
+            left.setdefault(symbols[value.x].id, f"{name} but for its factor")
+        elif value is not None:
+            names.setdefault(symbols[value].id, name)
+    return tape, names, left
+
+
 # ---- lines
 
 
@@ -274,8 +301,16 @@ class _Value(NamedTuple):
 class Writer:
     """Writes sections, one after the other, and knows what values are called."""
 
-    def __init__(self, tape: Any, names: dict[int, str], notation: Notation | None = None, *, tables: Sequence[str] = ()) -> None:
-        self.tape, self.names, self.tables = tape, names, tables
+    def __init__(
+        self,
+        tape: Any,
+        names: dict[int, str],
+        notation: Notation | None = None,
+        *,
+        tables: Sequence[str] = (),
+        notes: Mapping[int, str] = MappingProxyType({}),
+    ) -> None:
+        self.tape, self.names, self.tables, self.notes = tape, names, tables, notes
         self.notation = Notation() if notation is None else notation
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
@@ -305,7 +340,8 @@ class Writer:
             if known and not known.startswith("−") and known not in self._used:
                 return known, ""
             self._numbers[letter] += 1
-            return f"{letter}{self._numbers[letter]}", known if known.startswith("−") else ""
+            note = known if known.startswith("−") else "" if value.symbol is None else self.notes.get(value.symbol.id, "")
+            return f"{letter}{self._numbers[letter]}", note
 
         def write(place: int) -> None:
             value = values[place]
@@ -383,13 +419,16 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
     """The sections of a step that is one tape, cut as the core did."""
     tape = _core.Tape()
     tracer = Named(plan.system, tape)
-    _traced(tracer, plan, attempts)
+    roots = _traced(tracer, plan, attempts)
+    names, notes = tracer.names, dict[int, str]()
+    if plan.fused:
+        tape, names, notes = increments_last(tracer, roots)
     numbers, tables = parameters(plan)
     of_state, next_state = states(plan, attempts), states(plan, attempts, "'")
     params = [tape.param(i) for i in range(len(numbers))]
     for each, symbol in zip(numbers, params, strict=True):
         if each == "omega":
-            tracer.names[(tape.step() * symbol).id] = "Φ"
+            names[(tape.step() * symbol).id] = "Φ"
 
     def parameter(i: int, rank: int) -> Leaf:
         if i >= len(numbers):
@@ -410,7 +449,7 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
     def in_step(name: str, i: int) -> Leaf:
         return given(i) if name == "uniform" else Leaf(Formula("t"), tape.time(), 3)
 
-    writer = Writer(tape, tracer.names)
+    writer = Writer(tape, names, notes=notes)
     run, uniforms = writer.section("run", split["run"], before, 1, "c")
     member, rows = writer.section("member", split["member"], before, 2, "c")
     step, entries = writer.section("step", split["step"], in_step, 3, "s")

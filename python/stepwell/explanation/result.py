@@ -36,7 +36,7 @@ PARTS = {
 
 
 @dataclass(frozen=True)
-class MachineCode:
+class MachineCode(Value):
     """The machine code of a step.
 
     Attributes:
@@ -89,6 +89,17 @@ class Explanation(Value):
         beside: what is made beside the steps, ``when``: of a method that carries something, ``"start"``, which makes that from v
             at the start of a run, and ``"finish"``, which makes v from it where a state is kept; and what was asked for by
             ``record=``, such as ``"record energy"``. A sampled input is written as a function, a(t).
+
+    Example:
+        >>> step = sw.explain(sw.Oscillator(), "false_euler")
+        >>> print(step.listing)
+        once a run
+          Φ = h·omega
+        in each step
+          v' = v − Φ·y
+          y' = y + Φ·v'
+        >>> step.computed["additions"], step.computed["multiplications"]
+        (2, 2)
     """
 
     system: System

@@ -7,7 +7,7 @@ of which there is a file each; ``result`` holds the text.
 from __future__ import annotations
 
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from .rust import Rust
 from .tapes import Traced
 from .written import MEMBERS, Written
 
+if TYPE_CHECKING:
+    from .._words import LanguageName
+
 __all__ = ["ExportedStep", "export"]
 
 LANGUAGES: dict[str, type[Language]] = {"c": C, "javascript": JavaScript, "python": Python, "rust": Rust}
@@ -39,7 +42,7 @@ LANGUAGES: dict[str, type[Language]] = {"c": C, "javascript": JavaScript, "pytho
 def export(
     system: System,
     method: str | Method,
-    language: str,
+    language: LanguageName,
     *,
     dt: float = 0.01,
     t0: float = 0.0,
@@ -56,10 +59,6 @@ def export(
     The file has a structure of the parameters, which may be changed there, a structure of the state, and functions: preparation
     from the parameters, the state at the start, one step. Compiled and run it gives the numbers of ``integrate``,
     to the last bit.
-
-    ::
-
-        >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c")
 
     Args:
         system: what to step, one trajectory.
@@ -83,6 +82,10 @@ def export(
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system, if the language has no fused multiply-add, or if the step has
             too many operations to be written out one by one.
+
+    Example:
+        >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c").name
+        'step.c'
     """
     how = find_method(method)
     system = a_system(system)

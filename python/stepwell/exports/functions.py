@@ -9,7 +9,7 @@ from typing import Any
 from .. import _core
 from ..explanation.listing import Body
 from ..reference import log, trig
-from ..reference.fused import COMMUTE
+from ..reference.tape import COMMUTE
 
 #: Their names in a file.
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {"sine": trig.sin, "cosine": trig.cos, "logarithm": log.log}

@@ -28,6 +28,13 @@ class ExportedStep(Value):
         member: which trajectory of the system's batch.
         fused: whether it uses fused multiply-adds.
         operations: how many operations are written out, including those before the steps.
+
+    Example:
+        >>> step = sw.export(sw.Oscillator(), "false_euler", "c")
+        >>> step
+        <oscillator_false_euler in C: False Euler, Oscillator(omega=1.0, form='canonical'), 5 operations>
+        >>> "double" in step.source
+        True
     """
 
     source: str

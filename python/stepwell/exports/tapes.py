@@ -11,7 +11,7 @@ import numpy as np
 from .. import _checks, _core, engine
 from .._checks import Shape
 from ..errors import UnsupportedError
-from ..explanation.listing import Body, Named, indexed, parameters
+from ..explanation.listing import Body, Named, increments_last, indexed, parameters
 from ..reference.signal import Held
 from ..systems.base import aligned
 from .functions import named
@@ -171,6 +171,9 @@ class Traced:
             tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
         )
         told, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
+        names = tracer.names
+        if plan.fused:
+            tape, names, _ = increments_last(tracer, symbols)
         slot = method.carry or "v"
         before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]
         inputs = elements(before, v_shape) + elements("y", plan.system.y_shape)
@@ -179,7 +182,7 @@ class Traced:
             results += elements("y'", plan.system.y_shape)
             if plan.system.control is not None:
                 inputs, results = [*inputs, TALLY], [*results, f"{TALLY}'"]
-        return Part(tape, tracer.names, self.operations.add(told, roots), inputs, results), tracer
+        return Part(tape, names, self.operations.add(told, roots), inputs, results), tracer
 
 
 #: The sum that a control or a projection accumulates.

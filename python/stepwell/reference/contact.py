@@ -70,12 +70,21 @@ class Place(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What contact makes of a point: the velocity along the normal, the distance, whether it rests, and at which distance."""
+    """What contact makes of a point.
+
+    Attributes:
+        speed: the velocity along the normal.
+        distance: from the surface.
+        rests: whether it rests; None if the way knows no rest.
+        low: at which distance it rests.
+        since: the time from the impact to the end of the step.
+    """
 
     speed: Any
     distance: Any
     rests: Any | None
     low: Any
+    since: Any
 
 
 class Surface(ABC):
@@ -98,6 +107,10 @@ class Surface(ABC):
     def push(self, y: Vector) -> Vector:
         """What a one-sided spring takes from an increment of v."""
 
+    @abstractmethod
+    def depth_of(self, y: Vector) -> Any:
+        """The distance of a point from the surface itself."""
+
     def back(self, y: Vector, distance: Any) -> Vector:
         """A point on the touching plane, put at that distance from the surface itself."""
         return y
@@ -111,7 +124,7 @@ class Surface(ABC):
         else:
             leaving = -speed if self.restitution is None else -(self.restitution * speed)
             touches = bits.less(place.distance, 0.0) & bits.less(speed, 0.0)
-            change = Change(leaving, place.distance, None, None)
+            change = Change(leaving, place.distance, None, None, None)
         turn, lift = change.speed - speed, change.distance - place.distance
         if self.friction is None:
             new_v = [v + turn * n for v, n in zip(v, normal, strict=True)]
@@ -149,7 +162,7 @@ class Surface(ABC):
         low = bits.where(bits.less(place.before + place.slack, 0.0) | bits.less(push, 0.0), place.before, 0.0)
         height = since * (leaving - (0.5 * pull) * since)
         rising = (leaving - pull * since) - ahead
-        return touches, Change(bits.where(rests, 0.0, rising), bits.where(rests, low, height), rests, low)
+        return touches, Change(bits.where(rests, 0.0, rising), bits.where(rests, low, height), rests, low, since)
 
     def rub(self, step: Step, v: Vector, y: Vector, along: Any, normal: Vector, change: Change) -> tuple[Vector, Vector]:
         """Coulomb's friction: the tangential velocity loses μ times what the normal one gains.
@@ -189,6 +202,10 @@ class Plane(Surface):
         slack = ROUNDING * (magnitudes(y, self.normal) + bits.and_bits(self.offset, MAGNITUDE))
         before = dot(y0, self.normal) - self.offset
         return Place(bits.at_most(distance, slack), self.normal, distance, before, slack)
+
+    def depth_of(self, y: Vector) -> Any:
+        """Along the normal."""
+        return dot(y, self.normal) - self.offset
 
     def push(self, y: Vector) -> Vector:
         """As deep as the point is behind the plane."""
@@ -243,6 +260,11 @@ class Sphere(Surface):
         near = hits | bits.at_most(self.depth(np.sqrt(dot(from1, from1))), slack)
         return Place(near, normal, distance, self.depth(np.sqrt(square)), slack)
 
+    def depth_of(self, y: Vector) -> Any:
+        """Along the radius."""
+        way = [y - c for y, c in zip(y, self.centre, strict=True)]
+        return self.depth(np.sqrt(dot(way, way)))
+
     def push(self, y: Vector) -> Vector:
         """As deep as the point is behind the sphere, along the radius."""
         way = [y - c for y, c in zip(y, self.centre, strict=True)]
@@ -285,6 +307,12 @@ class Touching:
         safe = [each for each in self.met if each.way == "safe"]
         #: Along one plane the energy is right by itself.
         self.is_limited = len(safe) > 1 or any(each.is_curved or each.friction is not None for each in safe)
+        self.on_rods: Any = None
+        if hasattr(s, "as_rods"):
+            from .rod_contact import RodContacts  # which builds on this
+
+            rods, axes = s.as_rods()
+            self.on_rods = RodContacts(h, rods, axes, self.met)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.s, name)
@@ -306,8 +334,10 @@ class Touching:
     def resolve(self, before: Any, after: Any) -> tuple[Any, Any, Any]:
         """Which of the points that surfaces act on met one in a step, and the state of all after that.
 
-        From the states before and after the step.
+        From the states before and after the step. Of points on rods the first is None: only methods without a carry step them.
         """
+        if self.on_rods is not None:
+            return None, *self.on_rods.resolve(before, after)
         dim, h = before[1].shape[1], self.h
         v0, y0, v1, y1 = ([block[self.free, c] for c in range(dim)] for block in (*before, *after))
         kick = [b - a for a, b in zip(v0, v1, strict=True)]

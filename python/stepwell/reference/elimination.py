@@ -30,16 +30,21 @@ def factored(rows: list[list[Any]]) -> Factors:
 
 
 def solved(factors: Factors, right: list[Any]) -> list[Any]:
-    """The unknowns, from the right-hand sides."""
+    """The unknowns, from the right-hand sides. None is 0 whatever the state is, on either side."""
     below, pivots = factors
     x = list(right)
+
+    def less(from_: int, factor: Any, known: int) -> None:
+        if factor is not None and x[known] is not None:
+            term = factor * x[known]
+            x[from_] = -term if x[from_] is None else x[from_] - term
+
     for i, row in enumerate(below):
         for j, factor in enumerate(row):
-            if factor is not None:
-                x[i] = x[i] - factor * x[j]
+            less(i, factor, j)
     for j in reversed(range(len(x))):
-        x[j] = x[j] / pivots[j]
+        if x[j] is not None:
+            x[j] = x[j] / pivots[j]
         for i in range(j + 1, len(x)):
-            if below[i][j] is not None:
-                x[j] = x[j] - below[i][j] * x[i]
+            less(j, below[i][j], i)
     return x

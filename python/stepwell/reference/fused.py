@@ -6,74 +6,30 @@ fused tape operation by operation, and has a fused multiply-add of its own, sinc
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from .increments import increments_last
+from .tape import Operation, of_any, ranks
 from .types import Array
-
-
-class Operation(NamedTuple):
-    """A line of a tape.
-
-    Attributes:
-        name: what is done.
-        of: the numbers of the lines whose values it takes.
-        given: what else it needs: the number of a state or a parameter, the bits of a constant, places to shift by.
-    """
-
-    name: str
-    of: tuple[int, ...]
-    given: int
-
 
 # ---- where
 
 
-#: Operations whose two operands may change places.
-COMMUTE = {"add", "multiply", "equal", "and", "or", "exclusive or", "add bits"}
+def fused(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
+    """The same tape with fused multiply-adds, and the lines of the roots on it.
 
-
-def ranks(tape: Sequence[Operation]) -> list[int]:
-    """A number for each line, which says nothing of the order in which the tape was written.
-
-    Values of fewer operations one after the other come before those of more; equally deep ones are sorted by the name of the
-    operation, by what it is given, and by the ranks of its operands, the lower one first where they may change places.
-    """
-    depths: list[int] = []
-    levels: list[list[int]] = []
-    for line, operation in enumerate(tape):
-        depths.append(max((depths[each] + 1 for each in operation.of), default=0))
-        if depths[line] == len(levels):
-            levels.append([])
-        levels[depths[line]].append(line)
-    rank, next_rank = [0] * len(tape), 0
-
-    def key(line: int) -> tuple[str, int, list[int]]:
-        name, of, given = tape[line]
-        operands = [rank[each] for each in of]
-        return name, given, sorted(operands) if name in COMMUTE else operands
-
-    for level in levels:
-        for line in sorted(level, key=key):
-            rank[line] = next_rank
-            next_rank += 1
-    return rank
-
-
-def fused(tape: Sequence[Operation], roots: Sequence[int]) -> list[Operation]:
-    """The same tape with fused multiply-adds; ``roots`` are the lines of the next state, and all others are needed for them.
-
-    A product is fused into the sum or the difference of which it is a term if nothing else reads it and it depends on the state.
+    ``roots`` are the lines of the next state, and all others are needed for them. First increments are multiplied last. Then a
+    product is fused into the sum or the difference of which it is a term if nothing else reads it and it depends on the state.
     Of two such products the one of the higher rank is fused.
     """
+    tape, roots = increments_last(tape, roots)
     rank = ranks(tape)
     reads = [0] * len(tape)
     for line in [*roots, *(line for operation in tape for line in operation.of)]:
         reads[line] += 1
-    of_state: list[bool] = []
-    for operation in tape:
-        of_state.append(operation.name == "state" or any(of_state[line] for line in operation.of))
+    of_state = of_any(tape, "state")
 
     def can(line: int) -> bool:
         return tape[line].name == "multiply" and reads[line] == 1 and of_state[line]
@@ -88,7 +44,7 @@ def fused(tape: Sequence[Operation], roots: Sequence[int]) -> list[Operation]:
                 name = "multiply add" if operation.name == "add" else "multiply subtract" if product == a else "subtract multiply"
                 operation = Operation(name, (*tape[product].of, other), 0)
         out.append(operation)
-    return out
+    return out, roots
 
 
 # ---- a·b + c, rounded once
@@ -213,7 +169,7 @@ class Evaluated:
     def __init__(
         self, tape: Sequence[Operation], roots: Sequence[int], numbers: Mapping[int, Any], tables: Sequence[Any]
     ) -> None:
-        self.tape, self.roots, self.numbers, self.tables = fused(tape, roots), roots, numbers, tables
+        (self.tape, self.roots), self.numbers, self.tables = fused(tape, roots), numbers, tables
 
     @classmethod
     def traced(cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any]) -> "Evaluated":

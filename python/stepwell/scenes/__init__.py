@@ -29,7 +29,12 @@ __all__ = ["Scene", "scene", "scenes"]
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Every scene as it is made without arguments, by name."""
+    """Every scene as it is made without arguments, by name.
+
+    Example:
+        >>> sw.scenes.scenes()[0]
+        <scene aircraft: Aircraft in turns, dt = 0.1, horizon 20>
+    """
     return tuple(make() for make in _makers().values())
 
 
@@ -45,6 +50,10 @@ def scene(name: str | Scene) -> Scene:
         DTypeError: if it is neither a scene nor a name.
         UnknownNameError: if there is none; the message names the nearest.
         ArgumentError: if the file defines none, or several.
+
+    Example:
+        >>> sw.scenes.scene("kepler:e=0.5")
+        <scene kepler: Kepler's ellipse, e = 0.5, dt = 0.01, horizon 18.8496>
     """
     if isinstance(name, Scene):
         return name
@@ -55,6 +64,11 @@ def scene(name: str | Scene) -> Scene:
     name, _, arguments = name.partition(":")
     make = _makers()[_checks.known("scene", name, _makers())]
     return make(**_arguments(name, make, arguments)) if arguments else make()
+
+
+def _arguments_of(name: str) -> tuple[str, ...]:
+    """The arguments that a scene of the package takes, by its name; none if there is no such scene."""
+    return tuple(inspect.signature(_makers()[name]).parameters) if name in _makers() else ()
 
 
 def _arguments(name: str, make: Callable[..., Scene], written: str) -> dict[str, Any]:

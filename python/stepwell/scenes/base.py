@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _checks
+from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
 from ..control import AnyControl, a_control
@@ -20,6 +21,9 @@ from ..methods import Method
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system
+
+if TYPE_CHECKING:
+    from ..explorer import Explorer
 
 #: How many times of the horizon give the exact solution's scale.
 SCALE_SAMPLES = 1001
@@ -60,7 +64,8 @@ class Scene(Value):
 
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
-        >>> sw.advise(scene, frame=None, tolerance=1e-3).best
+        >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")
+        <advice for unnamed: rk4, dt = 0.30303, error 0.00089>
     """
 
     system: System
@@ -136,6 +141,30 @@ class Scene(Value):
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+
+    def explore(self, *, methods: Any = None, show: bool = True) -> Explorer:
+        """Show the scene in the browser: two methods side by side, with sliders for the step and the parameters.
+
+        In a notebook the page is shown in the cell, if this is its last expression; no browser is opened then.
+
+        Args:
+            methods: names of the methods to choose from; all if None.
+            show: whether to open the browser.
+
+        Returns:
+            The page, an ``Explorer``, which can also be saved; see ``stepwell.explore``.
+
+        Raises:
+            ArgumentError: what was given and what was expected.
+            UnsupportedError: if no method steps the scene, or its steps are too long for a page.
+        """
+        from ..explorer.page import explore, in_notebook
+
+        show = _checks.flag("show", show)
+        page = explore(self, methods=methods)
+        if show and not in_notebook():
+            page.open()
+        return page
 
     def steps_for(self, dt: float) -> int:
         """The least number of steps of ``dt`` that reach the horizon.
@@ -245,6 +274,21 @@ class Scene(Value):
 
     def _energy(self, v: Array, y: Array) -> Array:
         return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return facts(
+            f"{self.title} ({self.name})",
+            [
+                ("system", repr(self.system)),
+                ("usual step dt", f"{self.dt:g}"),
+                ("horizon", f"{self.horizon:g}"),
+                ("exact solution", "no" if self.exact is None else "yes"),
+                ("control", None if self.control is None else repr(self.control)),
+                ("section", self.section),
+            ],
+            self.description,
+        )
 
     def __repr__(self) -> str:
         return f"<scene {self.name}: {self.title}, dt = {self.dt:g}, horizon {self.horizon:g}>"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError
@@ -178,6 +179,28 @@ class Analysis(Value):
             product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        title = f"{type(self.system).__name__} by {self.method.title}"
+        if self.P.ndim > 2:
+            stable = np.asarray(self.stable)
+            kinds, counts = np.unique(np.asarray(self.kind), return_counts=True)
+            rows = [(str(kind), str(count)) for kind, count in zip(kinds, counts, strict=True)]
+            return facts(title, [("stable", f"{np.count_nonzero(stable)} of {stable.size}"), *rows])
+        return facts(
+            title,
+            [
+                ("system", repr(self.system)),
+                ("dt", f"{self.dt:g}"),
+                ("kind", self.kind),
+                ("stable", "yes" if self.stable else "no"),
+                ("spectral radius r₁", f"{self.radius:.9g}"),
+                ("angle Ψ of a step", f"{self.angle:.6g} rad"),
+                ("frequency ratio Ψ/Φ", f"{self.frequency_ratio:.6g}"),
+                ("steps a period", f"{self.samples_per_period:.4g}"),
+            ],
+        )
+
     def __repr__(self) -> str:
         head = f"<analysis of {self.system!r} by {self.method.name}: "
         if self.P.ndim > 2:
@@ -212,6 +235,11 @@ def analyse(
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> step = sw.analyse(sw.Oscillator(), "rk4", dt=0.1)
+        >>> bool(step.stable), step.kind
+        (True, 'damped oscillation')
     """
     how = find_method(method)
     at = given_state(at, v, y)

@@ -49,6 +49,10 @@ def operations(method: str | Method, system: System | None = None) -> Operations
     Raises:
         ArgumentError: if the system is a batch.
         UnsupportedError: if the method cannot step the system.
+
+    Example:
+        >>> sw.stability.operations("rk4").rate_evaluations
+        4
     """
     how = find_method(method)
     system = Oscillator() if system is None else a_system(system)

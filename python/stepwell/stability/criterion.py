@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import _checks
+from .._brief import MAX_LINE, shortened, table
 from .._value import by_value
 from ..errors import ArgumentError
 from ..methods import Method, choice
@@ -70,6 +71,10 @@ class Criterion(NamedTuple):
     at: tuple[At, ...]
     operations: Operations
 
+    def __repr__(self) -> str:
+        limit = f"stable for Φ < {float(self.limit):.7g}" if self.limit else "never stable"
+        return f"<criterion of {self.method.name}: {limit}, r₁² − 1 = {self.r1_squared}, Ψ/Φ − 1 = {self.deviation}>"
+
     @property
     def r1_squared(self) -> str:
         """The series of r₁² − 1, as text."""
@@ -85,6 +90,14 @@ class Criteria(tuple[Criterion, ...]):
     """A ``Criterion`` for each method, with ways to write them down."""
 
     __slots__ = ()
+
+    def __repr__(self) -> str:
+        phis = ", ".join(f"{at.phi:g}" for at in self[0].at) if self else ""
+        return shortened(f"<criteria of {', '.join(c.method.name for c in self)}; errors at Φ = {phis}>", MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        return table("The undamped oscillator by each method, Φ = ω₀·dt", *self.table())
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each method. What never holds or is not there is None."""
@@ -150,6 +163,12 @@ def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -
 
     Raises:
         ArgumentError: what was given and what was expected.
+
+    Example:
+        >>> for answer in sw.criteria(["false_euler", "rk4"]):
+        ...     print(answer)
+        <criterion of false_euler: stable for Φ < 2, r₁² − 1 = 0, Ψ/Φ − 1 = Φ²/24 + 3Φ⁴/640>
+        <criterion of rk4: stable for Φ < 2.828427, r₁² − 1 = −Φ⁶/72 + Φ⁸/576, Ψ/Φ − 1 = −Φ⁴/120 + Φ⁶/336>
     """
     chosen = choice(methods)
     angles = np.atleast_1d(_checks.numbers("phi", phi, positive=True, unit="rad"))

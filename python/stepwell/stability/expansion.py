@@ -38,6 +38,9 @@ class Series(NamedTuple):
     q: Polynomial
     ratio: Polynomial
 
+    def __repr__(self) -> str:
+        return f"<series in Φ: r₁² − 1 = {text(self.radius_terms())}, Ψ/Φ − 1 = {text(self.ratio_terms())}>"
+
     def radius_terms(self, most: int = 2) -> list[tuple[int, Fraction]]:
         """The first powers of Φ in r₁² − 1 of a conjugate pair, with their coefficients; none if it is 0."""
         return _terms(self.q - 1, most)
@@ -52,6 +55,10 @@ def series(method: str | Method) -> Series:
 
     Args:
         method: its name, or what ``stepwell.method`` returns.
+
+    Example:
+        >>> sw.stability.series("rk4")
+        <series in Φ: r₁² − 1 = −Φ⁶/72 + Φ⁸/576, Ψ/Φ − 1 = −Φ⁴/120 + Φ⁶/336>
     """
     return _series(find_method(method))
 

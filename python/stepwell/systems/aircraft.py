@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -17,7 +17,10 @@ from .base import System
 from .inputs import Sampled, Sinusoid
 from .own import OwnSystem
 
-FORMS = ("euler", "quaternion")
+if TYPE_CHECKING:
+    from .._words import AttitudeForm
+
+FORMS: tuple[AttitudeForm, ...] = ("euler", "quaternion")
 
 
 class Aircraft(OwnSystem):
@@ -75,7 +78,7 @@ class Aircraft(OwnSystem):
 
     def __init__(
         self,
-        form: str = "euler",
+        form: AttitudeForm = "euler",
         inertia: Any = (0.6, 1.0, 1.5),
         *,
         damping: Any = (2.0, 3.0, 1.0),

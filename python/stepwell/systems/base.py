@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 import numpy as np
 
 from .. import _checks
+from .._brief import MAX_LINE, facts, shortened
 from .._checks import Array, Shape
 from .._value import Fixed, Value, changed
 from ..contact import parameters
@@ -55,6 +56,11 @@ class System(Fixed, Value, ABC):
         constraint: the name of a constraint on its coordinates, which a control or projection of its own can keep; None without.
         kept: that control or projection, or None; ``integrate`` sets it.
         contacts: surfaces that its points meet, if the rows of its blocks are points.
+
+    Example:
+        >>> system = sw.Oscillator(omega=[1.0, 2.0, 3.0])
+        >>> isinstance(system, sw.System), system.batch, system.linear
+        (True, (3,), True)
     """
 
     kernel: ClassVar[str]
@@ -103,7 +109,26 @@ class System(Fixed, Value, ABC):
 
     def __repr__(self) -> str:
         said = self.said() + ([] if self.keeper is None else [repr(self.keeper)])
-        return f"{type(self).__name__}({', '.join(said)})"
+        return shortened(f"{type(self).__name__}({', '.join(said)})", 2 * MAX_LINE)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks, with what its states are."""
+        arguments = [
+            (name, value) if equal else ("", name) for name, equal, value in (each.partition("=") for each in self.said())
+        ]
+        words = [value for name, value in arguments if not name]
+        return facts(
+            type(self).__name__,
+            [
+                ("", ", ".join(words)) if words else ("", ""),
+                *((name, value) for name, value in arguments if name),
+                ("control", "" if self.keeper is None else repr(self.keeper)),
+                ("shape of v", str(self.v_shape)),
+                ("shape of y", str(self.y_shape)),
+                ("members", str(self.batch) if self.batch else "1, or as many as the states have"),
+                ("linear", "yes" if self.linear else "no"),
+            ],
+        )
 
     @abstractmethod
     def given(self, batch: Shape) -> dict[str, Any]:

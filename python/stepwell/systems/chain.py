@@ -24,6 +24,12 @@ class Chain(System):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> chain = sw.Chain(3, stiffness=2.0, mass=1.0)
+        >>> run = sw.integrate(chain, "leapfrog", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=10)
+        >>> run.y[-1].round(4)
+        array([-0.3092,  0.4724,  0.1099])
     """
 
     kernel = "chain"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import brief
 from .._checks import Shape
 from .._value import Fixed, Value
 from ..errors import ArgumentError, ShapeError
@@ -23,6 +24,12 @@ class Sinusoid(Fixed, Value):
         amplitude: in the unit of the input; broadcasts over the batch.
         omega: in radians per unit of time; broadcasts.
         phase: in radians; broadcasts.
+
+    Example:
+        >>> drive = sw.Sinusoid(amplitude=0.1, omega=2.0)
+        >>> run = sw.integrate(sw.Oscillator(damping=0.05, a=drive), "rk4", v=0.0, y=0.0, dt=0.05, steps=2000, every=1)
+        >>> float(abs(run.y[-400:]).max().round(3))
+        0.034
     """
 
     def __init__(self, amplitude: Any, omega: Any, phase: Any = 0.0) -> None:
@@ -34,7 +41,7 @@ class Sinusoid(Fixed, Value):
         )
 
     def __repr__(self) -> str:
-        return f"Sinusoid(amplitude={self.amplitude}, omega={self.omega}, phase={self.phase})"
+        return f"Sinusoid(amplitude={brief(self.amplitude)}, omega={brief(self.omega)}, phase={brief(self.phase)})"
 
     def check(self, last: float) -> None:
         """Raise if the angle leaves the range of the sine by a time."""
@@ -59,6 +66,12 @@ class Sampled(Fixed, Value):
 
     A time that falls short of a sample's time by less than a millionth of the interval, as t = t0 + k·dt may by rounding, already
     gets that sample.
+
+    Example:
+        >>> steps = sw.Sampled([0.0, 1.0, 0.5], interval=2.0)  # 0 until t = 2, 1 until 4, then 0.5
+        >>> run = sw.integrate(sw.Oscillator(damping=1.0, x=steps), "rk4", v=0.0, y=0.0, dt=0.05, steps=600)
+        >>> float(run.y[-1].round(4))
+        0.5
     """
 
     def __init__(self, values: Any, interval: Any, start: Any = 0.0) -> None:
@@ -70,6 +83,8 @@ class Sampled(Fixed, Value):
         self.batch: Shape = self.values.shape[1:]
 
     def __repr__(self) -> str:
+        if len(self.values) == 1:
+            return f"constant({brief(self.values[0])})"
         return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
 
     @property

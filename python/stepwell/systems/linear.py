@@ -39,6 +39,12 @@ class LinearSystem(System):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, place
+        >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
+        >>> run.y[-1].round(4)
+        array([0.25])
     """
 
     kernel = "linear"

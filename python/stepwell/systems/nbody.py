@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,10 @@ from ..errors import ShapeError
 from ..reference.systems import nbody as reference
 from .base import System, aligned
 
-FORCES = ("logarithmic", "newton", "printed")
+if TYPE_CHECKING:
+    from .._words import BodyForce
+
+FORCES: tuple[BodyForce, ...] = ("logarithmic", "newton", "printed")
 
 
 class NBody(System):
@@ -36,6 +39,13 @@ class NBody(System):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> sun_and_planet = sw.NBody([1.0, 1e-3], force="newton", G=1.0)
+        >>> v, y = [[0.0, 0.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]]
+        >>> run = sw.integrate(sun_and_planet, "leapfrog", v=v, y=y, dt=0.01, steps=628)
+        >>> run.y[-1, 1].round(2)
+        array([1.  , 0.02])
     """
 
     kernel = "nbody"
@@ -47,7 +57,7 @@ class NBody(System):
         self,
         masses: Any = (1.0, 1.0, 1.0),
         *,
-        force: str = "logarithmic",
+        force: BodyForce = "logarithmic",
         G: Any = 1.0,
         softening: Any = 0.0,
         floor: Any = None,

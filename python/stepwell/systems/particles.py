@@ -32,7 +32,7 @@ class Particles(System):
 
     Example:
         >>> ball = sw.Particles(gravity=9.81, floor=sw.Floor(restitution=0.8))
-        >>> sw.integrate(ball, "leapfrog", v=[[1.0, 0.0]], y=[[0.0, 1.0]], dt=1 / 60, steps=600, every=1)
+        >>> run = sw.integrate(ball, "leapfrog", v=[[1.0, 0.0]], y=[[0.0, 1.0]], dt=1 / 60, steps=600, every=1)
     """
 
     kernel = "particles"

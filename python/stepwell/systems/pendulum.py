@@ -27,6 +27,11 @@ class Pendulum(System):
 
     Raises:
         ArgumentError: what is wrong with which argument.
+
+    Example:
+        >>> run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=np.radians([10.0, 170.0]), dt=0.01, steps=740)
+        >>> np.degrees(run.y[-1]).round(1)
+        array([   4.5, -169.7])
     """
 
     kernel = "pendulum"

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, contact
 from .._checks import Array, Shape
 from ..errors import ArgumentError
 from ..reference.systems.pendulum_3d import Pendulum3D as Reference
 from ..reference.systems.rods import dot
 from .base import shown
-from .rods import RodSystem
+from .rods import RodSystem, surfaces_for_rods
 
 
 class Pendulum3D(RodSystem):
@@ -26,6 +26,7 @@ class Pendulum3D(RodSystem):
     Args:
         length: of the rod, above zero; broadcasts over the batch.
         gravity: acceleration downwards, in units of length per unit of time squared; broadcasts.
+        floor: a ``Floor`` or ``Sphere`` that the mass meets, or a list of them; with ``way="safe"`` only.
 
     Raises:
         ArgumentError: what is wrong with which argument; and before a run, if the mass is at the origin, where the rod has no
@@ -33,7 +34,7 @@ class Pendulum3D(RodSystem):
 
     Example:
         >>> start = {"v": [0.0, 0.3, 0.0], "y": [1.0, 0.0, 0.0]}
-        >>> sw.integrate(sw.Pendulum3D(), "rk4", **start, dt=0.01, steps=1000, control=sw.LengthControl(0.5))
+        >>> run = sw.integrate(sw.Pendulum3D(), "rk4", **start, dt=0.01, steps=1000, control=sw.LengthControl(0.5))
     """
 
     kernel = "pendulum_3d"
@@ -41,14 +42,16 @@ class Pendulum3D(RodSystem):
     axes = "x, y and z"
     v_shape = y_shape = (3,)
 
-    def __init__(self, length: Any = 1.0, gravity: Any = 1.0) -> None:
+    def __init__(self, length: Any = 1.0, gravity: Any = 1.0, *, floor: Any = None) -> None:
         self.length = _checks.numbers("length", length, positive=True)
         self.gravity = _checks.numbers("gravity", gravity)
-        self.batch = _checks.batch_shape({"length": self.length.shape, "gravity": self.gravity.shape})
+        self.contacts, _ = surfaces_for_rods(floor, {3})
+        shapes = {"length": self.length.shape, "gravity": self.gravity.shape}
+        self.batch = _checks.batch_shape(shapes | contact.batches(self.contacts))
 
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
-        return shown(length=self.length, gravity=self.gravity)
+        return [*shown(length=self.length, gravity=self.gravity), *self.said_of_contacts()]
 
     def sized(self, *states: Any) -> Pendulum3D:
         """The same pendulum.

@@ -27,6 +27,14 @@ class RestrictedThreeBody(System):
 
     Raises:
         ArgumentError: what is wrong with ``mu``.
+
+    Example:
+        >>> moon = sw.scenes.arenstorf()
+        >>> moon.system
+        RestrictedThreeBody(mu=0.012277471)
+        >>> run = sw.integrate(moon.system, "merson", v=moon.v, y=moon.y, tolerance=1e-9, at=[moon.period])
+        >>> run.y[-1].round(3)
+        array([0.994, 0.   ])
     """
 
     kernel = "restricted_three_body"

@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, contact
 from .._checks import Array, Shape
 from .._value import changed
-from ..errors import ArgumentError, DTypeError, ShapeError
+from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..reference.elimination import factored
 from ..reference.systems import rods as reference
 from .base import System, aligned, shown
 
 #: The most rods: if all of them meet in one point, a step has some m³/3 operations for each evaluation of the rates.
 MAX_RODS = 100
+
+#: The most pairs of a point and a surface: each is looked at in every step that comes near one.
+MAX_CONTACTS = 100
 
 #: A run that saves a rod this much off its length, as a share, gives a warning.
 DOUBTFUL_LENGTH_ERROR = 0.1
@@ -60,6 +63,30 @@ class RodSystem(System):
         )
 
 
+def surfaces_for_rods(floor: Any, given: set[int]) -> tuple[tuple[contact.Surface, ...], set[int]]:
+    """The argument ``floor`` of points on rods, and the numbers of dimensions in which these and what is given are.
+
+    Raises:
+        ShapeError: if a surface is in another number of dimensions.
+        UnsupportedError: for a way other than "safe".
+    """
+    found, given = contact.surfaces("floor", floor), set(given)
+    for i, each in enumerate(found):
+        if each.way != "safe":
+            raise UnsupportedError(
+                f'floor {i}: expected way="safe", got {each.way!r}; impulses of surfaces and pulls of rods have to be found '
+                f"together, which no other way does"
+            )
+        if each.dim is not None:
+            expected = given or {2, 3}
+            if each.dim not in expected:
+                raise ShapeError(
+                    f"floor {i}: expected vectors of {' or '.join(map(str, sorted(expected)))} components, got {each.dim}"
+                )
+            given.add(each.dim)
+    return found, given
+
+
 class Rods(RodSystem):
     """Point masses joined by rods without mass, under gravity, in a plane or in space (§12). Blocks have shape (points, dim).
 
@@ -73,7 +100,8 @@ class Rods(RodSystem):
             fastest if its rods are given from one end to the other.
         lengths: of the rods, above zero: one for all, or shape (rods,) or (rods, *batch).
         gravity: acceleration downwards, in units of length per unit of time squared; broadcasts over the batch.
-        dim: 2 or 3; if None, that of the anchors, or without anchors that of the state.
+        floor: a ``Floor`` or ``Sphere`` that the points meet, or a list of them; with ``way="safe"`` only.
+        dim: 2 or 3; if None, that of the anchors or of ``floor``, or else that of the state.
 
     Up to 100 rods, and not more than there are coordinates. Rods may form loops as long as each of them still restricts the
     motion.
@@ -84,14 +112,16 @@ class Rods(RodSystem):
 
     Example:
         >>> pendulum = sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0)
-        >>> sw.integrate(pendulum, "rk4", v=0.0, y=[[1.0, 0.0], [2.0, 0.0]], dt=0.01, steps=1000)
+        >>> run = sw.integrate(pendulum, "rk4", v=0.0, y=[[1.0, 0.0], [2.0, 0.0]], dt=0.01, steps=1000)
     """
 
     kernel = "rods"
     reference = reference.Rods
     axes = "points, dim"
 
-    def __init__(self, masses: Any, rods: Any, lengths: Any, *, gravity: Any = 1.0, dim: int | None = None) -> None:
+    def __init__(
+        self, masses: Any, rods: Any, lengths: Any, *, gravity: Any = 1.0, floor: Any = None, dim: int | None = None
+    ) -> None:
         self.masses = _checks.numbers("masses", masses, positive=True)
         if self.masses.ndim == 0 or len(self.masses) == 0:
             raise ShapeError(f"masses: expected one for each point along the first axis, got shape {self.masses.shape}")
@@ -100,7 +130,13 @@ class Rods(RodSystem):
         given = anchored | (set() if dim is None else {_checks.count("dim", dim, 2, 3)})
         if len(given) > 1:
             raise ShapeError(f"rods, dim: expected one number of dimensions, got {' and '.join(map(str, sorted(given)))}")
+        self.contacts, given = surfaces_for_rods(floor, given)
         self.dim = next(iter(given), None)
+        if len(self.contacts) * len(self.masses) > MAX_CONTACTS:
+            raise ArgumentError(
+                f"floor: expected at most {MAX_CONTACTS} pairs of a point and a surface, got {len(self.masses)} points and "
+                f"{len(self.contacts)} surfaces"
+            )
         lengths = _checks.numbers("lengths", lengths, positive=True)
         if lengths.ndim and len(lengths) != len(self.rods):
             raise ShapeError(f"lengths: expected one for each of {len(self.rods)} rods, or one number, got shape {lengths.shape}")
@@ -110,7 +146,7 @@ class Rods(RodSystem):
         if len(self.rods) > np.prod(self.y_shape):
             raise ArgumentError(f"rods: expected at most as many as coordinates, {np.prod(self.y_shape)}, got {len(self.rods)}")
         shapes = {"masses": self.masses.shape[1:], "lengths": self.lengths.shape[1:], "gravity": self.gravity.shape}
-        self.batch = _checks.batch_shape(shapes)
+        self.batch = _checks.batch_shape(shapes | contact.batches(self.contacts))
 
     @property
     def anchors(self) -> tuple[tuple[float, ...], ...]:
@@ -139,7 +175,7 @@ class Rods(RodSystem):
         n = len(self.masses)
         masses = self.masses.tolist() if self.masses.ndim == 1 and n <= 5 else f"{n} points"
         rods = list(self.rods) if len(self.rods) <= 5 else f"{len(self.rods)} rods"
-        return [str(masses), str(rods), *shown(gravity=self.gravity)]
+        return [str(masses), str(rods), *shown(gravity=self.gravity), *self.said_of_contacts()]
 
     def sized(self, *states: Any) -> Rods:
         """The same rods in as many dimensions as the states, v and y, have.

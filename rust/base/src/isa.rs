@@ -35,8 +35,10 @@ const ISA: &str = "STEPWELL_ISA";
 /// What the hot loop may use, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// What every CPU of the platform has (SSE2 on x86-64, NEON on AArch64).
+    /// What every CPU of the platform has (SSE2 on x86-64, NEON on AArch64), without machine code that is written at run time.
     Baseline,
+    /// 128-bit vectors of AArch64, which every such CPU has.
+    Neon,
     /// 256-bit vectors.
     Avx2,
     /// 512-bit vectors.
@@ -51,12 +53,13 @@ pub trait Task {
 
 impl Level {
     /// Every level, ascending.
-    pub const ALL: [Level; 3] = [Level::Baseline, Level::Avx2, Level::Avx512];
+    pub const ALL: [Level; 4] = [Level::Baseline, Level::Neon, Level::Avx2, Level::Avx512];
 
     /// Its name, which `STEPWELL_ISA` takes.
     pub fn name(self) -> &'static str {
         match self {
             Level::Baseline => "baseline",
+            Level::Neon => "neon",
             Level::Avx2 => "avx2",
             Level::Avx512 => "avx512",
         }
@@ -68,6 +71,7 @@ impl Level {
     pub fn here(self) -> bool {
         match self {
             Level::Baseline => true,
+            Level::Neon => false,
             // CPUs with the one have the other, except for a few models.
             Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             Level::Avx512 => {
@@ -79,10 +83,20 @@ impl Level {
         }
     }
 
-    /// Whether this machine has it.
+    /// Whether this machine has it. How a program may execute what it has written differs between systems; for AArch64 it is known here
+    /// for Linux.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn here(self) -> bool {
-        self == Level::Baseline
+        self == Level::Baseline || self == Level::Neon && cfg!(all(target_arch = "aarch64", target_os = "linux"))
+    }
+
+    /// The level whose instructions the interpreter's own loops use: of `Baseline`, which says that no machine code is written, the best
+    /// that this machine has.
+    pub fn of_loops(self) -> Level {
+        match self {
+            Level::Baseline => Level::available().pop().unwrap_or(self),
+            written => written,
+        }
     }
 
     /// The levels that this machine has, ascending.

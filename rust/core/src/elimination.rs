@@ -36,23 +36,28 @@ impl<N: Number> Factors<N> {
     }
 
     /// The unknowns, from the right-hand sides.
-    pub fn solve(&self, mut x: Vec<N>) -> Vec<N> {
+    pub fn solve(&self, x: Vec<N>) -> Vec<N> {
+        self.solve_some(x.into_iter().map(Some).collect()).into_iter().flatten().collect()
+    }
+
+    /// The same. `None` is 0 whatever the state is, on either side.
+    pub fn solve_some(&self, mut x: Vec<Option<N>>) -> Vec<Option<N>> {
         let n = x.len();
+        let less = |x: &mut [Option<N>], from: usize, factor: Option<N>, known: usize| {
+            if let (Some(factor), Some(known)) = (factor, x[known]) {
+                let term = factor * known;
+                x[from] = Some(x[from].map_or(-term, |x| x - term));
+            }
+        };
         for i in 0..n {
             for j in 0..i {
-                if let Some(factor) = self.below[i][j] {
-                    let known = x[j];
-                    x[i] -= factor * known;
-                }
+                less(&mut x, i, self.below[i][j], j);
             }
         }
         for j in (0..n).rev() {
-            x[j] = x[j] / self.pivots[j];
+            x[j] = x[j].map(|x| x / self.pivots[j]);
             for i in j + 1..n {
-                if let Some(factor) = self.below[i][j] {
-                    let known = x[i];
-                    x[j] -= factor * known;
-                }
+                less(&mut x, j, self.below[i][j], i);
             }
         }
         x

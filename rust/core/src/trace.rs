@@ -479,14 +479,14 @@ impl Scene {
     /// Traces all that a run needs, anew.
     pub fn trace(&self) -> Result<Tapes, Error> {
         let steps = trace_step(Tape::default(), &self.given, &self.how)?;
-        let fused = |tape: Tape, next: &[Id]| if self.fused { fuse(&tape, next) } else { tape };
+        let fused = |tape: Tape, next: Vec<Id>| if self.fused { fuse(&tape, &next) } else { (tape, next) };
         let (mut start, mut finish) = (None, None);
         if let How::Method { name, choice } = &self.how {
             let method = method(name)?;
             for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
                     let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
-                    *slot = Some((fused(tape, &next), next));
+                    *slot = Some(fused(tape, next));
                 }
             }
         }
@@ -495,7 +495,7 @@ impl Scene {
             quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
-        let step = (fused(steps.tape, &steps.next), steps.next);
+        let step = fused(steps.tape, steps.next);
         let shown = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
             let (mut both, mut next) = step.clone();
             let place = both.take_over(tape);

@@ -12,7 +12,7 @@ use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, InstructionInf
 use stepwell_core::{
     error::Error,
     isa::Level,
-    kernel::x86::{Shape, Written, choose, write},
+    kernel::writer::{Shape, Written, choose, write},
     run::Model,
     spec::{Row, Table},
     steppers::RECORDS,

@@ -336,7 +336,8 @@ impl Tape {
     /// A tape with fused multiply-adds in what these values need, and the values on it.
     fn fused(&self, of: Vec<PyRef<'_, Symbol>>) -> PyResult<(Tape, Vec<Symbol>)> {
         let (tape, roots) = self.with(&of)?;
-        let fused = Shared::new(Mutex::new(fuse(&tape, &roots)));
+        let (fused, roots) = fuse(&tape, &roots);
+        let fused = Shared::new(Mutex::new(fused));
         let symbols = roots.into_iter().map(|id| Symbol { tape: Arc::clone(&fused), id }).collect();
         Ok((Tape(fused), symbols))
     }

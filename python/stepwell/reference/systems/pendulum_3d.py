@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..types import Array, Blocks
-from .rods import dot, largest, spin
+from .rods import Rods, dot, largest, spin
 
 
 class Pendulum3D:
@@ -18,6 +18,7 @@ class Pendulum3D:
         self.h = h
         self.length = length
         self.square = length * length
+        self.gravity = gravity
         self.fall = h * gravity
         self.projects = keeps == "projection"
         self.damping: Any = None
@@ -48,6 +49,11 @@ class Pendulum3D:
             return v, y
         y = y * (self.length / np.sqrt(dot(y, y)))
         return v - (dot(y, v) / self.square) * y, y
+
+    def as_rods(self) -> tuple[Rods, int]:
+        """One rod from an anchor to a point of mass 1, for the surfaces that it meets, and how many axes a block has."""
+        anchor, one = np.zeros((1, 3)), np.ones(1)
+        return Rods(self.h, 3, [[1, 0]], one, np.asarray(self.length)[np.newaxis], anchor, self.gravity, None, None), 1
 
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state: ``length_error``, |length/l − 1|, or ``angular_momentum``, y × v per mass."""

@@ -151,6 +151,10 @@ class Rods:
         pushed = self.pushed(d, solved(factored(self.matrix(d)), off))
         return np.stack([each + push for each, push in zip(block, pushed, strict=True)])
 
+    def as_rods(self) -> tuple["Rods", int]:
+        """Itself, for the surfaces that its points meet, and how many axes a block has."""
+        return self, 2
+
     def record(self, name: str, v: Array, y: Array) -> Array:
         """A quantity of a state."""
         return np.asarray(QUANTITIES[name].of(self, v, y))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..._checks import number
+from ..._words import AttitudeForm
 from ...systems import Aircraft, Sinusoid
 from ..base import Scene
 
@@ -14,7 +15,7 @@ from ..base import Scene
 PERIOD, TURNS = 10.0, 2
 
 
-def aircraft(form: str = "euler", roll: Any = 40.0, pitch: Any = -10.0) -> Scene:
+def aircraft(form: AttitudeForm = "euler", roll: Any = 40.0, pitch: Any = -10.0) -> Scene:
     """The document's aircraft in turns to both sides, by its own step of 0.1.
 
     The document prints neither the start nor the commands nor the duration; they are chosen here. The aircraft is level and at

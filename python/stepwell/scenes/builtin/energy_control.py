@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 
 from ..._checks import known, number
+from ..._words import BodyForce, ControlForm
 from ...control import EnergyControl
 from ...systems import NBody
 from ..base import Scene
 
 #: Force and potential for each pair of them, as ``NBody`` names it.
-PAIRS = {"matching": "logarithmic", "printed": "printed"}
+PAIRS: dict[str, BodyForce] = {"matching": "logarithmic", "printed": "printed"}
 
 #: The document's control factor, found by experiment.
 GAIN = 0.3
 
 
-def energy_control(pair: str = "matching", eps: Any = 0.01, form: str = "limited") -> Scene:
+def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = "limited") -> Scene:
     """Three unit masses thrown out from the centre, one of them a little aside; the document's 100 000 steps of 0.01.
 
     The places are those of ``clover``, the velocities radial with speed 1, and the third body's gets ε in x (Appendix D). The

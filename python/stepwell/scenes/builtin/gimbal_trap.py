@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..._checks import number
+from ..._words import AttitudeForm
 from ...systems import Aircraft
 from ..base import Scene
 
 
-def gimbal_trap(form: str = "euler", roll: Any = 2.0, torque: Any = -1.5) -> Scene:
+def gimbal_trap(form: AttitudeForm = "euler", roll: Any = 2.0, torque: Any = -1.5) -> Scene:
     """An aircraft without controllers loops, and its nose passes near the vertical, where Euler angles have no meaning.
 
     A constant torque lifts the nose; the dampers and the yaw rate by the roll angle act. The aircraft is rolled a little at the

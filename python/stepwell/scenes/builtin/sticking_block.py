@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import Array, number
+from ..._checks import Array
 from ...systems import Oscillator
 from ..base import Scene
+from ..ranges import moderate
 
 
 def sticking_block(friction: Any = 0.13) -> Scene:
@@ -24,7 +25,7 @@ def sticking_block(friction: Any = 0.13) -> Scene:
     Raises:
         ArgumentError: what is wrong with ``friction``.
     """
-    friction = number("friction", friction, positive=True)
+    friction = moderate("friction", friction, "units of length per unit of time squared")
     # At the end of that half swing the spring pulls no harder than friction holds.
     last = max(0, math.ceil((1.0 - friction) / (2.0 * friction)))
 

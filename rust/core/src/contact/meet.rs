@@ -26,13 +26,20 @@ impl<N: Number> Step<N> {
 }
 
 /// What contact makes of a point.
-struct Change<N: Number> {
+pub struct Change<N: Number> {
     /// Its velocity along the normal.
-    speed: N,
+    pub speed: N,
     /// Its distance from the plane that touches the surface.
-    distance: N,
-    /// Whether it rests, and at which distance from the surface; None if the way knows no rest.
-    rest: Option<(N::Truth, N)>,
+    pub distance: N,
+    /// None if the way knows no rest.
+    pub rest: Option<Rest<N>>,
+}
+
+/// Whether a point rests, at which distance from the surface, and if it does not the time from the impact to the end of the step.
+pub struct Rest<N: Number> {
+    pub rests: N::Truth,
+    pub low: N,
+    pub since: N,
 }
 
 /// Whether a point meets a surface; if so it is changed in place.
@@ -58,7 +65,7 @@ pub fn meet<N: Number>(surface: &Surface<N>, step: &Step<N>, v: &mut [N], y: &mu
             (new_v.collect(), new_y)
         }
     };
-    if let Some((rests, low)) = change.rest {
+    if let Some(Rest { rests, low, .. }) = change.rest {
         let resting = surface.back(&new_y, low);
         new_y.iter_mut().zip(resting).for_each(|(y, rest)| *y = N::choose(rests, rest, *y));
     }
@@ -71,7 +78,7 @@ pub fn meet<N: Number>(surface: &Surface<N>, step: &Step<N>, v: &mut [N], y: &mu
 ///
 /// `w` is the velocity that belongs to the same time as y. In a uniform field w² + 2G·d is constant for every method, and so is
 /// (e·u − G·τ)² + 2G·τ(e·u − ½G·τ) for every time τ since the bounce.
-fn bounce<N: Number>(surface: &Surface<N>, step: &Step<N>, place: &Place<N>, speed: N) -> (N::Truth, Change<N>) {
+pub fn bounce<N: Number>(surface: &Surface<N>, step: &Step<N>, place: &Place<N>, speed: N) -> (N::Truth, Change<N>) {
     let (zero, half, h) = (N::of(0.0), N::of(0.5), step.h);
     let (push, late) = (-dot(&step.kick, &place.normal), dot(&step.lag, &place.normal));
     let size = magnitude(push);
@@ -92,7 +99,7 @@ fn bounce<N: Number>(surface: &Surface<N>, step: &Step<N>, place: &Place<N>, spe
     let height = since * (leaving - (half * pull) * since);
     let rising = (leaving - pull * since) - ahead;
     let (speed, distance) = (N::choose(rests, zero, rising), N::choose(rests, low, height));
-    (touches, Change { speed, distance, rest: Some((rests, low)) })
+    (touches, Change { speed, distance, rest: Some(Rest { rests, low, since }) })
 }
 
 /// Coulomb's friction: the tangential velocity loses the grip, μ times what the normal one gains. Returns the fraction that is left.
@@ -103,7 +110,7 @@ fn rub<N: Number>(grip: N, step: &Step<N>, y: &[N], slide: &[N], (normal, change
     let fast = dot(slide, slide).sqrt();
     let sticks = fast.at_most(grip);
     let kept = N::choose(sticks, zero, one - grip / fast);
-    if let Some((rests, _)) = change.rest {
+    if let Some(Rest { rests, .. }) = change.rest {
         let half = N::of(0.5) * step.h;
         let share = half * N::choose(zero.below(fast), fast / grip, zero);
         let way: Vec<N> = (0..y.len()).map(|i| (step.y0[i] - y[i]) + share * step.v0[i]).collect();

@@ -8,10 +8,13 @@
 //! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word
 //! `_side`, `inside` or `outside`, the vector `_centre` and `_radius`.
 
+mod joined;
 mod meet;
+mod rods;
 mod surface;
 
 use meet::Step;
+use rods::RodContacts;
 use surface::{Surface, Way};
 
 use crate::{
@@ -33,7 +36,16 @@ pub fn is_given(given: &Given) -> bool {
 
 /// Approximate number of operations that surfaces add to a step of blocks of this size.
 pub fn operations(given: &Given, shape: Shape) -> usize {
-    OPERATIONS * given.whole("contacts") * shape.y / dimensions(given).max(1)
+    let dim = dimensions(given);
+    if is_given(given) && are_rods(given) {
+        return rods::operations(given, shape.y / dim, dim);
+    }
+    OPERATIONS * given.whole("contacts") * shape.y / dim
+}
+
+/// Whether the points are joined by rods.
+fn are_rods(given: &Given) -> bool {
+    matches!(given.system.as_str(), "rods" | "pendulum_3d")
 }
 
 /// An error if the surfaces that are given are wrong.
@@ -41,6 +53,9 @@ pub fn check(given: &Given, shape: Shape) -> Result<(), Error> {
     let dim = dimensions(given);
     for i in 0..given.whole("contacts") {
         surface::check(given, i, dim)?;
+        if are_rods(given) && given.word(&format!("contact_{i}_way")) != "safe" {
+            return Err(given.unknown(&format!("contact_{i}_way")));
+        }
     }
     if is_given(given) && (shape.v != shape.y || !shape.y.is_multiple_of(dim)) {
         return Err(Error::Shape { what: "points that meet a surface", expected: dim, got: shape.y });
@@ -70,6 +85,8 @@ pub struct Contacts<N: Number> {
     dim: usize,
     held: Vec<u32>,
     surfaces: Vec<Surface<N>>,
+    /// If the points are joined by rods.
+    rods: Option<RodContacts<N>>,
     /// Whether the energy is compared: along one plane without friction it is right by itself.
     is_limited: bool,
 }
@@ -80,7 +97,20 @@ impl<N: Number> Contacts<N> {
         let surfaces = surface::all(p, |way| way != Way::Spring);
         let safe: Vec<_> = surfaces.iter().filter(|surface| surface.way == Way::Safe).collect();
         let is_limited = safe.len() > 1 || safe.iter().any(|surface| surface.is_curved() || surface.friction.is_some());
-        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim: dimensions(p.given), held: held(p.given), surfaces, is_limited })
+        let (dim, held) = (dimensions(p.given), held(p.given));
+        (!surfaces.is_empty()).then(|| Contacts { h: p.h, dim, held, surfaces, rods: RodContacts::new(p), is_limited })
+    }
+
+    /// Whether the points are joined by rods, so that all of them are to be resolved together.
+    pub fn are_joined(&self) -> bool {
+        self.rods.is_some()
+    }
+
+    /// What becomes of points on rods, in place. The state before the step comes first.
+    pub fn resolve_joined(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) {
+        if let Some(rods) = &self.rods {
+            rods.resolve(&self.surfaces, before, v, y);
+        }
     }
 
     /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
@@ -105,6 +135,10 @@ impl<N: Number> Contacts<N> {
     /// Which points met a surface in a step, None for those that no surface acts on, and the state after that.
     fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<Option<N::Truth>>, [Block<N>; 2]) {
         let mut touched = vec![None; y.len() / self.dim];
+        if self.are_joined() {
+            self.resolve_joined(before.map(Block::as_slice), [v.as_mut_slice(), y.as_mut_slice()]);
+            return (touched, [v, y]); // only methods without a carry step them
+        }
         for (i, touched) in touched.iter_mut().enumerate().filter(|(i, _)| self.acts_on(*i)) {
             let (from, to) = (self.dim * i, self.dim * (i + 1));
             let [v0, y0] = before.map(|block| &block.as_slice()[from..to]);
@@ -136,6 +170,11 @@ impl<N: Number> Contacts<N> {
 }
 
 impl Contacts<f64> {
+    /// Whether any point on rods may have met a surface in a step.
+    pub fn is_any_near(&self, before: &[f64], y: &[f64]) -> bool {
+        self.rods.as_ref().is_some_and(|rods| rods.is_near(&self.surfaces, before, y))
+    }
+
     /// Whether a point may have met a surface in a step, from where it was and is.
     pub fn is_near(&self, before: &[f64], y: &[f64]) -> bool {
         self.surfaces.iter().any(|surface| surface.reaches(before, y))

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// A distance is known to within so many times the numbers that it is computed from: eight roundings.
-const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
+pub const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// What happens to a point that met a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,6 +177,17 @@ impl<N: Number> Surface<N> {
             Form::Sphere { is_inside: true, radius, .. } => radius - length,
             Form::Sphere { is_inside: false, radius, .. } => length - radius,
             Form::Plane { .. } => length,
+        }
+    }
+
+    /// The distance of a point from the surface itself.
+    pub fn depth_of(&self, y: &[N]) -> N {
+        match &self.form {
+            Form::Plane { normal, offset } => dot(y, normal) - *offset,
+            Form::Sphere { centre, .. } => {
+                let way = difference(y, centre);
+                self.depth(dot(&way, &way).sqrt())
+            }
         }
     }
 

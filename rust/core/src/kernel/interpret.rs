@@ -24,7 +24,7 @@ pub struct Interpreter {
     fixed: Vec<(Op, usize)>,
     /// What is done in a step.
     steps: Vec<Step>,
-    /// Which row of the state is replaced by which.
+    /// Which row of the state is replaced by which after a step, where its place was not free before.
     next: Vec<(usize, usize)>,
     /// How many rows the scratch has.
     rows: usize,
@@ -49,6 +49,17 @@ impl Interpreter {
             operands[..n].iter().for_each(|id| last[*id as usize] = at);
         }
         body.next.iter().for_each(|id| last[*id as usize] = count);
+        // Of each number of the state when it is read last; what replaces it then takes its row at once.
+        let mut read = vec![0; body.next.len()];
+        let mut replaces: Vec<Option<usize>> = vec![None; count];
+        for (s, id) in body.next.iter().enumerate().filter(|(s, _)| !body.keeps(*s)) {
+            replaces[*id as usize] = Some(s);
+        }
+        for (at, op) in body.ops.iter().enumerate() {
+            if let Op::State(s) = *op {
+                read[s as usize] = read[s as usize].max(last[at]);
+            }
+        }
 
         let mut rows = body.next.len();
         let mut free = Vec::new();
@@ -76,7 +87,8 @@ impl Interpreter {
                     free.push(places[*id as usize]);
                 }
             }
-            let to = free.pop().unwrap_or_else(|| new(&mut rows));
+            let home = replaces[at].filter(|s| read[*s] <= at);
+            let to = home.unwrap_or_else(|| free.pop().unwrap_or_else(|| new(&mut rows)));
             places.push(to);
             if last[at] == at {
                 free.push(to);
@@ -84,10 +96,17 @@ impl Interpreter {
             let of = |i: usize| if i < n { places[operands[i] as usize] * lanes } else { to * lanes };
             made.steps.push(Step { op: *op, to: to * lanes, of: [of(0), of(1), of(2)] });
         }
-        let changed = (0..body.next.len()).filter(|s| !body.keeps(*s));
-        made.next = changed.map(|s| (s * lanes, places[body.next[s] as usize] * lanes)).collect();
+        let moved = (0..body.next.len()).filter(|s| !body.keeps(*s) && places[body.next[*s] as usize] != *s);
+        made.next = moved.map(|s| (s * lanes, places[body.next[s] as usize] * lanes)).collect();
         made.rows = rows;
         made
+    }
+}
+
+impl Interpreter {
+    /// How many values it has at once.
+    pub fn rows(&self) -> usize {
+        self.rows
     }
 }
 
@@ -108,7 +127,13 @@ impl Kernel for Interpreter {
     fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
         check(&self.body, self.lanes, tile);
         assert!(tile.pool.len() >= self.body.uniforms, "pool");
-        scratch.resize(scratch.len().max(self.rows * self.lanes), 0.0);
+        // From the start of a line of the cache on, so that no vector lies across two: at most 7 numbers are before it.
+        let enough = self.rows * self.lanes + 7;
+        if scratch.len() < enough {
+            scratch.resize(enough, 0.0);
+        }
+        let start = (scratch.as_ptr() as usize).wrapping_neg() % 64 / size_of::<f64>();
+        let scratch = &mut scratch[start..];
         with_isa!(self.level, |isa| isa.run(Run { of: self, tile, scratch }));
     }
 }
@@ -161,19 +186,28 @@ impl Task for Run<'_, '_> {
     }
 }
 
+/// Numbers that are read before any of their results is written: no check is needed whether rows are the same.
+const TOGETHER: usize = 8;
+
 /// An operation over rows of the scratch. Each kind has a loop of its own, which is vector code.
 #[inline(always)]
 fn apply(op: Op, scratch: &mut [f64], to: usize, [a, b, c]: [usize; 3], lanes: usize) {
     // Cells, because the place of an operand may be that of the result.
     let cells = Cell::from_mut(scratch).as_slice_of_cells();
-    let (to, a, b, c) = (&cells[to..to + lanes], &cells[a..a + lanes], &cells[b..b + lanes], &cells[c..c + lanes]);
+    let row = |at: usize| cells[at..at + lanes].as_chunks::<TOGETHER>();
+    let ((to, to_end), (a, a_end), (b, b_end), (c, c_end)) = (row(to), row(a), row(b), row(c));
+    let bits = |x: &Cell<f64>| x.get().to_bits();
     macro_rules! each {
         ($($kind:pat => $same:expr),* $(,)?) => {
             match op {
                 $($kind => {
-                    for l in 0..lanes {
-                        let made = eval::apply($same, a[l].get().to_bits(), b[l].get().to_bits(), c[l].get().to_bits());
-                        to[l].set(f64::from_bits(made));
+                    for (((to, a), b), c) in to.iter().zip(a).zip(b).zip(c) {
+                        let made: [u64; TOGETHER] =
+                            std::array::from_fn(|l| eval::apply($same, bits(&a[l]), bits(&b[l]), bits(&c[l])));
+                        to.iter().zip(made).for_each(|(to, made)| to.set(f64::from_bits(made)));
+                    }
+                    for (((to, a), b), c) in to_end.iter().zip(a_end).zip(b_end).zip(c_end) {
+                        to.set(f64::from_bits(eval::apply($same, bits(a), bits(b), bits(c))));
                     }
                 })*
                 // Not a wild card: the compiler asks for a line for each new operation.

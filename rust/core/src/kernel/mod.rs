@@ -1,23 +1,32 @@
 //! Kernels: from the list of operations to code that runs them.
 //!
 //! A kernel makes a number of steps of a tile of lanes, one lane a member. It is interpreted ([`interpret`]) or written as machine
-//! code at run time ([`x86`]); the bits are the same.
+//! code at run time ([`writer`], for x86-64 and AArch64); the bits are the same.
 
+pub mod aarch64;
+mod choose;
+mod frame;
 pub mod interpret;
-#[cfg(target_arch = "x86_64")]
-pub mod pages;
-#[cfg(target_arch = "x86_64")]
+mod loops;
+mod machine;
+mod pages;
+mod plan;
 mod registers;
 pub mod runner;
-pub mod unwritten;
-#[cfg(target_arch = "x86_64")]
-pub mod x86;
+mod shape;
+mod write;
+mod written;
+mod x86;
 
-/// The kernel writer of this machine.
-#[cfg(not(target_arch = "x86_64"))]
-pub use unwritten as writer;
-#[cfg(target_arch = "x86_64")]
-pub use x86 as writer;
+/// The kernel writer: chooses shapes, and writes machine code in them.
+pub mod writer {
+    pub use super::{
+        choose::{choose, choose_long, choose_trail},
+        frame::Frame,
+        shape::Shape,
+        written::{Assembled, Written, allowed, assemble, write},
+    };
+}
 
 use crate::tape::split::Body;
 

@@ -3,62 +3,41 @@
 //! A page is writable first and executable then, never both. A system may refuse to make it executable (hardened ones do); then there
 //! is no kernel, and the interpreter is used.
 
-use super::{Tile, check};
-use crate::tape::split::Body;
-
-/// What a kernel is called with: the start of each thing it may touch. The layout is known to the writers.
-#[repr(C)]
-struct Arguments {
-    state: *mut f64,
-    rows: *const f64,
-    pool: *const f64,
-    per_step: *const u64,
-    held: *const f64,
-    scratch: *mut f64,
-    steps: u64,
-    /// How the caller rounds, and how numbers are rounded here: to nearest, subnormal numbers as they are, no traps.
-    rounding: [u32; 2],
-}
-
-/// The place of each argument, in bytes.
-#[allow(missing_docs, reason = "they have the names of what is there")]
-pub(super) mod place {
-    use super::Arguments;
-    use std::mem::offset_of;
-
-    pub const STATE: i32 = offset_of!(Arguments, state) as i32;
-    pub const ROWS: i32 = offset_of!(Arguments, rows) as i32;
-    pub const POOL: i32 = offset_of!(Arguments, pool) as i32;
-    pub const PER_STEP: i32 = offset_of!(Arguments, per_step) as i32;
-    pub const HELD: i32 = offset_of!(Arguments, held) as i32;
-    pub const SCRATCH: i32 = offset_of!(Arguments, scratch) as i32;
-    pub const STEPS: i32 = offset_of!(Arguments, steps) as i32;
-    pub const ROUNDING: i32 = offset_of!(Arguments, rounding) as i32;
-}
+use super::{
+    Tile, check,
+    frame::{Arguments, Frame},
+};
 
 /// The rounding that Rust and C start with.
 const TO_NEAREST: u32 = 0x1F80;
 
-/// What the code of a kernel may touch, in numbers.
-#[derive(Clone, Debug)]
-pub struct Frame {
-    /// The sizes of a tile, and which entries of the table of the steps are places of rows.
-    pub body: Body,
-    /// How long rows are.
-    pub lanes: usize,
-    /// The size of the pool.
-    pub pool: usize,
-    /// Size of the spill area, which begins at a multiple of 64 bytes.
-    pub scratch: usize,
-    /// A pool that is read by whole vectors of so many numbers is copied to where no vector lies across two lines of the cache.
-    pub aligned_pool: bool,
-}
+/// How kernels are called.
+#[cfg(target_arch = "x86_64")]
+type Function = extern "sysv64" fn(*mut Arguments);
+#[cfg(not(target_arch = "x86_64"))]
+type Function = extern "C" fn(*mut Arguments);
 
-impl Frame {
-    /// For a body. Of its operations only those that name places matter.
-    pub fn new(body: &Body, lanes: usize) -> Frame {
-        let ops = body.ops.iter().copied().filter(|op| matches!(op, crate::tape::Op::Held(_))).collect();
-        Frame { body: Body { ops, ..body.clone() }, lanes, pool: 0, scratch: 0, aligned_pool: false }
+/// Tells the CPU that there are new instructions: its caches of data and of instructions do not know of each other.
+#[cfg(target_arch = "aarch64")]
+#[allow(unsafe_code, reason = "caches have instructions of their own")]
+fn synchronise(code: &[u8]) {
+    use std::arch::asm;
+    // SAFETY: these instructions are allowed to every program, and change nothing but what is in which cache.
+    unsafe {
+        let sizes: u64;
+        asm!("mrs {}, ctr_el0", out(reg) sizes, options(nomem, nostack, preserves_flags));
+        // The shortest lines that any cache has, each as a power of two in words of four bytes.
+        let lines = |power: u64| {
+            (code.as_ptr_range().start as usize & !((4 << power) - 1)..code.as_ptr_range().end as usize).step_by(4 << power)
+        };
+        for line in lines(sizes >> 16 & 15) {
+            asm!("dc cvau, {}", in(reg) line, options(nostack, preserves_flags));
+        }
+        asm!("dsb ish", options(nostack, preserves_flags));
+        for line in lines(sizes & 15) {
+            asm!("ic ivau, {}", in(reg) line, options(nostack, preserves_flags));
+        }
+        asm!("dsb ish", "isb", options(nostack, preserves_flags));
     }
 }
 
@@ -70,12 +49,15 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Code that was written for a frame. It must not access anything outside the frame, and must return: the writers ensure that, and
+    /// Code that was written for a frame, for this CPU. It must not access anything outside the frame, and must return: the writers ensure that, and
     /// the tests check it. None if the system has no memory left or does not allow executable pages.
     pub(super) fn new(code: &[u8], frame: Frame) -> Option<Pages> {
         let mut map = memmap2::MmapMut::map_anon(code.len()).ok()?;
         map.copy_from_slice(code);
-        Some(Pages { map: map.make_exec().ok()?, frame })
+        let map = map.make_exec().ok()?;
+        #[cfg(target_arch = "aarch64")]
+        synchronise(&map);
+        Some(Pages { map, frame })
     }
 
     /// Whether the system allows executable pages, found by trying one.
@@ -130,7 +112,7 @@ impl Pages {
         // table of the steps and the rows held that it names: inside what was asserted above. Nobody else uses the state or `own`
         // meanwhile, both are borrowed exclusively. It keeps the registers that its convention asks to keep.
         unsafe {
-            let function: extern "sysv64" fn(*mut Arguments) = std::mem::transmute(self.map.as_ptr());
+            let function: Function = std::mem::transmute(self.map.as_ptr());
             function(&raw mut arguments);
         }
     }

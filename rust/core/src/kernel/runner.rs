@@ -18,9 +18,23 @@ const INTERPRETATIONS_PER_WRITE: u64 = 4000;
 /// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
 const LANES_PER_DISPATCH: usize = 10;
 
-/// Lanes that the interpreter takes at once where no shape sets their number, for few members and for many: the values of a step stay
-/// in the L1 cache.
-const INTERPRETED_LANES: [usize; 2] = [8, 64];
+/// Lanes that the interpreter takes at once where no shape sets their number: of so few members all, of many the fewest and the most.
+/// The more there are, the less it counts how long an operation takes to be dispatched.
+const FEW_INTERPRETED: usize = 8;
+const INTERPRETED_LANES: [usize; 2] = [64, 256];
+/// The most bytes of the values of an interpreted step between these numbers of lanes, so that they stay in the L1 cache.
+const INTERPRETED_BYTES: usize = 16 << 10;
+
+/// How many lanes of a run of so many members the interpreter takes at once: the same for all turns, as nearly as can be.
+fn interpreted_lanes(body: &Body, members: usize) -> usize {
+    if members <= FEW_INTERPRETED {
+        return members.max(1);
+    }
+    let [fewest, most] = INTERPRETED_LANES;
+    let row = INTERPRETED_BYTES / size_of::<f64>() / Interpreter::new(body, 1, Level::Baseline).rows().max(1);
+    let turns = members.div_ceil(row.clamp(fewest, most));
+    members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
+}
 
 /// A body, over tiles of one length.
 pub struct Runner {
@@ -38,9 +52,8 @@ impl Runner {
     /// For a run of so many members.
     pub fn new(body: &Body, level: Level, members: usize) -> Runner {
         let shape = writer::choose(body, level, members);
-        let [few, many] = INTERPRETED_LANES;
-        let interpreted = if members <= few { members.max(1) } else { many };
-        Runner::shaped(body, level, shape.as_ref().map_or(interpreted, Shape::lanes), shape)
+        let lanes = shape.as_ref().map_or_else(|| interpreted_lanes(body, members), Shape::lanes);
+        Runner::shaped(body, level, lanes, shape)
     }
 
     /// For rows of so many lanes, each a number of a long block.
@@ -50,7 +63,7 @@ impl Runner {
 
     /// With a shape that was chosen before; interpreted if there is none.
     pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner {
-        let interpreter = Interpreter::new(body, lanes, level);
+        let interpreter = Interpreter::new(body, lanes, level.of_loops());
         Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }
     }
 

@@ -61,6 +61,21 @@ impl RowContacts {
         (0..points).flat_map(move |i| (0..lanes).map(move |lane| (i, lane)))
     }
 
+    /// Changes members whose points are joined by rods and met a surface.
+    fn resolve_joined(&self, v: &mut [f64], y: &mut [f64]) {
+        let count = self.lanes.len();
+        for (lane, contacts) in self.lanes.iter().enumerate() {
+            let of = |row: &[f64]| row.iter().skip(lane).step_by(count).copied().collect::<Vec<f64>>();
+            let [v0, y0, mut v1, mut y1] = [&self.before[0], &self.before[1], &*v, &*y].map(of);
+            if contacts.is_any_near(&y0, &y1) {
+                contacts.resolve_joined([&v0, &y0], [&mut v1, &mut y1]);
+                for (row, new) in [(&mut *v, v1), (&mut *y, y1)] {
+                    row.iter_mut().skip(lane).step_by(count).zip(new).for_each(|(number, new)| *number = new);
+                }
+            }
+        }
+    }
+
     /// Whether any point may have met a surface.
     fn is_near(&self, y: &[f64]) -> bool {
         let (dim, lanes) = (self.dim, self.lanes.len());
@@ -92,6 +107,10 @@ impl RowContacts {
 
     /// The state after a step from time t, in the slots.
     pub(super) fn after(&mut self, blocks: &mut Blocks, carry: Option<[&mut Executor; 2]>, t: f64, h: f64) {
+        if self.lanes.iter().any(Contacts::are_joined) {
+            let (v, y) = blocks.slots_mut();
+            return self.resolve_joined(v, y);
+        }
         if !self.is_near(blocks.slots().1) {
             return;
         }

@@ -6,7 +6,7 @@ use crate::{
 pub const RECORD: Record = Record {
     name: "standard_euler",
     title: "Standard Euler",
-    other_names: &["forward Euler", "explicit Euler"],
+    other_names: &["forward Euler", "explicit Euler", "Euler's method"],
     false_friends: &["symplectic Euler", "backward Euler"],
     order: 1,
     family: "Runge-Kutta",

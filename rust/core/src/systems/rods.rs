@@ -112,61 +112,82 @@ fn operations(given: &Given) -> usize {
     rods.len() * (9 * dim + 4) + coupled
 }
 
+/// Points and the rods between them.
+pub(crate) struct Links<N: Number> {
+    pub(crate) dim: usize,
+    pub(crate) ends: Vec<[usize; 2]>,
+    pub(crate) masses: Vec<N>,
+    /// 1/m and −1/m.
+    pub(crate) inverse: Vec<N>,
+    pub(crate) minus: Vec<N>,
+    pub(crate) lengths: Vec<N>,
+    pub(crate) anchors: Vec<N>,
+}
+
 struct Rods<N: Number> {
     h: N,
-    dim: usize,
-    ends: Vec<[usize; 2]>,
-    masses: Vec<N>,
-    /// 1/m and −1/m.
-    inverse: Vec<N>,
-    minus: Vec<N>,
-    lengths: Vec<N>,
+    links: Links<N>,
     squares: Vec<N>,
-    anchors: Vec<N>,
     fall: N,
     keeps: Keeps<N>,
 }
 
 fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
-    let (masses, lengths) = (p.numbers("masses").to_vec(), p.numbers("lengths").to_vec());
+    let links = Links::new(p);
     Box::new(Rods {
         h: p.h,
-        dim: p.given.whole("dim"),
-        ends: ends(p.given),
-        inverse: masses.iter().map(|m| N::of(1.0) / *m).collect(),
-        minus: masses.iter().map(|m| N::of(-1.0) / *m).collect(),
-        squares: lengths.iter().map(|l| *l * *l).collect(),
-        anchors: p.numbers("anchors").to_vec(),
+        squares: links.lengths.iter().map(|l| *l * *l).collect(),
         fall: p.h * p.number("gravity"),
         keeps: Keeps::new(p),
-        masses,
-        lengths,
+        links,
     })
 }
 
 /// A vector for each rod, or for each point.
-type Vectors<N> = Vec<Vec<N>>;
+pub(crate) type Vectors<N> = Vec<Vec<N>>;
 
-impl<N: Number> Rods<N> {
-    fn is_point(&self, end: usize) -> bool {
+impl<N: Number> Links<N> {
+    fn new(p: &Parameters<N>) -> Self {
+        let (dim, masses) = (p.given.whole("dim"), p.numbers("masses").to_vec());
+        Links::of(dim, ends(p.given), masses, p.numbers("lengths").to_vec(), p.numbers("anchors").to_vec())
+    }
+
+    /// From the dimensions, the ends of each rod, the points' masses, the rods' lengths and the anchors.
+    pub(crate) fn of(dim: usize, ends: Vec<[usize; 2]>, masses: Vec<N>, lengths: Vec<N>, anchors: Vec<N>) -> Self {
+        let (inverse, minus) = [1.0, -1.0].map(|one| masses.iter().map(|m| N::of(one) / *m).collect()).into();
+        Links { dim, ends, masses, inverse, minus, lengths, anchors }
+    }
+
+    /// Those of a system, if it has any.
+    pub(crate) fn given(p: &Parameters<N>) -> Option<Self> {
+        match p.given.system.as_str() {
+            "rods" => Some(Links::new(p)),
+            "pendulum_3d" => {
+                Some(Links::of(3, vec![[1, 0]], vec![N::of(1.0)], vec![p.number("length")], vec![N::of(0.0); 3]))
+            }
+            _ => None,
+        }
+    }
+
+    pub(crate) fn is_point(&self, end: usize) -> bool {
         end < self.masses.len()
     }
 
     /// The numbers of a point, or of an anchor.
-    fn at<'a>(&'a self, block: &'a Block<N>, end: usize) -> &'a [N] {
+    pub(crate) fn at<'a>(&'a self, block: &'a [N], end: usize) -> &'a [N] {
         let n = self.masses.len();
-        let (all, i) = if end < n { (block.as_slice(), end) } else { (&self.anchors[..], end - n) };
+        let (all, i) = if end < n { (block, end) } else { (&self.anchors[..], end - n) };
         &all[i * self.dim..][..self.dim]
     }
 
     /// The vector of each rod.
-    fn spans(&self, y: &Block<N>) -> Vectors<N> {
+    pub(crate) fn spans(&self, y: &[N]) -> Vectors<N> {
         let span = |[a, b]: &[usize; 2]| self.at(y, *b).iter().zip(self.at(y, *a)).map(|(b, a)| *b - *a).collect();
         self.ends.iter().map(span).collect()
     }
 
     /// The rate of each rod's vector.
-    fn closing(&self, v: &Block<N>) -> Vectors<N> {
+    pub(crate) fn closing(&self, v: &[N]) -> Vectors<N> {
         let rate = |[a, b]: &[usize; 2]| {
             if self.is_point(*a) {
                 self.at(v, *b).iter().zip(self.at(v, *a)).map(|(b, a)| *b - *a).collect()
@@ -178,7 +199,7 @@ impl<N: Number> Rods<N> {
     }
 
     /// How a pull of a rod changes C̈ of another: nothing unless they share a point.
-    fn factors(&self, d: &Vectors<N>) -> Factors<N> {
+    pub(crate) fn factors(&self, d: &Vectors<N>) -> Factors<N> {
         let (mut rows, mut diagonal) = (Vec::new(), Vec::new());
         for (k, [a, b]) in self.ends.iter().enumerate() {
             let entry = |other: usize| self.shared(k, other).map(|w| w * dot(&d[k], &d[other]));
@@ -205,8 +226,16 @@ impl<N: Number> Rods<N> {
 
     /// What the pulls of the rods do to each point.
     fn pushed(&self, d: &Vectors<N>, pulls: &[N]) -> Vectors<N> {
+        let pulls: Vec<Option<N>> = pulls.iter().copied().map(Some).collect();
+        // `shape` has seen that each point has a rod.
+        self.pushed_by_some(d, &pulls).into_iter().map(Option::unwrap_or_default).collect()
+    }
+
+    /// The same of some pulls; `None` for points that do not feel any.
+    pub(crate) fn pushed_by_some(&self, d: &Vectors<N>, pulls: &[Option<N>]) -> Vec<Option<Vec<N>>> {
         let mut sums: Vec<Option<Vec<N>>> = vec![None; self.masses.len()];
         for (([a, b], span), pull) in self.ends.iter().zip(d).zip(pulls) {
+            let Some(pull) = pull else { continue };
             let along: Vec<N> = span.iter().map(|d| *pull * *d).collect();
             if self.is_point(*a) {
                 sums[*a] = Some(match &sums[*a] {
@@ -219,36 +248,37 @@ impl<N: Number> Rods<N> {
                 Some(sum) => sum.iter().zip(&along).map(|(sum, x)| *sum + *x).collect(),
             });
         }
-        // `shape` has seen that each point has a rod.
-        let each = |(sum, minus): (Option<Vec<N>>, &N)| sum.into_iter().flatten().map(|x| *minus * x).collect();
+        let each = |(sum, minus): (Option<Vec<N>>, &N)| sum.map(|sum| sum.into_iter().map(|x| *minus * x).collect());
         sums.into_iter().zip(&self.minus).map(each).collect()
     }
+}
 
+impl<N: Number> Rods<N> {
     /// A block, changed along the rods by what takes these errors away.
     fn moved(&self, block: &Block<N>, d: &Vectors<N>, off: Vec<N>) -> Block<N> {
-        let pushed = self.pushed(d, &self.factors(d).solve(off));
+        let pushed = self.links.pushed(d, &self.links.factors(d).solve(off));
         Block::from_iterator(block.len(), block.iter().zip(pushed.iter().flatten()).map(|(x, push)| *x + *push))
     }
 }
 
 impl<N: Number> System<N> for Rods<N> {
     fn dv(&self, _t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
-        let (d, u) = (self.spans(y), self.closing(v));
+        let (d, u) = (self.links.spans(y.as_slice()), self.links.closing(v.as_slice()));
         let mut right = Vec::with_capacity(d.len());
-        for (k, [first, _]) in self.ends.iter().enumerate() {
+        for (k, [first, _]) in self.links.ends.iter().enumerate() {
             let mut pull = self.h * dot(&u[k], &u[k]);
-            if !self.is_point(*first) {
-                pull -= self.fall * d[k][self.dim - 1];
+            if !self.links.is_point(*first) {
+                pull -= self.fall * d[k][self.links.dim - 1];
             }
             if let Keeps::Control { damping, stiffness } = self.keeps {
                 pull = (pull + damping * dot(&d[k], &u[k])) + stiffness * (dot(&d[k], &d[k]) - self.squares[k]);
             }
             right.push(pull);
         }
-        let pushed = self.pushed(&d, &self.factors(&d).solve(right));
+        let pushed = self.links.pushed(&d, &self.links.factors(&d).solve(right));
         let mut dv = Block::from_iterator(v.len(), pushed.into_iter().flatten());
-        for point in 0..self.masses.len() {
-            dv[(point + 1) * self.dim - 1] -= self.fall;
+        for point in 0..self.links.masses.len() {
+            dv[(point + 1) * self.links.dim - 1] -= self.fall;
         }
         dv
     }
@@ -266,27 +296,27 @@ impl<N: Number> System<N> for Rods<N> {
             return (v, y);
         }
         for _ in 0..CORRECTIONS {
-            let d = self.spans(&y);
+            let d = self.links.spans(y.as_slice());
             let off = d.iter().zip(&self.squares).map(|(d, square)| N::of(0.5) * (dot(d, d) - *square)).collect();
             y = self.moved(&y, &d, off);
         }
-        let d = self.spans(&y);
-        let off = d.iter().zip(self.closing(&v)).map(|(d, u)| dot(d, &u)).collect();
+        let d = self.links.spans(y.as_slice());
+        let off = d.iter().zip(self.links.closing(v.as_slice())).map(|(d, u)| dot(d, &u)).collect();
         (self.moved(&v, &d, off), y)
     }
 
     fn record(&self, quantity: &str, v: &Block<N>, y: &Block<N>) -> Option<Vec<N>> {
         match quantity {
             "length_error" => {
-                let (d, one) = (self.spans(y), N::of(1.0));
-                Some(vec![largest(d.iter().zip(&self.lengths).map(|(d, length)| dot(d, d).sqrt() / *length - one))])
+                let (d, one) = (self.links.spans(y.as_slice()), N::of(1.0));
+                Some(vec![largest(d.iter().zip(&self.links.lengths).map(|(d, length)| dot(d, d).sqrt() / *length - one))])
             }
             "angular_momentum" => {
                 let of = |(i, mass): (usize, &N)| {
-                    cross(self.at(y, i), self.at(v, i)).into_iter().map(|part| *mass * part).collect::<Vec<N>>()
+                    cross(self.links.at(y.as_slice(), i), self.links.at(v.as_slice(), i)).into_iter().map(|part| *mass * part).collect::<Vec<N>>()
                 };
                 let sum = |whole: Vec<N>, each: Vec<N>| whole.iter().zip(each).map(|(a, b)| *a + b).collect();
-                self.masses.iter().enumerate().map(of).reduce(sum)
+                self.links.masses.iter().enumerate().map(of).reduce(sum)
             }
             _ => None,
         }

@@ -1,6 +1,6 @@
 //! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
 //!
-//! The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is fused into the sum or the
+//! First increments are multiplied last ([`super::increments`]). Then products are fused. The choice is made on the tape and not by a compiler, so it is the same on every machine. A product is fused into the sum or the
 //! difference of which it is a term if
 //!
 //! - nothing else reads it, so that it vanishes, and
@@ -11,7 +11,36 @@
 //! Of two such products the one of the higher [`ranks`] is fused. The rank of a value depends on the graph of operations alone, not on the
 //! order in which the tape was written: both languages fuse the same products.
 
-use super::{Id, Op, Tape, print::named};
+use super::{Id, Op, Tape, increments::increments_last, print::named};
+
+/// What decides about the values of a tape that are needed for some others.
+pub(super) struct Facts {
+    pub needed: Vec<bool>,
+    /// How often each is read.
+    pub reads: Vec<u32>,
+    pub ranks: Vec<u32>,
+    /// Whether it depends on the step h.
+    pub of_step: Vec<bool>,
+}
+
+impl Facts {
+    pub fn new(tape: &Tape, roots: &[Id]) -> Facts {
+        let ops = tape.ops();
+        let needed = tape.needed(roots.iter().copied());
+        let mut reads = vec![0; ops.len()];
+        let mut of_step: Vec<bool> = Vec::with_capacity(ops.len());
+        roots.iter().for_each(|root| reads[*root as usize] += 1);
+        for (op, needed) in ops.iter().zip(&needed) {
+            let (operands, n) = op.operands();
+            of_step.push(*op == Op::Step || operands[..n].iter().any(|id| of_step[*id as usize]));
+            if *needed {
+                operands[..n].iter().for_each(|id| reads[*id as usize] += 1);
+            }
+        }
+        let ranks = ranks(ops, &needed);
+        Facts { needed, reads, ranks, of_step }
+    }
+}
 
 /// A number for each value that is needed. Values are sorted by the depth of their graph; equally deep ones by the name of the operation,
 /// by its constants, and by the ranks of its operands, which are sorted where the operation commutes.
@@ -44,18 +73,12 @@ fn ranks(ops: &[Op], needed: &[bool]) -> Vec<u32> {
     ranks
 }
 
-/// The same tape, with products fused into the sums that these values need.
+/// The same tape for these values, with fused multiply-adds, and the values on it.
 #[must_use]
-pub fn fuse(tape: &Tape, roots: &[Id]) -> Tape {
+pub fn fuse(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
+    let (tape, roots) = increments_last(tape, roots);
+    let Facts { needed, reads, ranks, .. } = Facts::new(&tape, &roots);
     let ops = tape.ops();
-    let needed = tape.needed(roots.iter().copied());
-    let mut reads = vec![0u32; ops.len()];
-    roots.iter().for_each(|root| reads[*root as usize] += 1);
-    for (op, _) in ops.iter().zip(&needed).filter(|(_, needed)| **needed) {
-        let (operands, n) = op.operands();
-        operands[..n].iter().for_each(|id| reads[*id as usize] += 1);
-    }
-    let ranks = ranks(ops, &needed);
     let is_higher = |a: Id, b: Id| ranks[a as usize] > ranks[b as usize];
     let product = |id: Id| match ops[id as usize] {
         Op::Mul(x, y) if reads[id as usize] == 1 && tape.is_of_state(id) => Some((x, y)),
@@ -76,5 +99,6 @@ pub fn fuse(tape: &Tape, roots: &[Id]) -> Tape {
         },
         _ => op,
     };
-    tape.rewritten(|id, op| if needed[id as usize] { fused(op) } else { op })
+    let made = tape.rewritten(|id, op| if needed[id as usize] { fused(op) } else { op });
+    (made, roots)
 }

@@ -8,6 +8,7 @@
 
 pub mod eval;
 pub mod fuse;
+mod increments;
 pub mod print;
 pub mod quick;
 pub mod split;

@@ -1,7 +1,7 @@
 //! Machine code, read back: that it touches nothing but its frame, and does nothing but arithmetic.
 
 use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
-use stepwell_core::kernel::x86::Written;
+use stepwell_core::kernel::writer::Written;
 
 /// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some.
 pub fn read(kernel: &Written, is_fused: bool) {

@@ -1,84 +1,36 @@
 //! Kernels that are written at run time: every bit as the interpreter has it, nothing touched that is not theirs, pages given back.
-#![cfg(target_arch = "x86_64")]
+#![cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_os = "linux")))]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
+#[cfg(target_arch = "x86_64")]
 mod code;
+mod inputs;
 mod process;
 mod random;
 
+use inputs::{Inputs, same, shape};
 use random::Random;
 use stepwell_core::{
     isa::Level,
     kernel::{
-        Kernel, Tile,
+        Kernel,
         interpret::Interpreter,
-        x86::{Shape, Written, choose, write},
+        writer::{Shape, Written, choose, write},
     },
     tape::{Op, split::Body},
 };
 
-/// Inputs of a kernel.
-#[derive(Clone)]
-struct Inputs {
-    state: Vec<f64>,
-    rows: Vec<f64>,
-    uniforms: Vec<f64>,
-    per_step: Vec<u64>,
-    held: Vec<f64>,
-    steps: usize,
-}
-
-impl Inputs {
-    fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs {
-        let mut numbers = |n: usize| (0..n).map(|_| random.number()).collect::<Vec<f64>>();
-        let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
-        let held = numbers(3 * lanes + 5);
-        let mut per_step: Vec<u64> = numbers(body.per_step * steps).into_iter().map(f64::to_bits).collect();
-        for op in &body.ops {
-            if let Op::Held(i) = *op {
-                per_step
-                    .iter_mut()
-                    .skip(i as usize)
-                    .step_by(body.per_step)
-                    .for_each(|at| *at = random.below(2 * lanes + 6) as u64);
-            }
-        }
-        Inputs { state, rows, uniforms, per_step, held, steps }
-    }
-
-    fn run(&self, kernel: &dyn Kernel, scratch: &mut Vec<f64>) -> Vec<f64> {
-        let mut state = self.state.clone();
-        let pool = kernel.pool(&self.uniforms);
-        kernel.run(
-            &mut Tile {
-                state: &mut state,
-                rows: &self.rows,
-                pool: &pool,
-                steps: self.steps,
-                per_step: &self.per_step,
-                held: &self.held,
-            },
-            scratch,
-        );
-        state
-    }
-}
-
 fn widths() -> Vec<(Level, usize)> {
-    let all = [(Level::Avx2, 1), (Level::Avx2, 4), (Level::Avx512, 1), (Level::Avx512, 4), (Level::Avx512, 8)];
+    let all = [
+        (Level::Neon, 1),
+        (Level::Neon, 2),
+        (Level::Avx2, 1),
+        (Level::Avx2, 4),
+        (Level::Avx512, 1),
+        (Level::Avx512, 4),
+        (Level::Avx512, 8),
+    ];
     all.into_iter().filter(|(level, _)| level.here()).collect()
-}
-
-fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
-    let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
-    let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
-    let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
-    Shape { level, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
-}
-
-/// The same bits, or both NaN.
-fn same(a: f64, b: f64) -> bool {
-    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
 
 /// Compares a random body in a random shape with the interpreter; returns on how many inputs.
@@ -99,6 +51,10 @@ fn one_case(seed: u64, read_code: bool) -> usize {
         shape(random, level, width)
     };
     let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
+    // On other CPUs the assembly is read: see `tests/aarch64`.
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = read_code;
+    #[cfg(target_arch = "x86_64")]
     if read_code {
         let is_fused = body.ops.iter().any(|op| matches!(op, Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..)));
         code::read(&kernel, is_fused);
@@ -136,7 +92,7 @@ fn oscillator() -> Body {
 }
 
 fn written(body: &Body) -> Written {
-    let (level, width) = *widths().last().expect("AVX2");
+    let (level, width) = *widths().last().expect("machine code");
     write(body, Shape { level, width, block_vectors: 2, interleaved: 2, blocks: 3, resident: true }).expect("a kernel")
 }
 
@@ -157,7 +113,7 @@ fn states_that_change_places_do() {
 
 #[test]
 fn what_is_no_body_is_not_written() {
-    let (level, width) = *widths().last().expect("AVX2");
+    let (level, width) = *widths().last().expect("machine code");
     let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
     let good = oscillator();
     assert!(write(&good, shape).is_some());
@@ -176,7 +132,7 @@ fn what_is_no_body_is_not_written() {
         Shape { block_vectors: 0, ..shape },
         Shape { interleaved: 0, ..shape },
         Shape { blocks: 0, ..shape },
-        Shape { width: 2, ..shape },
+        Shape { width: 3, ..shape },
         Shape { level: Level::Baseline, ..shape },
         Shape { blocks: usize::MAX / 2, ..shape },
         Shape { blocks: 1 << 26, ..shape },
@@ -214,7 +170,7 @@ fn four_threads_run_one_kernel() {
 #[test]
 fn long_rows_are_gone_through_once() {
     // One step over 100 000 numbers, as elementwise functions are.
-    let (level, width) = *widths().last().expect("AVX2");
+    let (level, width) = *widths().last().expect("machine code");
     let body = oscillator();
     let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 100_000 / width, resident: false };
     let inputs = Inputs::new(&mut Random(9), &body, shape.lanes(), 2);
@@ -224,7 +180,10 @@ fn long_rows_are_gone_through_once() {
 }
 
 /// Upwards, and small numbers are taken for zero, as operands and as results.
-const OTHER_ROUNDING: u32 = 0x4000 | 0x40 | 0x8000;
+#[cfg(target_arch = "x86_64")]
+const OTHER_ROUNDING: u64 = 0x4000 | 0x40 | 0x8000;
+#[cfg(target_arch = "aarch64")]
+const OTHER_ROUNDING: u64 = 1 << 22 | 1 << 24;
 
 /// A caller that rounds otherwise gets the same bits, and goes on rounding as it did.
 #[test]
@@ -275,11 +234,12 @@ fn a_trail_has_the_states_of_its_steps() {
         let mut all = Inputs { steps: 1, ..inputs };
         all.state.truncate(state * lanes);
         all.state.resize(trail.next.len() * lanes, 0.0);
-        let width = if lanes == 1 { 1 } else { 4 };
+        let (level, widest) = if Level::Neon.here() { (Level::Neon, 2) } else { (Level::Avx2, 4) };
+        let width = if lanes == 1 { 1 } else { widest };
         let block_vectors = random.one_of(&[1, lanes / width]);
         let blocks = lanes / width / block_vectors;
-        let shape = Shape { level: Level::Avx2, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
-        let written = Level::Avx2.here().then(|| write(&trail, shape).expect("a kernel"));
+        let shape = Shape { level, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
+        let written = level.here().then(|| write(&trail, shape).expect("a kernel"));
         let interpreter = Interpreter::new(&trail, lanes, Level::Baseline);
         for kernel in
             [Some(&interpreter as &dyn Kernel), written.as_ref().map(|kernel| kernel as &dyn Kernel)].into_iter().flatten()

@@ -6,19 +6,45 @@ use crate::{oscillator, written};
 use std::{env, process::Command};
 use stepwell_core::kernel::Kernel;
 
-/// Runs with rounding upwards and small numbers taken for zero, and tells how is rounded afterwards.
-#[allow(deprecated, reason = "there is no other way to set it")]
-pub fn with_other_rounding<T>(f: impl FnOnce() -> T) -> (T, u32) {
-    use std::arch::x86_64::{_mm_getcsr, _mm_setcsr};
-    // SAFETY: nothing between these depends on how is rounded but what is tested.
+/// How numbers are rounded.
+#[allow(deprecated, reason = "there is no other way to get it")]
+fn rounding() -> u64 {
+    // SAFETY: reads a register of this thread.
+    #[cfg(target_arch = "x86_64")]
     unsafe {
-        let before = _mm_getcsr();
-        _mm_setcsr(before | crate::OTHER_ROUNDING);
-        let made = f();
-        let after = _mm_getcsr();
-        _mm_setcsr(before);
-        (made, after)
+        u64::from(std::arch::x86_64::_mm_getcsr())
     }
+    // SAFETY: reads a register of this thread.
+    #[cfg(target_arch = "aarch64")]
+    unsafe {
+        let bits;
+        std::arch::asm!("mrs {}, fpcr", out(reg) bits);
+        bits
+    }
+}
+
+#[allow(deprecated, reason = "there is no other way to set it")]
+fn set_rounding(bits: u64) {
+    // SAFETY: the caller runs nothing that depends on it but what is tested.
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        std::arch::x86_64::_mm_setcsr(bits as u32);
+    }
+    // SAFETY: as above.
+    #[cfg(target_arch = "aarch64")]
+    unsafe {
+        std::arch::asm!("msr fpcr, {}", in(reg) bits);
+    }
+}
+
+/// Runs with rounding upwards and small numbers taken for zero, and tells how is rounded afterwards.
+pub fn with_other_rounding<T>(f: impl FnOnce() -> T) -> (T, u64) {
+    let before = rounding();
+    set_rounding(before | crate::OTHER_ROUNDING);
+    let made = f();
+    let after = rounding();
+    set_rounding(before);
+    (made, after)
 }
 
 #[cfg(target_os = "linux")]
@@ -55,7 +81,7 @@ fn pages_are_given_back_and_never_writable_and_executable() {
 #[cfg(target_os = "linux")]
 #[test]
 fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
-    use stepwell_core::kernel::x86::{Shape, write};
+    use stepwell_core::kernel::writer::{Shape, write};
     if env::var_os("STEPWELL_TEST_MDWE").is_none() {
         return again("process::where_pages_cannot_be_made_executable_there_is_no_kernel", "STEPWELL_TEST_MDWE");
     }
@@ -67,7 +93,7 @@ fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
         println!("this system has no PR_SET_MDWE");
         return;
     }
-    let (level, width) = *crate::widths().last().expect("AVX2");
+    let (level, width) = *crate::widths().last().expect("machine code");
     assert!(write(&oscillator(), Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true }).is_none());
     // What was there before goes on.
     let inputs = crate::Inputs::new(&mut crate::Random(1), &oscillator(), before.lanes(), 3);

@@ -201,13 +201,13 @@ fn a_tape_that_was_cut_has_them_as_well() {
         let roots: Vec<Id> = (0..STATES).map(|_| asked.any(random)).collect();
         let next: Vec<Id> = roots.iter().map(|root| place[*root as usize]).collect();
         // As it was asked for, or with fused multiply-adds, which are what the tape says.
-        let (tape, asked, roots) = if seed % 2 == 0 {
-            (tape, asked.ops, roots)
+        let (tape, asked, roots, next) = if seed % 2 == 0 {
+            (tape, asked.ops, roots, next)
         } else {
-            let tape = fuse(&tape, &next);
+            let (tape, next) = fuse(&tape, &next);
             fused += tape.ops().iter().filter(|op| matches!(op, Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..))).count();
             let ops = tape.ops().to_vec();
-            (tape, ops, next.clone())
+            (tape, ops, next.clone(), next)
         };
         let stage = Stage::new(split(&tape, &next, |i| i < COMMON, |input| input == 0));
         let bodies = [&stage.split.run, &stage.split.member, &stage.split.step, &stage.split.body];

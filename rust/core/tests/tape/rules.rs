@@ -344,7 +344,8 @@ fn fused(text: &str, also: &[&str]) -> String {
         tape.push(Op::State(i));
     }
     let roots: Vec<Id> = std::iter::once(&text).chain(also).map(|text| read(text, &mut |op| tape.push(op))).collect();
-    show(&fuse(&tape, &roots), roots[0])
+    let (tape, roots) = fuse(&tape, &roots);
+    show(&tape, roots[0])
 }
 
 #[test]
@@ -384,9 +385,11 @@ fn what_would_not_vanish_or_is_not_of_the_state_is_not_fused() {
     let [x, a, b] = [Op::State(0), Op::Param(0), Op::Param(1)].map(|op| tape.push(op));
     let product = tape.push(Op::Mul(a, b));
     let sum = tape.push(Op::Add(x, product));
-    assert_eq!(fuse(&tape, &[sum]).op(sum), Op::Add(x, product));
+    let (fused, made) = fuse(&tape, &[sum]);
+    assert!(matches!(fused.op(made[0]), Op::Add(..)));
     // Of the state is what is a parameter times it.
     let product = tape.push(Op::Mul(a, x));
     let sum = tape.push(Op::Add(b, product));
-    assert!(matches!(fuse(&tape, &[sum]).op(sum), Op::MulAdd(..)));
+    let (fused, made) = fuse(&tape, &[sum]);
+    assert!(matches!(fused.op(made[0]), Op::MulAdd(..)));
 }

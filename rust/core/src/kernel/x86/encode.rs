@@ -125,10 +125,6 @@ pub enum Operand {
     Memory(Memory),
 }
 
-/// A mark to jump back to.
-#[derive(Clone, Copy, Debug)]
-pub struct Mark(usize);
-
 /// Instructions, as bytes.
 #[derive(Debug)]
 pub struct Code {
@@ -235,7 +231,7 @@ impl Code {
     }
 
     /// Pads with nops, so that what follows stands at a multiple of 64 bytes: a loop then takes as few lines of the cache as it can.
-    pub fn align(&mut self) {
+    pub fn pad(&mut self) {
         while !self.bytes.len().is_multiple_of(64) {
             // Nops of up to eight bytes, as the manual recommends them.
             const NOPS: [&[u8]; 8] = [
@@ -253,25 +249,22 @@ impl Code {
         }
     }
 
-    pub fn mark(&self) -> Mark {
-        Mark(self.bytes.len())
-    }
-
     /// Counts down, and jumps back unless that makes zero.
-    pub fn count_down(&mut self, counter: General, to: Mark) {
+    pub fn decrement_and_jump(&mut self, counter: General, to: usize) {
         self.general(0xFF, 1, Operand::Register(counter as u8));
         let from = self.bytes.len() + 6;
         self.bytes.extend([0x0F, 0x85]);
-        self.bytes.extend((to.0 as i32 - from as i32).to_le_bytes());
+        self.bytes.extend((to as i32 - from as i32).to_le_bytes());
     }
 
     /// Keeps rbx, which belongs to the caller, and puts the argument there.
-    pub fn enter(&mut self) {
+    pub fn keep_rbx(&mut self, argument: General) {
         self.bytes.push(0x53);
-        self.move_general(General::Rbx, General::Rdi);
+        self.move_general(General::Rbx, argument);
     }
 
-    pub fn leave(&mut self) {
+    /// Gives rbx back, and returns.
+    pub fn end(&mut self) {
         self.bytes.extend([0xC5, 0xF8, 0x77]); // vzeroupper
         self.bytes.extend([0x5B, 0xC3]); // pop rbx, ret
     }

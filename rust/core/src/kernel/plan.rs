@@ -1,11 +1,11 @@
 //! Instruction selection: the instruction of each operation of a body, and the source of each leaf.
 //!
-//! **To add an operation**, give it a line in [`Plan::doing`]; if it is of a new kind, an arm in `write.rs` as well.
+//! Which instructions there are says the [`Machine`].
 
 use std::collections::HashMap;
 
-use super::encode::{self as x, Form};
-use crate::tape::{Id, Op, split::Body};
+use super::machine::Machine;
+use crate::tape::{Counts, Id, Op, split::Body};
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -33,37 +33,16 @@ impl Source {
     }
 }
 
-/// An instruction, or a few that belong together.
-#[derive(Clone, Copy, Debug)]
-pub enum Doing {
-    /// Of two values. Whether they may be exchanged.
-    Two(Form, bool),
-    /// Of one, with or without an immediate byte.
-    One(Form, Option<u8>),
-    /// A product and a sum, rounded once.
-    Fused(x::Fused),
-    /// Moves bits up or down.
-    Shift(u8, u8),
-    /// A mask of two values, by predicate.
-    Compare(u8),
-    /// By the bits of the first, of the second and the third. Whether the first is surely a mask: all bits of a number or none.
-    Select(bool),
-    /// The comparison of the first two by predicate chooses of the third and the fourth.
-    Pick(u8),
-    /// The same.
-    Copy,
-}
-
 /// An operation with its operands.
 #[derive(Clone, Copy, Debug)]
-pub struct Step {
-    pub doing: Doing,
+pub struct Step<D> {
+    pub doing: D,
     pub id: Id,
     of: [Id; 4],
     n: u8,
 }
 
-impl Step {
+impl<D> Step<D> {
     /// What it reads.
     pub fn of(&self) -> &[Id] {
         &self.of[..self.n as usize]
@@ -72,10 +51,10 @@ impl Step {
 
 /// A body as machine instructions.
 #[derive(Debug)]
-pub struct Plan {
+pub struct Plan<D> {
     /// Of each value where it comes from.
     pub sources: Vec<Source>,
-    pub steps: Vec<Step>,
+    pub steps: Vec<Step<D>>,
     /// What replaces each number of the state; none if it stays.
     pub next: Vec<Option<Id>>,
     /// The value of each number of the state before the step, if it is read.
@@ -85,24 +64,9 @@ pub struct Plan {
     pub per_step: usize,
 }
 
-const LESS: u8 = 0x11;
-const LESS_EQUAL: u8 = 0x12;
-const EQUAL: u8 = 0;
-/// Round down, without raising the inexact flag.
-const FLOOR: u8 = 9;
-
-/// The predicate that says the same of two values in the other order.
-pub fn turned(predicate: u8) -> u8 {
-    match predicate {
-        LESS => 0x1E,
-        LESS_EQUAL => 0x1D,
-        other => other,
-    }
-}
-
-impl Plan {
+impl<D: Copy> Plan<D> {
     /// None if it is not a valid body: everything here and in the writer relies on its form.
-    pub fn new(body: &Body, evex: bool) -> Option<Plan> {
+    pub fn new<M: Machine<Doing = D>>(body: &Body, machine: &M) -> Option<Plan<D>> {
         if !is_sound(body) {
             return None;
         }
@@ -137,28 +101,32 @@ impl Plan {
             }
         }
         let masks = masks(body);
-        let fused = if evex { fused(body) } else { vec![false; body.ops.len()] };
-        let mut sign: Option<Id> = None;
-        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && !fused[*id]) {
+        let adds_doubles = has_more_products(body);
+        let picks = picks(body, machine);
+        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && picks[*id].is_none()) {
             let ([a, b, c], n) = op.with(|operand| same[operand as usize]).operands();
             let (doing, of, n) = match *op {
-                Op::Neg(_) => {
-                    let sign = *sign.get_or_insert_with(|| {
-                        let source = plan.constant(1 << 63, body.uniforms);
-                        *known.entry(source).or_insert_with(|| {
+                Op::Neg(_) => match machine.negate() {
+                    (doing, None) => (doing, [a, 0, 0, 0], 1),
+                    (doing, Some(bits)) => {
+                        let source = plan.constant(bits, body.uniforms);
+                        let constant = *known.entry(source).or_insert_with(|| {
                             plan.sources.push(source);
                             plan.sources.len() as Id - 1
-                        })
-                    });
-                    (Doing::Two(x::XOR, true), [a, sign, 0, 0], 2)
-                }
-                Op::Select(m, ..) if fused[m as usize] => {
-                    let comparison = body.ops[m as usize].with(|operand| same[operand as usize]);
-                    let [p, q, _] = comparison.operands().0;
-                    (Doing::Pick(predicate(comparison)), [p, q, b, c], 4)
-                }
-                Op::Select(m, ..) => (Doing::Select(masks[m as usize]), [a, b, c, 0], 3),
-                other => (Plan::doing(other), [a, b, c, 0], n as u8),
+                        });
+                        (doing, [a, constant, 0, 0], 2)
+                    }
+                },
+                Op::Select(m, ..) => match picks[m as usize] {
+                    Some(doing) => {
+                        let [p, q, _] = body.ops[m as usize].with(|operand| same[operand as usize]).operands().0;
+                        (doing, [p, q, b, c], 4)
+                    }
+                    None => (machine.select(masks[m as usize]), [a, b, c, 0], 3),
+                },
+                Op::Mul(..) if adds_doubles && is_two(body, a) => (machine.doing(Op::Add(b, b)), [b, b, 0, 0], 2),
+                Op::Mul(..) if adds_doubles && is_two(body, b) => (machine.doing(Op::Add(a, a)), [a, a, 0, 0], 2),
+                other => (machine.doing(other), [a, b, c, 0], n as u8),
             };
             plan.steps.push(Step { doing, id: id as Id, of, n });
         }
@@ -172,32 +140,6 @@ impl Plan {
         Some(plan)
     }
 
-    /// The instruction of an operation. Those that depend on their neighbours are not here.
-    fn doing(op: Op) -> Doing {
-        match op {
-            Op::Add(..) => Doing::Two(x::ADD, true),
-            Op::Sub(..) => Doing::Two(x::SUB, false),
-            Op::Mul(..) => Doing::Two(x::MUL, true),
-            Op::Div(..) => Doing::Two(x::DIV, false),
-            Op::MulAdd(..) => Doing::Fused(x::MUL_ADD),
-            Op::MulSub(..) => Doing::Fused(x::MUL_SUB),
-            Op::SubMul(..) => Doing::Fused(x::SUB_MUL),
-            Op::And(..) => Doing::Two(x::AND, true),
-            Op::Or(..) => Doing::Two(x::OR, true),
-            Op::Xor(..) => Doing::Two(x::XOR, true),
-            Op::AddBits(..) => Doing::Two(x::ADD_BITS, true),
-            Op::Sqrt(_) => Doing::One(x::SQRT, None),
-            Op::Floor(_) => Doing::One(x::ROUND, Some(FLOOR)),
-            Op::ShiftUp(_, n) => Doing::Shift(x::UP, n as u8),
-            Op::ShiftDown(_, n) => Doing::Shift(x::DOWN, n as u8),
-            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => Doing::Compare(predicate(op)),
-            // Operations that depend on their neighbours, and leaves, get a default here.
-            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
-            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
-            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
-        }
-    }
-
     /// A constant of the pool; until it is known how many there are, they are numbered behind the uniforms.
     fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
         let at = self.constants.iter().position(|known| *known == bits).unwrap_or_else(|| {
@@ -208,12 +150,15 @@ impl Plan {
     }
 }
 
-fn predicate(comparison: Op) -> u8 {
-    match comparison {
-        Op::Less(..) => LESS,
-        Op::LessEqual(..) => LESS_EQUAL,
-        _ => EQUAL,
-    }
+fn is_two(body: &Body, id: Id) -> bool {
+    body.ops[id as usize] == Op::Const(2f64.to_bits())
+}
+
+/// Whether there are more products than sums. Some CPUs have units for sums beside those for products; 2·x is x + x in every bit.
+fn has_more_products(body: &Body) -> bool {
+    let mut counts = Counts::default();
+    body.ops.iter().for_each(|op| counts.note(*op));
+    counts.multiplications + counts.fused > counts.additions
 }
 
 /// Whether it is what a [`Body`] says it is, and of operations that are known here.
@@ -256,8 +201,8 @@ fn masks(body: &Body) -> Vec<bool> {
     masks
 }
 
-/// For each value whether it is a comparison that is used by one choice only. Both are then computed together, with a mask register.
-fn fused(body: &Body) -> Vec<bool> {
+/// For each value that is a comparison and used by one choice only: the instruction that does both, if there is one.
+fn picks<M: Machine>(body: &Body, machine: &M) -> Vec<Option<M::Doing>> {
     let mut uses = vec![0u32; body.ops.len()];
     let mut chooses = vec![false; body.ops.len()];
     for op in &body.ops {
@@ -269,5 +214,9 @@ fn fused(body: &Body) -> Vec<bool> {
     }
     body.next.iter().for_each(|id| uses[*id as usize] += 1);
     let is_comparison = |op: &Op| matches!(op, Op::Less(..) | Op::LessEqual(..) | Op::Equal(..));
-    (0..body.ops.len()).map(|id| chooses[id] && uses[id] == 1 && is_comparison(&body.ops[id])).collect()
+    let pick = |id: usize| {
+        let op = &body.ops[id];
+        (chooses[id] && uses[id] == 1 && is_comparison(op)).then(|| machine.pick(*op)).flatten()
+    };
+    (0..body.ops.len()).map(pick).collect()
 }

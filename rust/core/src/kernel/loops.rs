@@ -1,34 +1,25 @@
 //! The whole function: what is kept in registers, and the loops over steps and blocks around one step.
 
 use super::{
-    Shape,
-    encode::{Code, General, Mark, Memory},
+    machine::{Base, Counter, Machine},
     plan::{Plan, Source},
-    write::{ARGUMENTS, BLOCKS, HELD, PER_STEP, POOL, ROWS, SCRATCH, STATE, STEPS, Value, Where, Writer},
-};
-use crate::{
-    isa::Level,
-    kernel::{
-        pages::place,
-        registers::{Registers, Uses},
-    },
+    registers::{Registers, Uses},
+    shape::Shape,
+    write::{Value, Where, Writer},
 };
 
 /// The code of a plan in a shape, and how many vectors of scratch it needs. None if it cannot be done with the registers there are.
-pub fn function(plan: &Plan, shape: Shape) -> Option<(Vec<u8>, usize)> {
-    let mut writer = Writer::new(plan, shape);
+pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape) -> Option<(Vec<u8>, usize)> {
+    let mut writer = Writer::new(plan, code, shape);
     let pinned = writer.share_out();
     writer.code.enter();
-    writer.arguments();
     if shape.resident {
         writer.steps_inside(&pinned)?;
     } else {
         writer.blocks_inside(&pinned)?;
     }
-    let code = &mut writer.code;
-    code.set_rounding(Memory::new(ARGUMENTS, place::ROUNDING));
-    code.leave();
-    Some((std::mem::take(&mut code.bytes), writer.slots as usize))
+    writer.code.leave();
+    Some((writer.code.take_bytes(), writer.slots as usize))
 }
 
 /// What stays in a register for the whole of the inner loop.
@@ -47,9 +38,8 @@ struct Pressure {
     reads: Vec<u32>,
 }
 
-impl<'a> Writer<'a> {
-    fn new(plan: &'a Plan, shape: Shape) -> Writer<'a> {
-        let evex = shape.level == Level::Avx512;
+impl<'a, M: Machine> Writer<'a, M> {
+    fn new(plan: &'a Plan<M::Doing>, code: M, shape: Shape) -> Writer<'a, M> {
         let values = plan.sources.len() * shape.block_vectors;
         let mut replaces = vec![None; plan.sources.len()];
         for (s, id) in plan.next.iter().enumerate() {
@@ -67,7 +57,7 @@ impl<'a> Writer<'a> {
             plan,
             shape,
             order,
-            code: Code { bytes: Vec::with_capacity(16 * plan.steps.len() * shape.block_vectors + 512), evex, width: shape.width },
+            code,
             registers: Registers::new(shape.registers() as u8, values),
             uses: Uses::new(values),
             memory: plan.sources.iter().flat_map(|source| std::iter::repeat_n(leaf(source), shape.block_vectors)).collect(),
@@ -175,29 +165,10 @@ impl<'a> Writer<'a> {
         pinned
     }
 
-    fn arguments(&mut self) {
-        let code = &mut self.code;
-        code.keep_rounding(Memory::new(ARGUMENTS, place::ROUNDING));
-        code.set_rounding(Memory::new(ARGUMENTS, place::ROUNDING + 4));
-        let arguments = [
-            (STATE, place::STATE),
-            (ROWS, place::ROWS),
-            (POOL, place::POOL),
-            (HELD, place::HELD),
-            (SCRATCH, place::SCRATCH),
-            (PER_STEP, place::PER_STEP),
-            (STEPS, place::STEPS),
-        ];
-        for (register, at) in arguments {
-            code.load_general(register, Memory::new(ARGUMENTS, at));
-        }
-    }
-
     /// Block after block, each over all steps: the state stays in registers.
     fn steps_inside(&mut self, pinned: &Pinned) -> Option<()> {
         let next_block = self.blocks();
-        self.code.load_general(PER_STEP, Memory::new(ARGUMENTS, place::PER_STEP));
-        self.code.load_general(STEPS, Memory::new(ARGUMENTS, place::STEPS));
+        self.code.rewind();
         for &(s, vector, register) in &pinned.state {
             if let Some(old) = self.plan.old[s as usize] {
                 let value = self.value(old, vector);
@@ -206,10 +177,10 @@ impl<'a> Writer<'a> {
         }
         self.load_leaves(pinned);
         self.code.align();
-        let next_step = self.code.mark();
+        let next_step = self.code.here();
         self.step()?;
-        self.code.add_general(PER_STEP, 8 * self.plan.per_step as i32);
-        self.code.count_down(STEPS, next_step);
+        self.code.advance(Base::PerStep, 8 * self.plan.per_step as i32);
+        self.code.count_down(Counter::Steps, next_step);
         for &(s, vector, register) in &pinned.state {
             if let Some(next) = self.plan.next[s as usize] {
                 let value = self.value(next, vector);
@@ -223,29 +194,29 @@ impl<'a> Writer<'a> {
 
     /// Step after step, each over all blocks: the state passes through registers.
     fn blocks_inside(&mut self, pinned: &Pinned) -> Option<()> {
-        let next_step = self.code.mark();
+        let next_step = self.code.here();
         self.load_leaves(pinned);
         let next_block = self.blocks();
         self.step()?;
         self.move_on(1);
         self.end_of_blocks(next_block);
         self.move_on(-(self.shape.blocks as i32));
-        self.code.add_general(PER_STEP, 8 * self.plan.per_step as i32);
-        self.code.count_down(STEPS, next_step);
+        self.code.advance(Base::PerStep, 8 * self.plan.per_step as i32);
+        self.code.count_down(Counter::Steps, next_step);
         Some(())
     }
 
-    fn blocks(&mut self) -> Mark {
+    fn blocks(&mut self) -> usize {
         if self.shape.blocks > 1 {
-            self.code.set_general(BLOCKS, self.shape.blocks as i32);
+            self.code.count_blocks(self.shape.blocks as i32);
         }
         self.code.align();
-        self.code.mark()
+        self.code.here()
     }
 
-    fn end_of_blocks(&mut self, next_block: Mark) {
+    fn end_of_blocks(&mut self, next_block: usize) {
         if self.shape.blocks > 1 {
-            self.code.count_down(BLOCKS, next_block);
+            self.code.count_down(Counter::Blocks, next_block);
         }
     }
 
@@ -255,13 +226,13 @@ impl<'a> Writer<'a> {
         if self.shape.blocks > 1 {
             let sources = &self.plan.sources;
             let reads = |kind: fn(&Source) -> bool| sources.iter().any(kind);
-            let moves: [(General, bool); 3] = [
-                (STATE, true),
-                (ROWS, reads(|source| matches!(source, Source::Row(_)))),
-                (HELD, reads(|source| matches!(source, Source::Held(_)))),
+            let moves: [(Base, bool); 3] = [
+                (Base::State, true),
+                (Base::Rows, reads(|source| matches!(source, Source::Row(_)))),
+                (Base::Held, reads(|source| matches!(source, Source::Held(_)))),
             ];
-            for (register, is_read) in moves {
-                self.code.add_general(register, if is_read { bytes } else { 0 });
+            for (base, is_read) in moves {
+                self.code.advance(base, if is_read { bytes } else { 0 });
             }
         }
     }

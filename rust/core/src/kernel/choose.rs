@@ -3,7 +3,7 @@
 //! A vector unit is busy when there are enough independent operations. One vector has few of them: a step is mostly one long
 //! dependency chain. So several vectors are interleaved: the longer the chain in comparison with the work, the more.
 
-use super::Shape;
+use super::shape::Shape;
 use crate::{
     isa::Level,
     tape::{Op, split::Body},
@@ -26,6 +26,7 @@ pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     let width = match level {
         _ if lanes == 1 => 1,
         Level::Avx512 => 8,
+        Level::Neon => 2,
         _ => 4,
     };
     let fits = level > Level::Baseline && lanes.is_multiple_of(width);
@@ -47,6 +48,7 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
     let width = match (level, members) {
         (_, 0..=1) => 1,
         (Level::Avx512, 5..) => 8,
+        (Level::Neon, _) => 2,
         _ => 4,
     };
     let vectors = members.div_ceil(width).max(1);
@@ -54,7 +56,7 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
     // A step of few operations takes less time than loading and storing its state: the state stays in registers. AVX2 has too few
     // registers for all of it, but some help; and out-of-order execution overlaps such short steps, so that vectors need not be
     // interleaved.
-    let (most, interleaved) = if level == Level::Avx512 { (24, 4) } else { (40, 1) };
+    let (most, interleaved) = if level == Level::Avx2 { (40, 1) } else { (24, 4) };
     // A single vector would wait for its state to pass through memory.
     if vectors == 1 || body.work() <= 5 * changed && 2 * changed <= most {
         let block_vectors = evenly(vectors, (most / changed).clamp(1, 20));
@@ -99,10 +101,11 @@ fn interleaving(body: &Body, level: Level) -> usize {
         work += cost;
         longest = longest.max(after[id]);
     }
-    // Fitted to the fastest numbers on the scenes of the benchmarks. With 16 registers more than five vectors cause spills.
+    // Fitted to the fastest numbers on the scenes of the benchmarks. With 16 registers more than five vectors cause spills. NEON has as
+    // many registers as AVX-512 and is taken to be like it: it was not measured.
     match level {
-        Level::Avx512 => (3.8 * longest / work - 1.3).round().clamp(1.0, 6.0) as usize,
-        _ => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
+        Level::Avx2 => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
+        _ => (3.8 * longest / work - 1.3).round().clamp(1.0, 6.0) as usize,
     }
 }
 

@@ -1,0 +1,94 @@
+"""Labels that stand beside their curves in place of a legend, and never on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._checks import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Places that are tried along a curve, points of a curve that a label should not cover, and pixels from a curve to its label.
+ANCHORS, POINTS, GAP = 24, 240, 7.0
+
+#: Air on each side of a label, in pixels.
+AIR = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A curve's name: its points in the units of the axes, shape (n, 2), and the keywords of the text."""
+
+    text: str
+    points: Array
+    style: dict[str, Any]
+
+
+def beside(axes: Axes, labels: Sequence[Label]) -> list[str]:
+    """Put each label where it covers least, the first ones first; those for which there is no room are returned.
+
+    The axes must have their final limits. A label lies within the axes and overlaps no other.
+    """
+    figure: Any = axes.get_figure()
+    renderer = figure.canvas.get_renderer()
+    frame = axes.get_window_extent(renderer)
+    curves = [_pixels(axes, label.points) for label in labels]
+    covered = np.concatenate([_dense(curve, POINTS) for curve in curves] or [np.empty((0, 2))])
+    taken: list[Any] = [tuple(text.get_window_extent(renderer).extents) for text in axes.texts if text.get_text()]
+    left: list[str] = []
+    for label, curve in zip(labels, curves, strict=True):
+        text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **label.style)
+        size = text.get_window_extent(renderer)
+        width, height = size.width + 2 * AIR, size.height + 2 * AIR
+        best: tuple[float, float, float] | None = None
+        inside = curve[
+            (curve[:, 0] >= frame.x0) & (curve[:, 0] <= frame.x1) & (curve[:, 1] >= frame.y0) & (curve[:, 1] <= frame.y1)
+        ]
+        for place, (x, y) in enumerate(_dense(inside, ANCHORS)[::-1]):
+            for dx, dy in ((0.0, -0.5), (0.0, -1.0), (0.0, 0.0), (-1.0, -0.5), (-1.0, 0.0), (-1.0, -1.0)):
+                low_x = x + (GAP if dx == 0.0 else -GAP) + dx * width
+                low_y = y + dy * height + GAP * (2.0 * dy + 1.0)
+                box = (low_x, low_y, low_x + width, low_y + height)
+                out = box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1
+                if out or any(_overlap(box, other) for other in taken):
+                    continue
+                hidden = (covered[:, 0] > box[0]) & (covered[:, 0] < box[2]) & (covered[:, 1] > box[1]) & (covered[:, 1] < box[3])
+                cost = float(hidden.sum()) + 0.2 * place  # the fine end of a curve is where curves are farthest apart
+                if best is None or cost < best[0]:
+                    best = (cost, low_x, low_y)
+        if best is None:
+            text.remove()
+            left.append(label.text)
+            continue
+        _, low_x, low_y = best
+        taken.append((low_x, low_y, low_x + width, low_y + height))
+        at = axes.transData.inverted().transform((low_x + AIR, low_y + AIR))
+        text.set_transform(axes.transData)
+        text.set_position((float(at[0]), float(at[1])))
+    return left
+
+
+def _pixels(axes: Axes, points: Array) -> Array:
+    """The points of a curve on the page, without those that cannot be drawn."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if axes.get_yscale() == "log":
+        finite = finite[finite[:, 1] > 0.0]
+    return np.asarray(axes.transData.transform(finite)) if len(finite) else np.empty((0, 2))
+
+
+def _dense(curve: Array, number: int) -> Array:
+    """So many points at equal distances along a curve."""
+    if len(curve) < 2:
+        return curve
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve, axis=0).T))])
+    at = np.linspace(0.0, way[-1], number)
+    return np.stack([np.interp(at, way, curve[:, 0]), np.interp(at, way, curve[:, 1])], axis=1)
+
+
+def _overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

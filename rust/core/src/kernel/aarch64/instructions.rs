@@ -1,0 +1,254 @@
+//! The instructions of NEON for the operations of a tape.
+//!
+//! Operands are in registers, and most instructions have a register of its own for the result.
+//!
+//! **To add an operation**, give it a line in `doing`; if it is of a new kind, an arm in `make` as well.
+
+use super::encode::{self as n, Code, Form, General};
+use crate::{
+    kernel::{
+        frame::place,
+        machine::{Base, Counter, Machine, Place},
+        plan::Step,
+        shape::Shape,
+        write::{Value, Writer},
+    },
+    tape::Op,
+};
+
+/// An instruction, or a few that belong together.
+#[derive(Clone, Copy, Debug)]
+pub enum Doing {
+    /// Of two values.
+    Two(Form),
+    /// Of two values, the second first.
+    Turned(Form),
+    /// Of one.
+    One(Form),
+    /// a · b + c, rounded once.
+    MulAdd,
+    /// a · b − c
+    MulSub,
+    /// c − a · b
+    SubMul,
+    /// By the bits of the first, of the second and the third.
+    Select,
+    /// The same.
+    Copy,
+}
+
+const ARGUMENTS: General = General(0);
+const STEPS: General = General(7);
+const BLOCKS: General = General(9);
+/// How the caller rounds.
+const ROUNDING: General = General(10);
+/// Registers for an address, and for an offset that does not fit into an instruction.
+const ADDRESS: General = General(17);
+const SPARE: General = General(16);
+
+/// The general register of a pointer. All are the callee's to use.
+fn pointer(base: Base) -> General {
+    General(match base {
+        Base::State => 1,
+        Base::Rows => 2,
+        Base::Pool => 3,
+        Base::PerStep => 4,
+        Base::Held => 5,
+        Base::Scratch => 6,
+    })
+}
+
+impl Machine for Code {
+    type Doing = Doing;
+
+    // A jump reaches 2²⁷ bytes. An operation takes at most 23 instructions, 92 bytes: four for each of its operands and its result, four
+    // for a value that it spills, and three of its own.
+    const MOST_OPERATIONS: usize = 1 << 20;
+
+    fn new(shape: Shape, instructions: usize) -> Code {
+        Code { bytes: Vec::with_capacity(8 * instructions + 512), width: shape.width }
+    }
+
+    fn doing(&self, op: Op) -> Doing {
+        match op {
+            Op::Add(..) => Doing::Two(n::ADD),
+            Op::Sub(..) => Doing::Two(n::SUB),
+            Op::Mul(..) => Doing::Two(n::MUL),
+            Op::Div(..) => Doing::Two(n::DIV),
+            Op::MulAdd(..) => Doing::MulAdd,
+            Op::MulSub(..) => Doing::MulSub,
+            Op::SubMul(..) => Doing::SubMul,
+            Op::And(..) => Doing::Two(n::AND),
+            Op::Or(..) => Doing::Two(n::OR),
+            Op::Xor(..) => Doing::Two(n::XOR),
+            Op::AddBits(..) => Doing::Two(n::ADD_BITS),
+            Op::Sqrt(_) => Doing::One(n::SQRT),
+            Op::Floor(_) => Doing::One(n::FLOOR),
+            Op::ShiftUp(_, places) => Doing::One(n::shift_up(places)),
+            Op::ShiftDown(_, 0) => Doing::Copy,
+            Op::ShiftDown(_, places) => Doing::One(n::shift_down(places)),
+            Op::Less(..) => Doing::Turned(n::GREATER),
+            Op::LessEqual(..) => Doing::Turned(n::GREATER_EQUAL),
+            Op::Equal(..) => Doing::Two(n::EQUAL),
+            // What is not asked for gets a default here.
+            Op::Copy(_) | Op::Neg(_) | Op::Select(..) => Doing::Copy,
+            Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => Doing::Copy,
+            Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => Doing::Copy,
+        }
+    }
+
+    fn negate(&self) -> (Doing, Option<u64>) {
+        (Doing::One(n::NEG), None)
+    }
+
+    fn select(&self, _is_mask: bool) -> Doing {
+        Doing::Select
+    }
+
+    fn pick(&self, _comparison: Op) -> Option<Doing> {
+        None
+    }
+
+    fn make(writer: &mut Writer<Code>, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
+        let mut registers = [0; 3];
+        for (register, value) in registers.iter_mut().zip(of) {
+            *register = writer.fetch(*value)?;
+        }
+        let [a, b, c] = registers;
+        match step.doing {
+            Doing::MulAdd if writer.shape.width == 2 => writer.fused(n::ADD_PRODUCT, false, step.id, vector, of),
+            Doing::MulSub if writer.shape.width == 2 => writer.fused(n::ADD_PRODUCT, true, step.id, vector, of),
+            Doing::SubMul if writer.shape.width == 2 => writer.fused(n::SUB_PRODUCT, false, step.id, vector, of),
+            Doing::Select => {
+                let to = writer.result_over(step.id, vector, of, of, &[])?;
+                let code = &mut writer.code;
+                match to {
+                    _ if to == b && to != a => code.three(n::INSERT_WHERE_NOT, to, c, a),
+                    _ if to == c && to != a => code.three(n::INSERT_WHERE, to, b, a),
+                    _ => {
+                        if to != a {
+                            code.move_vector(to, a);
+                        }
+                        code.three(n::CHOOSE, to, b, c);
+                    }
+                }
+                Some(to)
+            }
+            doing => {
+                let to = writer.result(step.id, vector, of)?;
+                let code = &mut writer.code;
+                match doing {
+                    Doing::Two(form) => code.three(form, to, a, b),
+                    Doing::Turned(form) => code.three(form, to, b, a),
+                    Doing::One(form) => code.two(form, to, a),
+                    Doing::MulAdd => code.fused(n::MUL_ADD, to, a, b, c),
+                    Doing::MulSub => code.fused(n::MUL_SUB, to, a, b, c),
+                    Doing::SubMul => code.fused(n::SUB_MUL, to, a, b, c),
+                    Doing::Copy | Doing::Select if to == a => {}
+                    Doing::Copy | Doing::Select => code.move_vector(to, a),
+                }
+                Some(to)
+            }
+        }
+    }
+
+    fn load(&mut self, register: u8, from: Place) {
+        let mut base = pointer(from.base);
+        if let Some(entry) = from.held {
+            self.load_general(ADDRESS, pointer(Base::PerStep), entry * 8, SPARE);
+            self.add_numbers(ADDRESS, base, ADDRESS);
+            base = ADDRESS;
+        }
+        self.load_vector(register, base, from.at as u32, from.one, SPARE);
+        if from.one && self.width > 1 {
+            self.spread(register, register);
+        }
+    }
+
+    fn store(&mut self, register: u8, to: Place) {
+        self.store_vector(register, pointer(to.base), to.at as u32, SPARE);
+    }
+
+    fn copy(&mut self, to: u8, from: u8) {
+        self.move_vector(to, from);
+    }
+
+    fn enter(&mut self) {
+        self.keep_vectors();
+        self.get_rounding(ROUNDING);
+        self.round_to_nearest();
+        let arguments = [
+            (Base::State, place::STATE),
+            (Base::Rows, place::ROWS),
+            (Base::Pool, place::POOL),
+            (Base::Held, place::HELD),
+            (Base::Scratch, place::SCRATCH),
+        ];
+        for (base, at) in arguments {
+            self.load_general(pointer(base), ARGUMENTS, at as u32, SPARE);
+        }
+        self.rewind();
+    }
+
+    fn leave(&mut self) {
+        self.set_rounding(ROUNDING);
+        self.restore_vectors();
+        self.end();
+    }
+
+    fn rewind(&mut self) {
+        self.load_general(pointer(Base::PerStep), ARGUMENTS, place::PER_STEP as u32, SPARE);
+        self.load_general(STEPS, ARGUMENTS, place::STEPS as u32, SPARE);
+    }
+
+    fn advance(&mut self, base: Base, bytes: i32) {
+        self.add_general(pointer(base), bytes, SPARE);
+    }
+
+    fn count_blocks(&mut self, blocks: i32) {
+        self.set_general(BLOCKS, blocks as u32);
+    }
+
+    fn align(&mut self) {
+        self.pad();
+    }
+
+    fn here(&self) -> usize {
+        self.bytes.len()
+    }
+
+    fn count_down(&mut self, of: Counter, to: usize) {
+        let counter = match of {
+            Counter::Steps => STEPS,
+            Counter::Blocks => BLOCKS,
+        };
+        self.decrement_and_jump(counter, to);
+    }
+
+    fn take_bytes(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
+    }
+}
+
+impl Writer<'_, Code> {
+    /// Of vectors, the sum overwrites its term, which may have to change its sign before: the factors must then be elsewhere.
+    fn fused(&mut self, word: u32, negated: bool, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
+        let &[a, b, c] = of else { return None };
+        let term = self.registers.of(c)?;
+        let (first, second) = (self.registers.of(a)?, self.registers.of(b)?);
+        let mut apart = [first, second];
+        if !negated {
+            // A product of the term itself is added to it as any other: all operands are read before the result is written. The place of
+            // the other factor is no place for it.
+            apart = [first, second].map(|factor| if factor != term { factor } else { u8::MAX });
+        }
+        let to = self.result_over(id, vector, of, &[c], &apart)?;
+        if negated {
+            self.code.two(n::NEG, to, term);
+        } else if to != term {
+            self.code.move_vector(to, term);
+        }
+        self.code.overwrite(word, to, first, second);
+        Some(to)
+    }
+}

@@ -1,0 +1,10 @@
+//! Machine code for AArch64, with NEON: vectors of two numbers.
+//!
+//! [`instructions`] selects them for operations, [`encode`] has their bytes.
+
+#[allow(
+    missing_docs,
+    reason = "instructions and registers have the names of what they do; tests compare them with an assembler's"
+)]
+pub mod encode;
+mod instructions;

@@ -1,0 +1,56 @@
+//! What the code of a kernel is called with, and what it may touch.
+
+use crate::tape::split::Body;
+
+/// What a kernel is called with: the start of each thing it may touch. The layout is known to the writers.
+#[repr(C)]
+pub(super) struct Arguments {
+    pub state: *mut f64,
+    pub rows: *const f64,
+    pub pool: *const f64,
+    pub per_step: *const u64,
+    pub held: *const f64,
+    pub scratch: *mut f64,
+    pub steps: u64,
+    /// How the caller rounds, and how numbers are rounded here: to nearest, subnormal numbers as they are, no traps.
+    pub rounding: [u32; 2],
+}
+
+/// The place of each argument, in bytes.
+#[allow(missing_docs, reason = "they have the names of what is there")]
+pub(super) mod place {
+    use super::Arguments;
+    use std::mem::offset_of;
+
+    pub const STATE: i32 = offset_of!(Arguments, state) as i32;
+    pub const ROWS: i32 = offset_of!(Arguments, rows) as i32;
+    pub const POOL: i32 = offset_of!(Arguments, pool) as i32;
+    pub const PER_STEP: i32 = offset_of!(Arguments, per_step) as i32;
+    pub const HELD: i32 = offset_of!(Arguments, held) as i32;
+    pub const SCRATCH: i32 = offset_of!(Arguments, scratch) as i32;
+    pub const STEPS: i32 = offset_of!(Arguments, steps) as i32;
+    pub const ROUNDING: i32 = offset_of!(Arguments, rounding) as i32;
+}
+
+/// What the code of a kernel may touch, in numbers.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The sizes of a tile, and which entries of the table of the steps are places of rows.
+    pub body: Body,
+    /// How long rows are.
+    pub lanes: usize,
+    /// The size of the pool.
+    pub pool: usize,
+    /// Size of the spill area, which begins at a multiple of 64 bytes.
+    pub scratch: usize,
+    /// A pool that is read by whole vectors of so many numbers is copied to where no vector lies across two lines of the cache.
+    pub aligned_pool: bool,
+}
+
+impl Frame {
+    /// For a body. Of its operations only those that name places matter.
+    pub fn new(body: &Body, lanes: usize) -> Frame {
+        let ops = body.ops.iter().copied().filter(|op| matches!(op, crate::tape::Op::Held(_))).collect();
+        Frame { body: Body { ops, ..body.clone() }, lanes, pool: 0, scratch: 0, aligned_pool: false }
+    }
+}

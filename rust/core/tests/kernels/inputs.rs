@@ -1,0 +1,70 @@
+//! Random shapes and inputs of kernels.
+
+use crate::random::Random;
+use stepwell_core::{
+    isa::Level,
+    kernel::{Kernel, Tile, writer::Shape},
+    tape::{Op, split::Body},
+};
+
+/// Inputs of a kernel.
+#[derive(Clone)]
+pub struct Inputs {
+    pub state: Vec<f64>,
+    pub rows: Vec<f64>,
+    pub uniforms: Vec<f64>,
+    pub per_step: Vec<u64>,
+    pub held: Vec<f64>,
+    pub steps: usize,
+}
+
+impl Inputs {
+    /// For a body, over rows of so many lanes.
+    pub fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs {
+        let mut numbers = |n: usize| (0..n).map(|_| random.number()).collect::<Vec<f64>>();
+        let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
+        let held = numbers(3 * lanes + 5);
+        let mut per_step: Vec<u64> = numbers(body.per_step * steps).into_iter().map(f64::to_bits).collect();
+        for op in &body.ops {
+            if let Op::Held(i) = *op {
+                per_step
+                    .iter_mut()
+                    .skip(i as usize)
+                    .step_by(body.per_step)
+                    .for_each(|at| *at = random.below(2 * lanes + 6) as u64);
+            }
+        }
+        Inputs { state, rows, uniforms, per_step, held, steps }
+    }
+
+    /// The state after a kernel has made the steps.
+    pub fn run(&self, kernel: &dyn Kernel, scratch: &mut Vec<f64>) -> Vec<f64> {
+        let mut state = self.state.clone();
+        let pool = kernel.pool(&self.uniforms);
+        kernel.run(
+            &mut Tile {
+                state: &mut state,
+                rows: &self.rows,
+                pool: &pool,
+                steps: self.steps,
+                per_step: &self.per_step,
+                held: &self.held,
+            },
+            scratch,
+        );
+        state
+    }
+}
+
+/// A shape of a level and a width.
+pub fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
+    let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
+    let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
+    let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
+    Shape { level, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
+}
+
+/// The same bits, or both NaN.
+pub fn same(a: f64, b: f64) -> bool {
+    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+}

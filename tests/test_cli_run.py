@@ -1,0 +1,141 @@
+"""``stepwell run``: what it takes, and its verdict in words."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import charts, cli
+from stepwell.cli.settings import scene_with
+from stepwell.cli.verdict import growth_of, tenfold, verdict
+
+
+def told(capsys: Any, *words: str) -> tuple[int, str, str]:
+    code = cli.main(["run", *words])
+    return code, *capsys.readouterr()
+
+
+def report(capsys: Any, *words: str) -> dict[str, Any]:
+    code, out, err = told(capsys, *words, "--json")
+    assert (code, err) == (0, "")
+    found: dict[str, Any] = json.loads(out)
+    return found
+
+
+def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
+    scene = sw.scenes.kepler()
+    at = np.linspace(0.0, scene.horizon, 101)
+    run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-6, at=at)
+    found = report(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6")
+    assert run.paces is not None
+    assert found["last_y"] == run.y[-1].tolist()
+    assert (found["steps"], found["rejected_steps"]) == (run.paces.accepted, run.paces.rejected)
+    assert found["function_evaluations"] == run.paces.evaluations
+    assert found["largest_state_error"] == scene.state_error(run).max()
+    for option in ("--steps", "--every"):
+        code, _, err = told(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
+        assert code == 2
+        assert err.startswith(f"stepwell: {option}: goes with fixed steps only")
+
+
+def test_form_and_start_are_those_of_integrate(capsys: Any) -> None:
+    scene = sw.scenes.oscillator()
+    for form in ("matrix", "power"):
+        found = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
+        assert found["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
+    found = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
+    assert found["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
+    assert found["last_y"] != scene.run("verlet", steps=50).y[-1]
+
+
+def test_set_changes_the_scene_and_its_exact_solution(capsys: Any) -> None:
+    found = report(capsys, "oscillator", "--method", "rk4", "--set", "omega=3")
+    scene = sw.scenes.oscillator(3.0)
+    run = scene.run("rk4", every=1)
+    assert found["last_y"] == run.y[-1]
+    assert found["largest_state_error"] == scene.state_error(run).max()
+    assert scene_with("kepler:e=0.5", []).v.tolist() == scene_with("kepler", ["e=0.5"]).v.tolist()
+
+
+def test_set_changes_the_system_and_the_start(capsys: Any) -> None:
+    found = report(capsys, "oscillator", "--method", "rk4", "--set", "damping=0.1", "--set", "y=2", "--steps", "40")
+    scene = sw.scenes.oscillator()
+    run = sw.integrate(sw.Oscillator(1.0, 0.1), "rk4", v=0.0, y=2.0, dt=scene.dt, steps=40)
+    assert found["last_y"] == run.y[-1]
+    assert "largest_state_error" not in found, "the exact solution is that of another system"
+    moved = scene_with("kepler", ["y=1,0,-1,0"])
+    assert moved.y.tolist() == [[1.0, 0.0], [-1.0, 0.0]]
+    assert moved.exact is None
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("omega", "--set: expected NAME=VALUE, such as omega=3, got 'omega'"),
+        ("=3", "--set: expected NAME=VALUE"),
+        ("omgea=3", "--set: oscillator has no 'omgea'; known: omega, "),
+        ("omega=-1", "omega: expected 1e-100 to 1e+100 rad per unit of time"),
+        ("omega=x", "omega: expected"),
+        ("y=1,2", "--set: expected y as one number, or as numbers of shape (), got '1,2'"),
+        ("y=x", "--set: expected y as one number"),
+        ("damping=nan", "--set: expected finite numbers"),
+    ],
+)
+def test_a_wrong_setting_is_one_line(setting: str, message: str, capsys: Any) -> None:
+    code, out, err = told(capsys, "oscillator", "--method", "rk4", "--set", setting)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("oscillator", "--method", "false_euler", "--dt", "3", "--steps", "24"), "grew by 10²⁰: unstable"),
+        (("oscillator", "--method", "standard_euler"), "grew by 10⁴: unstable"),
+        (("oscillator", "--method", "rk4"), "bounded; the state error is at most 0.0"),
+        (("oscillator", "--method", "false_euler", "--dt", "1.9"), "bounded, but wrong: the state error is up to "),
+        (("plummer", "--method", "leapfrog", "--steps", "3"), "finite to the end; the true motion is not known"),
+        (("oscillator", "--method", "false_euler", "--dt", "30", "--steps", "400"), "diverged at step "),
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_the_verdict_is_in_words(words: tuple[str, ...], said: str, capsys: Any) -> None:
+    code, out, _ = told(capsys, *words)
+    assert code == 0
+    verdicts = [line.partition("verdict")[2].strip() for line in out.splitlines() if line.startswith("verdict")]
+    assert len(verdicts) == 1
+    assert verdicts[0].startswith(said)
+    assert "None" not in out
+
+
+def test_growth_is_against_the_true_motion() -> None:
+    """By False Euler at Φ = 3 the eigenvalues are −(7 ± √45)/2, so y grows by 6.854 a step."""
+    scene = sw.scenes.oscillator()
+    run = scene.run("false_euler", 3.0, steps=24, every=1)
+    picture = charts.run_picture(scene, run)
+    growth, known = growth_of(picture)
+    assert known
+    radius = (7.0 + 45.0**0.5) / 2.0
+    # After n steps y = c·radiusⁿ, but for what the other eigenvalue, 1/radius, adds: of the size of radius⁻²ⁿ.
+    assert growth == pytest.approx(abs(run.y[1:]).max(), rel=0.2)
+    assert abs(run.y[-1] / run.y[-2]) == pytest.approx(radius, rel=1e-12)
+    assert verdict(picture) == f"grew by {tenfold(growth)}: unstable"
+    assert (tenfold(1.2e20), tenfold(387.0), tenfold(9.9e19)) == ("10²⁰", "a factor of 387", "10²⁰")
+
+
+def test_a_tolerance_that_stops_says_so() -> None:
+    scene = sw.scenes.kepler()
+    at = np.linspace(0.0, scene.horizon, 11)
+    with pytest.warns(sw.ToleranceWarning):
+        run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-8, at=at, max_steps=30)
+    assert "used up the most steps that are allowed" in verdict(charts.run_picture(scene, run))
+
+
+def test_blocks_of_many_numbers_do_not_fill_the_screen(capsys: Any) -> None:
+    _, out, _ = told(capsys, "plummer", "--method", "leapfrog", "--steps", "3")
+    assert max(map(len, out.splitlines())) < 120
+    assert "last y                64 × 3 numbers; -o FILE writes them" in out

@@ -1,0 +1,64 @@
+"""What is installed: the metadata, the wheel if one is there, and a clean environment."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+import zipfile
+from email import message_from_string
+from pathlib import Path
+
+import pytest
+from installed import tried
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+#: What ``make wheel`` or ``make release`` has built.
+WHEELS = sorted((ROOT / "dist").glob("stepwell-*.whl"))
+
+needs_wheel = pytest.mark.skipif(not WHEELS, reason="make wheel builds one")
+
+
+def test_the_project_says_what_an_index_shows() -> None:
+    assert {"chart", "notebook", "docs", "progress", "test", "bench"} <= set(PROJECT["optional-dependencies"])
+    assert len(PROJECT["classifiers"]) > 10
+    assert "Typing :: Typed" in PROJECT["classifiers"]
+    assert PROJECT["dependencies"] == ["numpy>=1.26"]
+    assert PROJECT["scripts"] == {"stepwell": "stepwell.cli:main"}
+    assert (ROOT / PROJECT["readme"]).exists()
+    assert PROJECT["license"] == "MIT"
+
+
+def test_every_extra_that_a_page_or_a_message_names_is_there() -> None:
+    files = [*(ROOT / "python").rglob("*.py"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
+    named = {name for file in files for name in re.findall(r"stepwell\[(\w+)\]", file.read_text(encoding="utf-8"))}
+    assert "chart" in named
+    assert named <= set(PROJECT["optional-dependencies"])
+
+
+def test_a_release_is_one_command() -> None:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    recipe = text.partition("\nrelease:")[2].partition("\n\n")[0]
+    for step in ("maturin build --release", "maturin sdist", "twine check --strict", "tests/installed.py"):
+        assert step in recipe
+    assert "twine upload" in recipe.rpartition("@echo")[2], "which a person does"
+    assert "twine upload" not in recipe.rpartition("@echo")[0]
+
+
+@needs_wheel
+def test_a_wheel_has_what_it_should() -> None:
+    with zipfile.ZipFile(WHEELS[-1]) as wheel:
+        names = wheel.namelist()
+        (head,) = (name for name in names if name.endswith("METADATA"))
+        metadata = message_from_string(wheel.read(head).decode("utf-8"))
+    assert "stepwell/py.typed" in names
+    assert any(name.startswith("stepwell/_core") for name in names)
+    assert not [name for name in names if name.startswith(("tests/", "benches/", "docs/")) or "__pycache__" in name]
+    assert metadata["Name"] == "stepwell"
+    assert {"chart"} <= set(metadata.get_all("Provides-Extra") or ())
+
+
+@pytest.mark.long
+@needs_wheel
+def test_a_wheel_installs_in_a_clean_environment() -> None:
+    tried(WHEELS[-1])

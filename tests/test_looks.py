@@ -1,0 +1,115 @@
+"""The look of charts: colours that stay apart to every eye and in print, labels off each other, titles that are true."""
+
+import itertools
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.charts import labels, style
+from stepwell.charts.picture import finding
+
+#: Linear RGB as it is seen without green cones (Machado, Oliveira and Fernandes, 2009, severity 1).
+DEUTERANOPE = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
+
+#: What half of all people see as two colours (Stone, Szafir and Setlur, 2014), in L*, a*, b*, of marks of a quarter of a
+#: degree: a marker of 7.5 points, 2.6 mm, from 60 cm away.
+SIZE = 0.25
+SEEN = 0.5 * np.array([10.16 + 1.50 / SIZE, 10.68 + 3.08 / SIZE, 10.70 + 5.74 / SIZE])
+
+
+def linear(colour):
+    c = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def lab(light):
+    """CIELAB of linear sRGB, for daylight D65."""
+    to_xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    xyz = np.array(to_xyz) @ light / [0.95047, 1.0, 1.08883]
+    x, y, z = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+EYES = {
+    "normal": lambda c: lab(linear(c)),
+    "deuteranope": lambda c: lab(np.clip(DEUTERANOPE @ linear(c), 0.0, 1.0)),
+    "grey": lambda c: lab(linear(c)) * [1.0, 0.0, 0.0],
+}
+
+
+def least(eye, colours):
+    """The least distance of two colours, in those that half of all people see."""
+    seen = [EYES[eye](colour) for colour in colours]
+    return min(float(np.linalg.norm((a - b) / SEEN)) for a, b in itertools.combinations(seen, 2))
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_families_are_told_apart(eye):
+    assert least(eye, style.FAMILIES.values()) > 1.0
+
+
+def test_colours_that_merge_are_noticed():
+    """Red and green of one lightness are alike in grey, and nearly so without green cones."""
+    assert lab(np.ones(3)) == pytest.approx([100.0, 0.0, 0.0], abs=0.02)
+    assert least("normal", ["#c75a22", "#578a2c"]) > 1.0
+    assert least("grey", ["#c75a22", "#578a2c"]) < 1.0
+    assert least("deuteranope", ["#a08020", "#8f8a20"]) < 1.0
+
+
+def test_every_method_has_the_colour_of_its_family():
+    of = {method.name: style.family(method) for method in sw.methods()}
+    assert set(of.values()) == set(style.FAMILIES)
+    assert of["false_euler"] == "Euler"
+    assert of["verlet"] == of["leapfrog"] == "leapfrog"
+    assert of["merson"] == of["rk4"] == "Runge-Kutta"
+    assert of["semi_false_heun"] == "Heun"
+    assert all(style.look(method)["color"] == style.FAMILIES[of[method.name]] for method in sw.methods())
+
+
+def test_labels_lie_in_the_axes_and_not_on_each_other():
+    figure = style.new_figure(6.0, 4.0)
+    axes = figure.add_axes((0.1, 0.1, 0.85, 0.85))
+    axes.set(xscale="log", yscale="log", xlim=(1.0, 1e4), ylim=(1e-8, 1.0))
+    x = np.geomspace(1.0, 1e4, 30)
+    given = [labels.Label(f"a curve of order {p:.2f}", np.array([x, x**-p]).T, {"size": 11}) for p in np.linspace(1.0, 1.2, 9)]
+    left = labels.beside(axes, given)
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) + len(left) == 9
+    assert len(boxes) > 4
+    frame = axes.get_window_extent()
+    for i, box in enumerate(boxes):
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
+        assert not any(box.overlaps(other) for other in boxes[:i])
+    # Where there is room for none, all are returned.
+    narrow = figure.add_axes((0.0, 0.0, 0.05, 0.05), xlim=(1.0, 1e4), ylim=(1e-8, 1.0), xscale="log", yscale="log")
+    assert labels.beside(narrow, given) == [label.text for label in given]
+    assert not narrow.texts
+
+
+def test_the_title_is_what_the_front_says():
+    chart = sw.charts.work_precision("oscillator", ["false_euler", "rk4"], [20, 100, 1000, 10_000], tolerances=[])
+    best = [chart.best(10.0**-digits) for digits in range(1, 20)]
+    names = [row["method"] for row in best if row is not None]
+    digits = [i + 1 for i, name in enumerate(names) if name == "rk4"]
+    assert len(digits) > len(names) / 2
+    assert finding(chart) == f"Runge-Kutta 4 is the cheapest for {digits[0]} to {digits[-1]} digits"
+    assert finding(chart) in chart.plot().texts[0].get_text()
+    useless = sw.charts.work_precision("oscillator", ["standard_euler"], [20], tolerances=[])
+    assert finding(useless) == "no method has a digit right"
+
+
+@pytest.mark.parametrize("scene", sw.scenes.scenes(), ids=lambda scene: scene.name)
+def test_a_run_is_drawn_in_one_line(scene, tmp_path):
+    run = scene.run("rk4", steps=3, every=1)
+    figure = run.plot(tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert f"{type(scene.system).__name__} by Runge-Kutta 4" in [text.get_text() for text in figure.texts]
+
+
+def test_what_cannot_be_drawn_is_said():
+    batch = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=5, every=1)
+    with pytest.raises(sw.errors.ArgumentError, match=r"expected a run of one member, got a batch of shape \(2,\)"):
+        batch.plot()
+    with pytest.raises(sw.errors.ArgumentError, match="expected two saved states or more, got 1; run with every="):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5).plot()

@@ -1,0 +1,120 @@
+"""Every name in the records finds its method, or says why not; the name of another method is explained and never suggested."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import stepwell as sw
+from stepwell._method_names import names_of, spelling
+from stepwell.errors import UnknownNameError
+
+ALL = {m.name: m for m in sw.methods()}
+NAMES = [(m.name, name) for m in sw.methods() for name in (m.name, m.title, *m.other_names)]
+FRIENDS = [(m.name, name) for m in sw.methods() for friend in m.false_friends for name in friend.split(", which is ")]
+
+
+def holders(name: str) -> list[str]:
+    """Which records have that name, by the records alone; the name of a method is that method."""
+    exact = [m.name for m in sw.methods() if spelling(m.name) == spelling(name)]
+    every = [m.name for m in sw.methods() if spelling(name) in {spelling(each) for each in (m.title, *m.other_names)}]
+    return exact or every
+
+
+@pytest.mark.parametrize(("method", "name"), NAMES)
+def test_every_name_of_a_record_finds_its_method(method: str, name: str) -> None:
+    expected = holders(name)
+    assert method in expected or expected == [m for m in ALL if m == spelling(name)]
+    for written in {name, name.lower(), name.upper(), spelling(name), name.replace("-", " "), name.replace(" ", "_")}:
+        if len(expected) == 1:
+            assert sw.method(written) is ALL[expected[0]]
+        else:
+            with pytest.raises(UnknownNameError, match=re.escape(", ".join(expected))):
+                sw.method(written)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    {
+        "euler": "standard_euler",
+        "symplectic_euler": "false_euler",
+        "velocity_verlet": "leapfrog",
+        "RKF45": "fehlberg",
+        "heun": "standard_heun",
+        "Heun’s method": "standard_heun",
+        "RK4": "rk4",
+        "Classical Runge-Kutta": "rk4",
+        "False Euler": "false_euler",
+        "position-extended Forest-Ruth-like": "pefrl",
+        "DOP853": "dop853",
+    }.items(),
+)
+def test_names_that_people_type(name: str, method: str) -> None:
+    assert sw.method(name).name == method
+    assert sw.integrate(sw.Oscillator(), name, v=0.0, y=1.0, dt=0.1, steps=1).method.name == method
+
+
+@pytest.mark.parametrize(("method", "friend"), FRIENDS)
+def test_a_false_friend_is_another_method_or_explained(method: str, friend: str) -> None:
+    own = holders(friend)
+    if len(own) == 1:
+        assert own != [method]
+        assert sw.method(friend).name == own[0]
+        return
+    with pytest.raises(UnknownNameError) as caught:
+        sw.method(friend)
+    told = str(caught.value).partition(" Known:")[0]
+    if holders(re.sub(r"( \(| with ).*", "", friend)):  # a method with a remark, of which the name alone is known
+        return
+    assert "did you mean" not in told
+    assert "is not here; nearest, but not the same: " in told.replace("which is", "is")
+    assert method in told or ", which is not here" in told or "Dormand-Prince 5(4)" in friend
+
+
+@pytest.mark.parametrize("name", ["RK45", "rk45", "Dormand-Prince 5(4)", "dopri5", "ode45"])
+def test_the_method_that_most_people_know_is_explained(name: str) -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        sw.method(name)
+    told = str(caught.value).partition(" Known:")[0]
+    assert re.search(r"Dormand-Prince 5\(4\)(, which)? is not here; nearest, but not the same: fehlberg_5\.$", told)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "meant"), [("dopri_5", None), ("backwards Euler", None), ("yoshida", None), ("RK54", "rk4"), ("rk5", "rk4")]
+)
+def test_a_typing_error_in_a_false_friend_is_explained_too(wrong: str, meant: str | None) -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        sw.method(wrong)
+    told = str(caught.value).partition("Known:")[0]
+    assert "not here; nearest, but not the same: " in told
+    assert ("did you mean" in told) == (meant is not None)
+    assert meant is None or f"did you mean {meant!r}?" in told
+
+
+def test_a_name_without_its_remark_says_what_there_is() -> None:
+    with pytest.raises(UnknownNameError, match=r"'RK2' does not say which: RK2 \(trapezoidal\) is 'standard_heun'"):
+        sw.method("RK2")
+    assert sw.method("RK2 (trapezoidal)").name == "standard_heun"
+
+
+@pytest.mark.parametrize("nothing", ["", "  ", "…", "qqqq"])
+def test_what_is_no_name(nothing: str) -> None:
+    with pytest.raises(UnknownNameError, match="method: there is no "):
+        sw.method(nothing)
+
+
+def test_a_new_record_needs_nothing_else() -> None:
+    """What resolves and what is ambiguous follows from the records alone."""
+
+    def record(name: str, *others: str, friends: tuple[str, ...] = ()) -> Any:
+        return SimpleNamespace(name=name, title=name.title(), other_names=others, false_friends=friends)
+
+    names = names_of(
+        [record("one", "Common name", "Own name"), record("two", "common-name", friends=("Third, which is Fourth 4(3)",))]
+    )
+    assert names.methods[spelling("Own name")] == ["one"]
+    assert names.methods[spelling("COMMON name")] == ["one", "two"]
+    assert names.friends["third"] == ("Fourth 4(3)", ["two"])
+    assert names.friends["fourth_4_3"] == ("", ["two"])

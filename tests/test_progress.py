@@ -1,0 +1,100 @@
+"""The progress of a long run is shown in a terminal, with rich or without, and in a notebook; in a pipe it is not."""
+
+from __future__ import annotations
+
+import io
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _progress
+
+OPTIONS: dict[str, Any] = {"v": 0.0, "y": np.ones(200), "dt": 0.1, "steps": 3000, "progress": True, "backend": "numpy"}
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def without_rich(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in [name for name in sys.modules if name.split(".")[0] == "rich"]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "rich", None)
+    monkeypatch.setitem(sys.modules, "rich.console", None)
+
+
+def test_without_rich_a_terminal_shows_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    without_rich(monkeypatch)
+    monkeypatch.setattr(_progress, "MIN_SECONDS_BETWEEN", 0.0)
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    run = sw.integrate(sw.Oscillator(), "rk4", **OPTIONS)
+    lines = terminal.getvalue().split("\r")
+    assert "Runge-Kutta 4, 3000 steps" in lines[1]
+    shares = [int(line.split()[-2]) for line in lines if line.endswith("%")]
+    assert shares[0] == 0
+    assert shares == sorted(shares)
+    assert shares[-1] > 50
+    assert lines[-1] == "\033[K", "the line is removed at the end"
+    assert np.array_equal(run.y, sw.integrate(sw.Oscillator(), "rk4", **(OPTIONS | {"progress": False})).y)
+
+
+def test_without_rich_a_pipe_shows_nothing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    without_rich(monkeypatch)
+    sw.integrate(sw.Oscillator(), "rk4", **OPTIONS)
+    assert capsys.readouterr() == ("", "")
+
+
+class Handle:
+    """What ``display`` returns, and all that it showed."""
+
+    def __init__(self) -> None:
+        self.shown: list[str] = []
+
+    def update(self, element: str) -> None:
+        self.shown.append(element)
+
+
+def in_a_notebook(monkeypatch: pytest.MonkeyPatch) -> Handle:
+    handle = Handle()
+
+    def display(element: str, *, display_id: bool) -> Handle:
+        assert display_id
+        handle.shown.append(element)
+        return handle
+
+    shell = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=object()))
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(HTML=str, display=display))
+    return handle
+
+
+def test_a_notebook_shows_an_element_of_its_page(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    handle = in_a_notebook(monkeypatch)
+    monkeypatch.setattr(_progress, "MIN_SECONDS_BETWEEN", 0.0)
+    sw.integrate(sw.Oscillator(), "rk4", **OPTIONS)
+    assert capsys.readouterr() == ("", "")
+    assert handle.shown[0] == 'Runge-Kutta 4, 3000 steps <progress value="0.000" max="1"></progress> 0 %'
+    values = [float(text.split('"')[1]) for text in handle.shown[:-1]]
+    assert values == sorted(values)
+    assert values[-1] > 0.5
+    assert handle.shown[-1] == "", "it is removed at the end"
+
+
+def test_a_notebook_is_not_written_anew_for_every_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = in_a_notebook(monkeypatch)
+    with _progress.bar("much") as told:
+        for i in range(10_000):
+            told(i / 10_000)
+    assert len(handle.shown) < 100
+
+
+def test_ipython_in_a_terminal_is_no_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not _progress.in_notebook()
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: SimpleNamespace()))
+    assert not _progress.in_notebook()
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
+    assert not _progress.in_notebook()
