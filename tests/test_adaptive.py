@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
+from stepwell import engine
 from stepwell.errors import ArgumentError, StepwellError, UnsupportedError
 from stepwell.result import Status
 
@@ -89,8 +90,8 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
     assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
     # For each asked time the step that passes it is made twice, and an extra one.
     tried = whole.paces.accepted + whole.paces.rejected + 2 * 2
-    # By Taylor series of order 10, by the tolerance, ten of each.
-    evaluations = 10 if sw.method(method).has_series else sw.method(method).attempt_evaluations
+    # A Taylor series has order 10 by the tolerance; how many evaluations that is, see test_taylor.py.
+    evaluations = engine.evaluations(sw.method(method), whole.system, order=10, paced=True)
     assert np.array_equal(whole.paces.evaluations, evaluations * tried)
 
 

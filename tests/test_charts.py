@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from charted import LADDER, METHODS, SCENES, the_charts, the_small, the_whole  # noqa: F401
+from stepwell import engine
 from stepwell.charts import data, known, measure, peers
 from stepwell.errors import ArgumentError, UnknownNameError
 
@@ -184,7 +185,7 @@ def test_cost_is_counted_from_the_record(charts):
                 assert point.dt == chart.scene.horizon / point.steps
                 # With a tolerance the core counts; to the rounding of two quotients.
                 method = curve.method
-                evaluations = method.evaluations if curve.by == "step" else method.attempt_evaluations
+                evaluations = engine.evaluations(method, chart.scene.system, paced=curve.by != "step")
                 assert point.cost == pytest.approx(evaluations / point.dt, rel=1e-15)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core, engine
-from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.errors import UnsupportedError
 from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
 from test_graphs import assert_one_graph
+from truths import DRIVE, END, FORCE, OMEGA, forced_exact
 
 TAYLOR = sw.method("taylor")
 EPS = 2.0**-52
@@ -137,6 +139,67 @@ def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
         assert abs(run.y[-1] - sum(h**k for k in range(8))) > 0.5 * h**8
 
 
+def _cleaned_slopes(error: Callable[[int], tuple[Any, Any]]) -> list[float]:
+    """The order that 8, 16 and 32 steps show, of v and of y.
+
+    E(h) = C·h⁸ + D·h⁹ + …. F(h) = 2⁹·E(h/2) − E(h) has no h⁹, so its slope is off by O(h²). With E alone it is
+    off by O(h), and that of v on the forced system all but vanishes at 4 steps: slopes from 2 steps on are 13.3, 3.7, 7.5, 7.8.
+    Rounding, 1e-15·2⁹, is below a hundredth of F.
+    """
+    errors = [error(steps) for steps in (8, 16, 32)]
+    slopes = []
+    for block in (0, 1):
+        first, second = (np.linalg.norm(2.0**9 * np.atleast_1d(b[block]) - a[block]) for a, b in itertools.pairwise(errors))
+        slopes.append(float(np.log2(first / second)))
+    return slopes
+
+
+def _forced(steps: int, backend: Any) -> tuple[Any, Any]:
+    system = sw.Oscillator(OMEGA, 0.2, a=sw.Sinusoid(FORCE, DRIVE), form="physical")
+    run = sw.integrate(system, "taylor", v=0.3, y=1.0, dt=END / steps, steps=steps, backend=backend)
+    v, y = forced_exact(END, 0.2, 0.3, 1.0)
+    return run.v[-1] - v, run.y[-1] - y
+
+
+def _clover(steps: int, backend: Any) -> tuple[Any, Any]:
+    """Three bodies on the unit circle, angular speed 1, after three units of time."""
+    scene = sw.scenes.clover()
+    run = sw.integrate(scene.system, "taylor", v=scene.v, y=scene.y, dt=3.0 / steps, steps=steps, backend=backend)
+    assert scene.exact is not None
+    v, y = scene.exact(np.array([3.0]))
+    return run.v[-1] - v[0], run.y[-1] - y[0]
+
+
+@pytest.mark.parametrize("error", [_forced, _clover])
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_the_order_is_eight(error: Callable[[int, Any], tuple[Any, Any]], backend: str) -> None:
+    """Of a damped oscillator under a sinusoid, whose derivatives in time the series needs; and of bodies."""
+    assert _cleaned_slopes(lambda steps: error(steps, backend)) == pytest.approx([8.0, 8.0], abs=0.1)
+
+
+def test_a_wrong_order_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A term less; and an input that stays as it is at the start of the step."""
+    monkeypatch.setattr(TAYLOR.steps, "ORDER", 7)
+    assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
+    monkeypatch.undo()
+    held = series.coefficients
+    monkeypatch.setattr(TAYLOR.steps, "coefficients", lambda s, order, t, h, v, y: held(s, order, t, 0.0 * h, v, y))
+    assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
+
+
+def test_growth_above_the_limit() -> None:
+    """By the radius |Σ (iΦ)ᵏ/k!| in each step, to the letter: the matrix turns and stretches, so lengths are its powers.
+
+    A thousandth above the limit that is 11.02 after 4000 steps: growth begins slowly there. Each step has some 50 roundings.
+    """
+    phi = TAYLOR.limit * np.array([0.999, 1.0 - 1e-9, 1.0 + 1e-9, 1.001])
+    radius = abs(sum((1j * phi) ** k / math.factorial(k) for k in range(9)))
+    assert np.array_equal(radius > 1.0, [False, False, True, True])
+    assert radius[3] ** 4000 == pytest.approx(11.02, rel=1e-3)
+    run = sw.integrate(sw.Oscillator(phi), "taylor", v=0.0, y=1.0, dt=1.0, steps=4000)
+    np.testing.assert_allclose(np.hypot(run.v[-1], run.y[-1]), radius**4000, rtol=4000 * 50 * EPS * 10)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
     """Of ẏ = y the coefficients are y/k!, so the step is known.
@@ -160,6 +223,60 @@ def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
     assert abs(run.paces.h / reach - 1.0) < 1e-7
     assert run.paces.evaluations == order * (run.paces.accepted + 2)  # the held step twice, and one to the saved time
     assert abs(run.y[-1] / math.exp(5.0) - 1.0) < (5.0 / reach + 1.0) * (2.0 * tolerance + 10 * EPS)
+
+
+def squared() -> sw.System:
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y * y
+
+    return growth().sized(None, np.zeros(()))
+
+
+@pytest.mark.parametrize("order", [4, 8, 12, 20])
+def test_evaluations_are_operations_over_those_of_one_evaluation(order: int) -> None:
+    """Of a linear system each order is its matrix once more: p evaluations.
+
+    Of y·y, one product, the coefficient k has ⌊k/2⌋ + 1 different products and k sums. One evaluation for each order would be far
+    too few.
+    """
+    for linear in (sw.Oscillator(1.3), sw.Oscillator(1.3, 0.2, form="physical")):
+        assert engine.evaluations(TAYLOR, linear, order=order, paced=True) == order
+    assert (
+        engine.evaluations(TAYLOR, squared(), order=order, paced=True) == sum(k // 2 + 1 + k for k in range(order)) > order**2 / 2
+    )
+
+
+def operations_of(tape: _core.Tape, values: list[Any]) -> int:
+    """Operations on the state and on the time that these values are made of; a change of sign is none."""
+    lines, _ = tape.operations(values)
+    changes: list[bool] = []
+    for name, operands, _more in lines:
+        changes.append(name in ("state", "time", "sample") or any(changes[i] for i in operands))
+    return sum(
+        change and bool(operands) and name != "negate" and name != "sample"
+        for change, (name, operands, _) in zip(changes, lines, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    "system", [sw.Pendulum(), sw.NBody([1.0, 0.5], force="newton"), sw.NBody(), sw.RestrictedThreeBody(0.1)], ids=repr
+)
+def test_evaluations_counted_by_the_reference(system: sw.System) -> None:
+    """Its operations but for the product that makes a coefficient of the state of one of the rates.
+
+    That is the method's own, as the sums of stages are of other methods. The first is a product with 1, which is not on the tape.
+    """
+    tape = _core.Tape()
+    tracer = Tracer(system, tape)
+    v, y, _ = tracer.state()
+    s, t = tracer.scaled(tape.step()), tape.time()
+    rates = operations_of(tape, tracer.flat(s.dv(t, v, y), s.dy(t, v, y)))
+    terms = [each for pair in series.coefficients(s, 8, t, tape.step(), v, y) for each in pair]
+    every = operations_of(tape, tracer.flat(*terms)) - 7 * (v.size + y.size)
+    evaluations = -(-every // rates)
+    assert engine.evaluations(TAYLOR, system) == evaluations
+    assert sw.stability.operations(TAYLOR, system).rate_evaluations == evaluations
 
 
 def test_saved_states_are_on_the_series() -> None:
@@ -215,6 +332,6 @@ def test_what_is_refused() -> None:
         sw.integrate(sw.Oscillator(x=sw.Sinusoid(1.0, 1.0)), "taylor", v=0.0, y=1.0, dt=0.1, steps=3, form="matrix")
     bodies = sw.NBody(np.ones(40))
     state = np.random.default_rng(0).normal(size=(40, 2))
-    with pytest.raises(ArgumentError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
+    with pytest.raises(UnsupportedError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
         sw.integrate(bodies, "taylor", v=0.0 * state, y=state, dt=0.01, steps=3)
     assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays

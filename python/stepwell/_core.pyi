@@ -235,6 +235,9 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
 
+def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
+    """To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series."""
+
 def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, list[int], float]], list[int]]:
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
 

@@ -572,6 +572,20 @@ def pace_of(numbers: Array) -> Pace:
     return adaptive.Pace(*numbers)
 
 
+def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
+    """Function evaluations of a step, or of an attempt at an adaptive one by a series of that order.
+
+    Of a series: operations of all coefficients of the rates over those of one evaluation, rounded up. All operations count alike.
+
+    Raises:
+        UnsupportedError: if the series of the system is too long.
+    """
+    if method.has_series:
+        plan = Plan(system, method, system.batch, 1.0, order=order)
+        return _core.series_evaluations(model(plan), attempts=paced)
+    return method.attempt_evaluations if paced else method.evaluations
+
+
 def attempts(method: Method, system: Any, block_axes: tuple[int, int], order: int = 0) -> Any:
     """An attempt at an adaptive step by the reference: a function of a pace, a budget, v and y."""
     from .reference import adaptive, series_pace

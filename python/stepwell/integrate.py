@@ -425,7 +425,7 @@ def _adapt(
         pace = pace._replace(work=np.zeros(batch))
         plan = plan._replace(order=_order(how, pace))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
-    attempts = plan.order or how.attempt_evaluations
+    attempts = engine.evaluations(how, system, order=plan.order, paced=True)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
     run = Run(
         t=times,

@@ -48,7 +48,8 @@ class Method(Fixed):
     false_friends: tuple[str, ...]
     #: Order of convergence.
     order: int
-    #: Function evaluations per step of fixed length (of both rates: rate evaluations).
+    #: Function evaluations per step of fixed length (of both rates: rate evaluations). Of a series those of a linear system; of
+    #: others it may be more, see ``stepwell.stability.operations``.
     evaluations: int
     #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
     attempt_evaluations: int
@@ -126,6 +127,8 @@ class Method(Fixed):
         return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
 
     def _costs(self) -> str:
+        if self.has_series:
+            return f"{self.evaluations} function evaluations (of a linear system)"
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
 
     def _repr_html_(self) -> str:

@@ -255,7 +255,8 @@ def _leaf(tape: Any, name: str, given: int) -> Any:
 def increments_last(tracer: Named, roots: Sequence[Any]) -> tuple[Any, dict[int, str], dict[int, str]]:
     """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
     listed, places = tracer.tape.operations([*roots, *(symbol for symbol, _ in tracer.called)])
-    lines = [Operation(name, tuple(of), given) for name, of, given in listed]
+    lines, place = increments.negated_sums([Operation(name, tuple(of), given) for name, of, given in listed])
+    places = [place[each] for each in places]
     order = in_order(lines, places[: len(roots)])
     kept, moved = needed(lines, places[: len(roots)])
     work = increments.Rewriting(kept, moved)

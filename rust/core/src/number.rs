@@ -108,6 +108,11 @@ impl Not for SymbolTruth {
     }
 }
 
+/// What a function makes of the tape of this thread.
+pub(crate) fn on_tape<T>(f: impl FnOnce(&mut Tape) -> T) -> T {
+    TAPE.with_borrow_mut(f)
+}
+
 /// The operation of a value on the tape of this thread.
 pub(crate) fn operation(id: Id) -> Op {
     TAPE.with_borrow(|tape| tape.op(id))

@@ -12,7 +12,7 @@ use std::{
 
 use crate::{
     functions::{cos, sin},
-    number::{Function, Number, Symbol, operation},
+    number::{Function, Number, Symbol, on_tape, operation},
     tape::{Id, Op},
 };
 
@@ -66,7 +66,25 @@ pub fn of_solution(order: u32, start: &[Symbol], time: [Symbol; 2], rates: &mut 
         }
         made.push(next.into_iter().map(|term| term.unwrap_or_else(|| Symbol::of(0.0))).collect());
     }
+    note_evaluations(order, &rates, &series, &made);
     made
+}
+
+/// Notes what the coefficients cost in evaluations of the rates. The products by 1/k, from the second order on, are the method's own, as the
+/// sums of stages are of other methods.
+fn note_evaluations(order: u32, rates: &[Symbol], series: &Series, made: &[Vec<Symbol>]) {
+    let all = (0..order as usize).flat_map(|k| rates.iter().map(move |rate| (rate.0, k)));
+    let terms: Vec<Id> = all.filter_map(|(rate, k)| series.term(rate, k)).map(|term| term.0).collect();
+    let own = made.iter().skip(1).flatten().map(|term| match operation(term.0) {
+        Op::Neg(product) => product,
+        _ => term.0,
+    });
+    let own: BTreeSet<Id> = own.filter(|id| !operation(*id).is_leaf()).collect();
+    on_tape(|tape| {
+        let one = tape.changing(rates.iter().map(|rate| rate.0), &BTreeSet::new());
+        // Rates that are copies take no operation: each order then counts as one evaluation.
+        if one == 0 { tape.note_series(1, order as usize) } else { tape.note_series(one, tape.changing(terms, &own)) }
+    });
 }
 
 struct Series {

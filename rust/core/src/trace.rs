@@ -76,6 +76,8 @@ pub struct Tapes {
     pub record: Option<Stage>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
+    /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
+    pub series_evaluations: usize,
 }
 
 /// The properties and tapes of a scene. Expensive ones are found on first use.
@@ -495,6 +497,7 @@ impl Scene {
             quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
+        let series_evaluations = steps.tape.series_evaluations();
         let step = fused(steps.tape, steps.next);
         let shown = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
             let (mut both, mut next) = step.clone();
@@ -504,7 +507,7 @@ impl Scene {
         });
         let [start, finish, shown] = [start, finish, shown].map(|made| made.map(|made| cut(&self.given, &made)));
         let step = cut(&self.given, &step);
-        Ok(Tapes { step, start, finish, shown, record: quantities, written })
+        Ok(Tapes { step, start, finish, shown, record: quantities, written, series_evaluations })
     }
 }
 

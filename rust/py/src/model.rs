@@ -32,7 +32,12 @@ pub fn error_of(name: &str, message: String) -> PyErr {
 
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
-    error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
+    let name = match error {
+        Error::Memory { .. } => "TooLargeError",
+        Error::TooLongForSeries { .. } => "UnsupportedError",
+        _ => "ArgumentError",
+    };
+    error_of(name, error.to_string())
 }
 
 /// The rates of a user's own system.
