@@ -17,6 +17,7 @@ from advised import (  # noqa: F401
     assert_cheap,
     assert_true,
     brute_of,
+    evaluations_of,
     pendulum,
     scene_of,
     tried,
@@ -194,7 +195,7 @@ def test_ranking_by_time_is_by_measured_time() -> None:
         assert row.substeps == (steps if row.tolerance is None else None)
         assert row.seconds_per_frame == pytest.approx(1e-9 * row.ns_per_step * steps, rel=1e-12)
         assert row.seconds_per_time == 1e-9 * row.ns_per_step / row.dt
-        worst = (row.worst_evaluations or 0) // row.method.evaluations
+        worst = (row.worst_evaluations or 0) // evaluations_of(row, advice.scene.system)
         assert row.objects == int(0.3 / (1e-9 * row.ns_per_step * worst))
 
 

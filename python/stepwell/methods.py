@@ -165,7 +165,7 @@ def methods() -> tuple[Method, ...]:
 
     Example:
         >>> [method.name for method in sw.methods() if method.error_order is not None]
-        ['fehlberg', 'merson', 'fehlberg_5', 'dop853']
+        ['fehlberg', 'merson', 'fehlberg_5', 'dop853', 'taylor']
     """
     return tuple(_catalogue().values())
 
