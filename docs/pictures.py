@@ -255,7 +255,7 @@ def tape() -> Figure:
         arrow((32.3, height), (40.7, height))
     axes.text(36.4, 36.2, "run once\nwith symbols", fontsize=10, ha="center", va="bottom")
     readers = (
-        ("Kernel writer", "machine code at run time (AVX2, AVX-512)"),
+        ("Kernel writer", "machine code at run time (AVX2, AVX-512, NEON)"),
         ("Interpreter", "the same bits, on any machine"),
         ("Comparer", "proves that core and reference are equal"),
         ("Fuser", "fused multiply-adds, on request"),

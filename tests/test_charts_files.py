@@ -208,10 +208,10 @@ def test_the_json_is_strict_and_whole(small, tmp_path):
 def test_the_summary_is_what_the_points_say(charts):
     for chart in charts.values():
         for row, curve in zip(chart.summary(), chart.curves, strict=True):
-            assert row["least_error"] == min((p.state_error for p in curve.usable), default=math.inf)
+            assert row["least_error"] == min((p.state_error for p in curve.dependable()), default=math.inf)
             for error in data.TARGETS:
                 cost = row[f"cost_at_error_{error:g}"]
-                better = [p.cost for p in curve.points if not p.unstable and p.state_error <= error]
+                better = [p.cost for p in curve.dependable() if p.state_error <= error]
                 assert cost == (min(better) if better else math.inf)
 
 

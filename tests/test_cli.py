@@ -125,7 +125,7 @@ def test_run_writes_the_kept_states(capsys, tmp_path):
 
 
 def test_run_draws_a_picture_or_an_animation(capsys, tmp_path):
-    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF", "gif": b"GIF89a", "html": b"\n<link"}
+    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF", "gif": b"GIF89a", "html": b"<!doctype html>"}
     for ending, start in starts.items():
         path = tmp_path / f"run.{ending}"
         words = ("run", "figure_eight", "--method", "leapfrog", "-o", str(path), "--seconds", "0.2", "--fps", "10", "--json")

@@ -118,6 +118,30 @@ def test_files_and_pictures(chart: ControlSweep, tmp_path: Path) -> None:
     assert [axes.get_ylabel() for axes in figure.axes] == ["largest |E − E₀| / K₀", "error of the last state, relative"]
 
 
+def test_the_title_says_what_control_changes() -> None:
+    """Standard Euler drives the energy up without control (§5); a wrong title would count the gains that diverged as better."""
+    chart = sw.charts.control(
+        "energy_control", ["standard_euler", "false_euler"], horizon=1000.0, evaluations=100_000, relative=GAINS
+    )
+    factors = []
+    for name in ("standard_euler", "false_euler"):
+        held = chart.line(name, "limited").energy_error
+        factors.append(chart.line(name, "none").energy_error[0] / np.median(held[np.isfinite(held)]))
+    better = sum(factor > 1.0 for factor in factors)
+    assert factors[0] > 1.0
+    # Over 20 units of time it has not yet grown, and control is no help: a title that is always the same would be wrong there.
+    short = sw.charts.control("energy_control", ["standard_euler"], horizon=20.0, evaluations=2000, relative=GAINS)
+    assert "control lowers the energy error of 0 of 1 runs" in short.plot().texts[0].get_text()
+    title = chart.plot().texts[0].get_text()
+    said = f"control lowers the energy error of {better} of 2 runs"
+    assert title.startswith(f"{chart.title}: {said}")
+    assert (", by a factor of " in title) == (better == 2)
+    none = sw.charts.control(
+        "energy_control", ["rk4"], ways=["scaling"], forms=[], horizon=20.0, evaluations=2000, relative=GAINS
+    )
+    assert none.plot().texts[0].get_text().endswith(": energy and state under control")
+
+
 def test_what_diverged_is_drawn_above_the_frame_and_summed_up() -> None:
     """Printed with h·C·K = 10 multiplies ΔE by −19 in a step."""
     chart = sw.charts.control("energy_control", ["standard_euler"], horizon=20.0, evaluations=2000, relative=GAINS)

@@ -160,7 +160,7 @@ def test_controls_by_hand(browser: Any, file: str) -> None:
         shown.until("explorer.page.scene.name === 'forced_oscillator'")
         assert web.locator("#method-a option[value=verlet]").is_disabled()
         web.locator("#code summary").click()
-        assert "export class Step" in shown.text("code-a")
+        shown.until("document.getElementById('code-a').textContent.includes('export class Step')")
         assert not shown.complaints
 
 

@@ -1,11 +1,13 @@
 """The look of charts: colours that stay apart to every eye and in print, labels off each other, titles that are true."""
 
 import itertools
+import sys
 
 import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.charts import labels, style
+from stepwell.charts.panel_picture import leader
 from stepwell.charts.picture import finding
 
 #: Linear RGB as it is seen without green cones (Machado, Oliveira and Fernandes, 2009, severity 1).
@@ -66,6 +68,15 @@ def test_every_method_has_the_colour_of_its_family():
     assert all(style.look(method)["color"] == style.FAMILIES[of[method.name]] for method in sw.methods())
 
 
+@pytest.mark.parametrize("eye", EYES)
+def test_methods_of_a_family_are_told_apart_where_no_names_are_beside_them(eye):
+    """The four methods of a control chart, two of which are Euler's."""
+    methods = [sw.method(name) for name in ("standard_euler", "false_euler", "standard_heun", "rk4")]
+    assert least(eye, [style.apart(methods, method)["color"] for method in methods]) > 1.0
+    assert style.look(methods[0])["color"] == style.look(methods[1])["color"]  # which is what would merge them
+    assert style.apart(methods[1:], methods[1])["color"] == style.FAMILIES["Euler"]
+
+
 def test_labels_lie_in_the_axes_and_not_on_each_other():
     figure = style.new_figure(6.0, 4.0)
     axes = figure.add_axes((0.1, 0.1, 0.85, 0.85))
@@ -99,12 +110,101 @@ def test_the_title_is_what_the_front_says():
     assert finding(useless) == "no method has a digit right"
 
 
+def test_the_title_is_of_the_error_that_is_drawn():
+    """By state error PEFRL is not the cheapest in a case in which it is by energy error, so the two titles cannot be one."""
+    chart = sw.charts.work_precision("oscillator", ["pefrl", "fehlberg_5"], [20, 100, 300, 1000, 10_000], tolerances=[])
+    titles = {}
+    for error in ("state_error", "energy_error"):
+        front = chart.front(error)
+        names = [next((row["method"] for row in front if row["error"] <= 10.0**-d), None) for d in range(1, 20)]
+        names = [name for name in names if name is not None]
+        winner = max(set(names), key=names.count)
+        titles[error] = finding(chart, error)
+        assert titles[error].startswith(sw.method(winner).title)
+        assert titles[error] in chart.plot(error=error).texts[0].get_text()
+    assert titles["energy_error"].endswith(" digits of the energy")
+    assert titles["state_error"].endswith(" digits")
+    panel = sw.charts.panel(["oscillator"], methods=["pefrl", "rk4"], steps=[20, 100, 1000], tolerances=[])
+    assert leader(panel, "energy_error") + ": what an error of the energy costs, scene by scene" in [
+        text.get_text() for text in panel.plot(error="energy_error").texts
+    ]
+
+
+def test_the_title_says_how_steps_were_made_where_that_is_what_differs():
+    chart = sw.charts.work_precision("kepler", ["merson"], [200, 1000, 4000], tolerances=[1e-3, 1e-5, 1e-7])
+    assert {row["method"] for row in chart.front()} == {"merson, tolerance"}  # by a factor of ten: the orbit has one near point
+    assert finding(chart).startswith("RK-Merson with a tolerance is the cheapest for 1 to ")
+    panel = sw.charts.panel(["kepler"], methods=["merson"], steps=[200, 1000, 4000], tolerances=[1e-3, 1e-5])
+    assert leader(panel).startswith("RK-Merson with a tolerance is the cheapest in ")
+    fixed = sw.charts.work_precision("kepler", ["merson"], [4000, 16_000], tolerances=[])
+    assert finding(fixed).startswith("RK-Merson is the cheapest for ")
+
+
 @pytest.mark.parametrize("scene", sw.scenes.scenes(), ids=lambda scene: scene.name)
 def test_a_run_is_drawn_in_one_line(scene, tmp_path):
     run = scene.run("rk4", steps=3, every=1)
     figure = run.plot(tmp_path / "run.png")
     assert (tmp_path / "run.png").stat().st_size > 10_000
     assert f"{type(scene.system).__name__} by Runge-Kutta 4" in [text.get_text() for text in figure.texts]
+
+
+def drawn_points(axes, label):
+    line = next(line for line in axes.lines if line.get_label() == label)
+    return np.sort_complex(line.get_xdata() + 1j * line.get_ydata())
+
+
+def test_an_analysis_is_drawn_in_one_line(tmp_path):
+    """Standard Euler's roots are 1 ± iΦ, outside the circle; the exact ones are e^(±iΦ)."""
+    one = sw.analyse(sw.Oscillator(), "standard_euler", dt=0.5)
+    figure = one.plot(tmp_path / "roots.png")
+    assert (tmp_path / "roots.png").stat().st_size > 10_000
+    assert figure.texts[0].get_text() == "Standard Euler, dt = 0.5: unstable oscillation"
+    np.testing.assert_array_equal(drawn_points(figure.axes[0], "growing samples"), [1.0 - 0.5j, 1.0 + 0.5j])
+    # e^z of one rounding in z and a few of its own.
+    np.testing.assert_allclose(drawn_points(figure.axes[0], "exact"), np.exp([-0.5j, 0.5j]), rtol=0, atol=1e-15)
+    assert not any(line.get_label() == "bounded samples" for line in figure.axes[0].lines)
+    # False Euler is stable below Φ = 2 and not above.
+    figure = sw.analyse(sw.Oscillator(), "false_euler", dt=[0.5, 1.5, 2.5]).plot()
+    assert figure.texts[0].get_text() == "False Euler: 2 of 3 stable"
+    assert len(drawn_points(figure.axes[0], "bounded samples")) == 4
+    far = sw.analyse(sw.Oscillator(), "false_euler", dt=30.0).plot()
+    assert "Not in the picture: 1 of 2." in far.texts[-1].get_text()  # the other root is near 0: their product is 1
+    with pytest.raises(sw.errors.ArgumentError, match="expected an ending of a picture"):
+        one.plot("roots.doc")
+
+
+def test_advice_is_drawn_in_one_line(tmp_path):
+    advice = sw.advise("oscillator", tolerance=1e-3, cost="evaluations")
+    figure = advice.plot(tmp_path / "advice.png")
+    assert (tmp_path / "advice.png").stat().st_size > 10_000
+    (axes,) = figure.axes
+    marks = [line for line in axes.lines if line.get_marker() not in ("None", "", None) and len(line.get_xdata()) == 1]
+    told = {(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in marks}
+    assert told == {(row.evaluations_per_frame, row.error) for row in advice.ranked}
+    assert all(error <= advice.tolerance for _, error in told)
+    assert any(np.array_equal(line.get_ydata(), [1e-3, 1e-3]) for line in axes.lines)
+    best = advice.ranked[0]
+    assert best.method.title in figure.texts[0].get_text()
+    # No name is on another, on the line, or outside.
+    names = [text.get_window_extent() for text in axes.texts[1:]]
+    assert len(names) >= 3
+    frame, line = axes.get_window_extent(), axes.transData.transform((1.0, 1e-3))[1]
+    for i, box in enumerate(names):
+        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
+        assert frame.y0 <= box.y0 < box.y1 < line
+        assert not any(box.overlaps(other) for other in names[:i])
+    nothing = sw.advise("oscillator", tolerance=1e-3, methods=["standard_euler"], cost="evaluations", budget=1e-12)
+    with pytest.raises(sw.errors.ArgumentError, match=r"plot: expected advice with a method that is good enough.*Nothing fits"):
+        nothing.plot()
+
+
+def test_without_matplotlib_these_pictures_say_so(monkeypatch):
+    analysis = sw.analyse(sw.Oscillator(), "rk4", dt=0.5)
+    advice = sw.advise("oscillator", tolerance=1e-3, methods=["rk4"], cost="evaluations")
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    for draw in (analysis.plot, advice.plot):
+        with pytest.raises(sw.errors.UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
+            draw()
 
 
 def test_what_cannot_be_drawn_is_said():

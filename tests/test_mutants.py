@@ -31,7 +31,7 @@ MUTANTS = [
     ("semi_false_heun", "dy2 = s.dy(t + h, v2, y1)", "dy2 = s.dy(t + h, v1, y1)", "old v for new v"),
     ("semi_false_heun", "dv2 = s.dv(t + h, v1, y1)", "dv2 = s.dv(t, v1, y1)", "wrong stage time"),
     ("semi_false_heun", "y + 0.5 * (dy1 + dy2)", "y + (dy1 + dy2)", "a lost half"),
-    ("rk4", "half = t + 0.5 * h", "half = t + h", "wrong stage time"),
+    ("rk4", "middle = t + 0.5 * h", "middle = t + h", "wrong stage time"),
     ("rk4", "dv4, dy4 = s.dv(t + h, v4, y4)", "dv4, dy4 = s.dv(t, v4, y4)", "wrong stage time"),
     ("rk4", "v3, y3 = v + 0.5 * dv2, y + 0.5 * dy2", "v3, y3 = v + dv2, y + dy2", "a lost half"),
     ("rk4", "v2, y2 = v + 0.5 * dv1, y + 0.5 * dy1", "v2, y2 = v + 0.5 * dv1, y", "old y for new y"),

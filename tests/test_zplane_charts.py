@@ -251,7 +251,7 @@ def test_the_json_is_strict_and_whole(chart, figures, tmp_path):
 def panels(figure, chart):
     """The panel of each method, by name."""
     used = [axes for axes in figure.axes if axes.get_visible()]
-    return dict(zip((locus.method.name for locus in chart.loci), used, strict=True))
+    return {locus.method.name: axes for same, axes in zip(zplane_picture.groups(chart), used, strict=True) for locus in same}
 
 
 @pytest.mark.parametrize(
@@ -268,16 +268,33 @@ def test_a_picture_is_whole(kind, methods, tmp_path):
     figure = chart.plot(tmp_path / "chart.png", kind=kind)
     check_page(figure, tmp_path / "chart.png")
     titles = [axes.get_title().splitlines() for axes in figure.axes if axes.get_visible() and axes.get_title()]
-    assert [title[0] for title in titles] == [f"{c.method.title} ({c.method.section})" for c in chart.loci]
-    assert [title[1] for title in titles] == [f"stable for Φ < {c.limit:.5g}" if c.limit else "never stable" for c in chart.loci]
+    shared = zplane_picture.groups(chart)
+    names = [
+        [c.method.title for c in same] if len(same) > 1 else [f"{same[0].method.title} ({same[0].method.section})"]
+        for same in shared
+    ]
+    assert [" ".join(title[:-1]) for title in titles] == [", ".join(each) for each in names]
+    first = [same[0] for same in shared]
+    assert [title[-1] for title in titles] == [f"stable for Φ < {c.limit:.5g}" if c.limit else "never stable" for c in first]
+
+
+def test_what_is_the_same_shares_a_panel(chart):
+    """Damped and False Euler, leapfrog and Verlet have p = 1 − Φ²/2 and q = 1 (§6 to §8); no two others are alike."""
+    shared = [{locus.method.name for locus in same} for same in zplane_picture.groups(chart)]
+    assert [same for same in shared if len(same) > 1] == [{"damped_euler", "false_euler", "leapfrog", "verlet"}]
+    assert len(shared) == len(METHODS) - 3
+    never = sum(not LIMITS.get(locus.method.name, locus.limit) for locus in chart.loci)
+    title = f"{never} of {len(METHODS)} methods are never stable; 4 others have the same eigenvalues"
+    assert chart.plot().texts[0].get_text() == title
 
 
 def test_the_loci_are_the_eigenvalues_with_their_angles_and_where_they_leave(chart):
     figure = chart.plot()
+    first = {same[0].method.name for same in zplane_picture.groups(chart)}
     for name, axes in panels(figure, chart).items():
         locus = of(chart, name)
         drawn = np.concatenate(lines(axes)) @ [1, 1j]
-        assert np.isin(locus.eigenvalues.ravel(), drawn).all()
+        assert name not in first or np.isin(locus.eigenvalues.ravel(), drawn).all()
         circles = [patch for patch in axes.patches if getattr(patch, "radius", None) == 1.0]
         assert [circle.center for circle in circles] == [(0.0, 0.0)]
         assert axes.get_aspect() == 1.0
@@ -313,8 +330,7 @@ def test_branches_do_not_jump(chart):
 
 def test_the_curves_are_exact_and_series_with_the_limit(chart):
     figure = chart.plot(kind="curves")
-    for row, name in enumerate(locus.method.name for locus in chart.loci):
-        locus = of(chart, name)
+    for row, (locus, *_) in enumerate(zplane_picture.groups(chart)):
         radius, ratio = figure.axes[2 * row : 2 * row + 2]
         pair = locus.eigenvalues[0].imag != 0
         for axes, exact, series in (

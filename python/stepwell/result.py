@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,6 +19,8 @@ from .reference.types import Whole
 from .systems import System
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
 
@@ -306,14 +307,16 @@ class Run(Value):
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
         """Write an animation of the motion; its frames are the saved states.
 
+        A page (.html) is small, is written at once, and has a button and a slider; it needs neither matplotlib nor a network.
+
         Args:
-            path: the file, ending in .gif, .mp4 or .html.
+            path: the file, ending in .html, .gif or .mp4.
             seconds: how long it lasts, above zero.
-            fps: frames a second, above zero; fewer if fewer states were saved.
+            fps: frames a second, above zero; fewer if fewer states were saved. A page shows as many states as it has room for.
 
         Raises:
             ArgumentError: if the run is of a batch, fewer than two states were saved, or an argument is wrong.
-            UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
+            UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
         from .charts.runs import own_picture
 

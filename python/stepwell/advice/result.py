@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _checks
 from .._brief import one_line, table
@@ -18,6 +18,9 @@ from ..methods import Method
 from ..result import Run
 from ..scenes import Scene
 from .motion import grid_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The text has a line for at most so many methods; ``ranked`` and ``rejected`` have all.
 LINES = 6
@@ -368,6 +371,29 @@ class Advice:
             if most is not None and len(said) > most:
                 lines.append(f"{kind} likewise: {'; '.join(said[most:])}")
         return lines
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw cost and error of each ranked method, with the error that was asked for, and write the picture if asked.
+
+        Args:
+            path: the file; its ending says in which format.
+
+        Returns:
+            The figure; a notebook shows it.
+
+        Raises:
+            ArgumentError: if no method is good enough, or there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
+        Example:
+            >>> import stepwell as sw
+            >>> advice = sw.advise("oscillator", tolerance=1e-3, methods=["rk4", "leapfrog"], cost="evaluations")
+            >>> figure = advice.plot()
+        """
+        from ..charts.advice_picture import draw
+        from ..charts.style import drawn
+
+        return drawn(path, lambda: draw(self))
 
     @property
     def title(self) -> str:

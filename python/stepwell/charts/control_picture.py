@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UnknownNameError
+from ..methods import Method
 from .control import ControlSweep
 from .control_runs import Held
-from .style import FONT, GREY, look, new_figure
+from .labels import title
+from .style import FONT, GREY, apart, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,17 +47,45 @@ def draw(chart: ControlSweep) -> Figure:
         left.set_ylabel("largest |E − E₀| / K₀")
         _panel(right, chart, "state_error" if chart.exact else "largest")
         right.set_ylabel("error of the last state, relative" if chart.exact else "largest coordinate")
-        figure.text(0.012, 0.945, f"{chart.title}: energy and state under control", size=20, weight="bold")
+        title(figure, 0.012, 0.945, f"{chart.title}: {finding(chart)}", 20)
         evaluations = ", ".join(map(str, chart.evaluations))
         what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
         figure.text(0.012, 0.905, textwrap.shorten(what, 150), size=13.5, color=GREY)
         _legend(figure, chart, methods)
         note = (
             "Left edge: without control. Right edge: projected after every step. Above the frame: gains at which a run diverged. "
-            "K: kinetic energy."
+            "K: kinetic energy. In the title: the limited form, median of all gains."
         )
         figure.text(0.012, 0.022, note, size=12, color=GREY)
     return figure
+
+
+def finding(chart: ControlSweep) -> str:
+    """Before and after: for how many methods control at the median gain has a smaller energy error than none, and by how much."""
+    factors = []
+    for line in chart.lines:
+        if line.kind != "limited":
+            continue
+        count = chart.evaluations[
+            [same for same in chart.lines if (same.method, same.kind) == (line.method, "limited")].index(line)
+        ]
+        try:
+            before = float(chart.line(line.method, "none", count).energy_error[0])
+        except UnknownNameError:
+            continue
+        held = line.energy_error[np.isfinite(line.energy_error)]
+        after = float(np.median(held)) if held.size else np.inf
+        factors.append(before / max(after, LEAST_DRAWN))
+    if not factors:
+        return "energy and state under control"
+    better = sum(1 for factor in factors if factor > 1.0)
+    said = f"control lowers the energy error of {better} of {len(factors)} runs"
+    return f"{said}, by a factor of {float(np.median(factors)):.2g}" if better == len(factors) else said
+
+
+def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
+    """Each method has a colour of its own."""
+    return apart({line.method.name: line.method for line in chart.lines}.values(), method)
 
 
 def _panel(axes: Axes, chart: ControlSweep, what: str) -> None:
@@ -66,7 +97,7 @@ def _panel(axes: Axes, chart: ControlSweep, what: str) -> None:
     axes.set_xlim(low / 10 ** (0.09 * wide), high * 10 ** (0.13 * wide))
     for line in chart.lines:
         values = np.maximum(getattr(line, what), LEAST_DRAWN)
-        seen = look(line.method)
+        seen = _look(chart, line.method)
         if line.kind in FORMS:
             shown = np.where(np.isfinite(values), values, np.nan)
             axes.plot(line.relative, shown, **(seen | FORMS[line.kind]), markevery=_every(line, chart))
@@ -101,7 +132,7 @@ def _strip(axes: Axes, line: Held, lost: Any, chart: ControlSweep) -> None:
         return
     names = list(dict.fromkeys(each.method.name for each in chart.lines))
     height = 1.0 + FIRST + ROW * names.index(line.method.name)
-    style = look(line.method) | FORMS[line.kind] | {"linestyle": "none", "clip_on": False}
+    style = _look(chart, line.method) | FORMS[line.kind] | {"linestyle": "none", "clip_on": False}
     axes.plot(line.relative[lost], np.full(lost.sum(), height), transform=axes.get_xaxis_transform(), **style)
 
 
@@ -112,7 +143,7 @@ def _legend(figure: Figure, chart: ControlSweep, methods: list[Any]) -> None:
     handles: list[Any] = []
     labels = []
     for method in methods:
-        handles.append(Line2D([], [], **(look(method) | {"linestyle": "none"})))
+        handles.append(Line2D([], [], **(_look(chart, method) | {"linestyle": "none"})))
         dt = next(line.dt for line in chart.lines if line.method == method)
         labels.append(f"{method.title}, h = {dt:.4g}")
     texts = {"limited": "limited form", "printed": "printed form"}

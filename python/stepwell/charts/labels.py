@@ -12,6 +12,7 @@ from .._checks import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Places that are tried along a curve, points of a curve that a label should not cover, and pixels from a curve to its label.
 ANCHORS, POINTS, GAP = 24, 240, 7.0
@@ -29,10 +30,18 @@ class Label:
     style: dict[str, Any]
 
 
-def beside(axes: Axes, labels: Sequence[Label]) -> list[str]:
+#: The places of a label beside a point of its curve: its corner, as shares of its width and height.
+PLACES = ((0.0, -0.5, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 0.0), (-1.0, -0.5, 0.0), (-1.0, 0.0, 0.0), (-1.0, -1.0, 0.0))
+
+#: The label of a single point may also be so many of its heights above or below it, with a line to it.
+FARTHER = tuple((dx, dy, 1.15 * rows) for rows in range(1, 9) for dy in (-1.0, 0.0) for dx in (0.0, -0.5, -1.0))
+
+
+def beside(axes: Axes, labels: Sequence[Label], keep_off: Sequence[tuple[float, float, float, float]] = ()) -> list[str]:
     """Put each label where it covers least, the first ones first; those for which there is no room are returned.
 
-    The axes must have their final limits. A label lies within the axes and overlaps no other.
+    The axes must have their final limits. A label lies within the axes and overlaps no other, and none of the boxes ``keep_off``
+    (left, bottom, right, top, in pixels).
     """
     figure: Any = axes.get_figure()
     renderer = figure.canvas.get_renderer()
@@ -40,6 +49,7 @@ def beside(axes: Axes, labels: Sequence[Label]) -> list[str]:
     curves = [_pixels(axes, label.points) for label in labels]
     covered = np.concatenate([_dense(curve, POINTS) for curve in curves] or [np.empty((0, 2))])
     taken: list[Any] = [tuple(text.get_window_extent(renderer).extents) for text in axes.texts if text.get_text()]
+    taken += keep_off
     left: list[str] = []
     for label, curve in zip(labels, curves, strict=True):
         text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **label.style)
@@ -49,16 +59,18 @@ def beside(axes: Axes, labels: Sequence[Label]) -> list[str]:
         inside = curve[
             (curve[:, 0] >= frame.x0) & (curve[:, 0] <= frame.x1) & (curve[:, 1] >= frame.y0) & (curve[:, 1] <= frame.y1)
         ]
+        single = len(curve) == 1
         for place, (x, y) in enumerate(_dense(inside, ANCHORS)[::-1]):
-            for dx, dy in ((0.0, -0.5), (0.0, -1.0), (0.0, 0.0), (-1.0, -0.5), (-1.0, 0.0), (-1.0, -1.0)):
+            for dx, dy, rows in PLACES + FARTHER if single else PLACES:
                 low_x = x + (GAP if dx == 0.0 else -GAP) + dx * width
-                low_y = y + dy * height + GAP * (2.0 * dy + 1.0)
+                low_y = y + dy * height + (GAP + rows * height) * (2.0 * dy + 1.0)
                 box = (low_x, low_y, low_x + width, low_y + height)
                 out = box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1
                 if out or any(_overlap(box, other) for other in taken):
                     continue
                 hidden = (covered[:, 0] > box[0]) & (covered[:, 0] < box[2]) & (covered[:, 1] > box[1]) & (covered[:, 1] < box[3])
-                cost = float(hidden.sum()) + 0.2 * place  # the fine end of a curve is where curves are farthest apart
+                # The fine end of a curve is where curves are farthest apart.
+                cost = float(hidden.sum()) + 0.2 * place + 0.3 * rows
                 if best is None or cost < best[0]:
                     best = (cost, low_x, low_y)
         if best is None:
@@ -70,7 +82,22 @@ def beside(axes: Axes, labels: Sequence[Label]) -> list[str]:
         at = axes.transData.inverted().transform((low_x + AIR, low_y + AIR))
         text.set_transform(axes.transData)
         text.set_position((float(at[0]), float(at[1])))
+        if single and not low_y - 2.0 * GAP <= curve[0, 1] <= low_y + height + 2.0 * GAP:
+            end = axes.transData.inverted().transform(
+                (float(np.clip(curve[0, 0], low_x, low_x + width)), low_y if low_y > curve[0, 1] else low_y + height)
+            )
+            axes.plot(*np.array([label.points[0], end]).T, color=text.get_color(), linewidth=0.7, zorder=1.5)
     return left
+
+
+def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
+    """A bold title at that place of the page, smaller where it would leave it."""
+    drawn = figure.text(x, y, text, size=size, weight="bold")
+    canvas: Any = figure.canvas
+    box = drawn.get_window_extent(canvas.get_renderer())
+    room = figure.bbox.width * (1.0 - x) - 10.0
+    if box.width > room:
+        drawn.set_fontsize(size * room / box.width)
 
 
 def _pixels(axes: Axes, points: Array) -> Array:

@@ -7,8 +7,9 @@ import textwrap
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from .labels import title as put_title
 from .panel import Panel
-from .picture import COUNTED, ERRORS, draw_errors, known_to, name_curves, title_of
+from .picture import COUNTED, DIGITS_OF, ERRORS, draw_errors, family_of, known_to, name_curves, with_way
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
@@ -56,7 +57,8 @@ def draw(panel: Panel, error: str) -> Figure:
             note = f"{kind.replace('_', ' ')}, {note}" if len(kinds) > 1 else note
             axes.set_title(f"{chart.scene.title}\n", size=14, weight="bold", loc="left")
             axes.text(0.0, 1.02, note, transform=axes.transAxes, size=11, color=GREY)
-        figure.text(0.012, 1.0 - 0.42 / height, f"{leader(panel)}: what an error costs, scene by scene", size=20, weight="bold")
+        title = f"{leader(panel, error)}: what an error{DIGITS_OF[error]} costs, scene by scene"
+        put_title(figure, 0.012, 1.0 - 0.42 / height, title, 20)
         bottom = 0.12 / height
         figure.text(0.012, bottom, PALE_IS, size=12, color=GREY)
         figure.text(0.52, bottom, COUNTED, ha="center", size=14)
@@ -66,11 +68,18 @@ def draw(panel: Panel, error: str) -> Figure:
     return figure
 
 
-def leader(panel: Panel) -> str:
-    """Which method is the cheapest most often, of all scenes and all numbers of digits that any method reaches."""
-    best = [chart.best(10.0**-digits) for chart in panel.charts for digits in DIGITS]
-    names = [row["method"].split(",")[0] for row in best if row is not None]
+def leader(panel: Panel, error: str = "state_error") -> str:
+    """What is the cheapest most often, of all scenes and all numbers of digits of that error that any method reaches."""
+    best = []
+    for chart in panel.charts:
+        front = chart.front(error)
+        best += [next((row["method"] for row in front if row["error"] <= 10.0**-digits), None) for digits in DIGITS]
+    curves = dict.fromkeys(curve.name for chart in panel.charts for curve in chart.curves)
+    alone = len({family_of(name) for name in curves}) == 1
+    names = [name for name in best if name is not None]
     if not names:
-        return "No method has a digit right"
-    first, times = Counter(names).most_common(1)[0]
-    return f"{title_of(first)} is the cheapest in {times} of {len(names)} cases"
+        return f"No method has a digit{DIGITS_OF[error]} right"
+    first, times = Counter(name if alone else family_of(name) for name in names).most_common(1)[0]
+    meant = [name for name in names if first in (name, family_of(name))]
+    ways = [name for name in curves if family_of(name) == family_of(first)]
+    return f"{with_way(meant, ways)} is the cheapest in {times} of {len(names)} cases"

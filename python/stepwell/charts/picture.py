@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..methods import Method
 from ..methods import methods as every_method
 from .data import Curve, WorkPrecision
 from .labels import Label, beside
+from .labels import title as put_title
 from .peers import Peer
 from .style import FONT, GREY, PALE, look, new_figure, peer_look
 
@@ -36,6 +38,13 @@ ERRORS = {
     "phase_error": "phase error at the end of the run, periods",
     "energy_error": "largest energy error of the run, relative",
 }
+#: Digits of what, in a title; of the state if nothing is said.
+DIGITS_OF = {
+    "state_error": "",
+    "end_error": " at the end",
+    "phase_error": " of the phase",
+    "energy_error": " of the energy",
+}
 COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
@@ -50,7 +59,7 @@ def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
 
     with rc_context(FONT):
         unnamed = _panels(figure, chart, error, time)
-        _text(figure, chart, time, unnamed)
+        _text(figure, chart, error, time, unnamed)
     return figure
 
 
@@ -154,20 +163,38 @@ def name_curves(axes: Axes, chart: WorkPrecision, error: str, cost: str, size: f
     return [name.replace("\n", ", ") for name in beside(axes, labels)]
 
 
-def finding(chart: WorkPrecision) -> str:
-    """What the front says: the method that is the cheapest for most digits, and for which."""
+def finding(chart: WorkPrecision, error: str = "state_error") -> str:
+    """What the front of that error says: what is the cheapest for most digits, and for which."""
+    front = chart.front(error)
     cheapest: list[str] = []
-    while (row := chart.best(10.0 ** -(len(cheapest) + 1))) is not None:
-        cheapest.append(title_of(row["method"].split(",")[0]))
+    while front and front[-1]["error"] <= (wanted := 10.0 ** -(len(cheapest) + 1)):
+        cheapest.append(next(row["method"] for row in front if row["error"] <= wanted))
     if not cheapest:
-        return "no method has a digit right"
-    runs = [(title, len(list(same))) for title, same in itertools.groupby(cheapest)]
+        return f"no method has a digit{DIGITS_OF[error]} right"
+    alone = len({curve.method.name for curve in chart.curves}) == 1
+    runs = [(kind, len(list(same))) for kind, same in itertools.groupby(each if alone else family_of(each) for each in cheapest)]
     longest = max(range(len(runs)), key=lambda i: runs[i][1])
-    title, number = runs[longest]
     first = 1 + sum(length for _, length in runs[:longest])
-    last = first + number - 1
+    last = first + runs[longest][1] - 1
     digits = "one digit" if first == last == 1 else f"{first} digits" if first == last else f"{first} to {last} digits"
-    return f"{title} is the cheapest for {digits}"
+    ways = [curve.name for curve in chart.curves if family_of(curve.name) == family_of(runs[longest][0])]
+    return f"{with_way(cheapest[first - 1 : last], ways)} is the cheapest for {digits}{DIGITS_OF[error]}"
+
+
+def family_of(name: str) -> str:
+    """The method of a curve, without how its steps were made."""
+    return name.split(",")[0]
+
+
+def with_way(cheapest: Sequence[str], ways: Sequence[str]) -> str:
+    """The title of a method and how its steps were made, if the chart has other ways and all that is meant was made in one."""
+    first = cheapest[0]
+    title = title_of(family_of(first))
+    if len(set(ways)) < 2 or set(cheapest) != {first}:
+        return title
+    kinds = first.split(", ")[1:]
+    step = "with a tolerance" if "tolerance" in kinds else "with fixed steps"
+    return f"{title} {step}{', fused,' if 'fused' in kinds else ''}"
 
 
 def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:
@@ -229,9 +256,9 @@ def title_of(name: str) -> str:
     return ", ".join([next((method.title for method in every_method() if method.name == first), first), *kinds])
 
 
-def _text(figure: Figure, chart: WorkPrecision, time: str, unnamed: list[str]) -> None:
+def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: list[str]) -> None:
     scene = chart.scene
-    figure.text(0.012, 0.955, f"{scene.title}: {finding(chart)}", size=20, weight="bold")
+    put_title(figure, 0.012, 0.955, f"{scene.title}: {finding(chart, error)}", 20)
     system = f"{scene.system!r} over {scene.horizon:.4g} units of time{known_to(chart)} ({scene.section})"
     figure.text(0.012, 0.915, textwrap.shorten(system, 150), size=13.5, color=GREY)
     what = f"one member of a batch of {chart.members}" if time == "batch" else "a single run"

@@ -15,7 +15,7 @@ from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, Particles, RigidBody, Rods, Springs
+from ..systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -50,11 +50,41 @@ class RunPicture(Drawn, Value):
         """``"orbits"`` of bodies and points, an aircraft's ``"attitude"``, a rigid ``"body"``, a ``"swing"`` or ``"rows"``."""
         if isinstance(self.run.system, (NBody, Particles, Rods, Springs)) and self.run.system.y_shape[-1] > 1:
             return "orbits"
+        if isinstance(self.run.system, (RestrictedThreeBody, Pendulum3D)):
+            return "orbits"  # of one point, beside what is fixed
         if hasattr(self.run.system, "commanded"):
             return "attitude"
         if isinstance(self.run.system, RigidBody):
             return "body"
         return "rows" if self.scene.system.y_shape else "swing"
+
+    @property
+    def places(self) -> Array:
+        """The places of points, shape (saved, points, dimensions)."""
+        return _of_points(self.run.y)
+
+    @property
+    def exact_places(self) -> Array | None:
+        """The same of the exact solution at the times of ``exact``, or None."""
+        return None if self.exact is None else _of_points(self.exact[2])
+
+    @property
+    def fixed_points(self) -> list[tuple[str, tuple[float, ...], tuple[int, ...]]]:
+        """Name, place, and the points at the other ends of its rods, of each body or end of a rod that does not move."""
+        system: Any = self.run.system
+        if isinstance(system, RestrictedThreeBody):
+            mu = float(system.mu)
+            names = ("earth", "moon") if mu == float(RestrictedThreeBody().mu) else ("heavy body", "light body")
+            return [(names[0], (-mu, 0.0), ()), (names[1], (1.0 - mu, 0.0), ())]
+        if isinstance(system, Pendulum3D):
+            return [("", (0.0, 0.0, 0.0), (0,))]
+        if not isinstance(system, Rods):
+            return []
+        ends = [(rod, anchor) for anchor in system.anchors for rod in system.rods if anchor in rod]
+        return [
+            ("", tuple(anchor), tuple(end for rod, one in ends if one == anchor for end in rod if isinstance(end, int)))
+            for anchor in system.anchors
+        ]
 
     @property
     def title(self) -> str:
@@ -87,20 +117,25 @@ class RunPicture(Drawn, Value):
         return draw(self)
 
     def animate(self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0) -> None:
-        """Write an animation of the run; its frames are the saved states, without interpolation.
+        """Write an animation of the run; its frames are the saved states.
+
+        A page (.html) holds the states themselves, as numbers of 16 bits, and draws them: it is small, is written at once and
+        needs no network. It shows more states than ``fps`` asks for if there is room, and where there is room for fewer, moves in
+        straight lines between them.
 
         Args:
-            path: the file, ending in .gif, .mp4 or .html.
+            path: the file, ending in .html, .gif or .mp4.
             seconds: how long it lasts, above zero.
             fps: frames a second, above zero; fewer if fewer states were saved.
 
         Raises:
             ArgumentError: what was given and what was expected.
-            UnsupportedError: if matplotlib is missing, or ffmpeg for .mp4.
+            UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
-        from .runs_animation import need, write
+        from . import page_animation, runs_animation
 
-        seconds, fps = need(path, seconds, fps)
+        seconds, fps = runs_animation.need(path, seconds, fps)
+        write = page_animation.write if Path(path).suffix.lower() == ".html" else runs_animation.write
         write(self, path, seconds, fps)
 
     def summary(self) -> dict[str, Any]:
@@ -223,6 +258,11 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
     with np.errstate(all="ignore"):
         error = np.abs(energy - energy[0]) / scale
     return np.where(np.isfinite(error), error, np.inf), name
+
+
+def _of_points(y: Array) -> Array:
+    """States as those of points; a block of one point has no axis of its own for it."""
+    return y if y.ndim == 3 else y[:, np.newaxis]
 
 
 def _largest(error: Array | None) -> float | None:

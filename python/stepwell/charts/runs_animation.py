@@ -12,7 +12,7 @@ from .. import _checks
 from ..errors import ArgumentError, UnsupportedError
 from . import attitude_picture, body_picture
 from .runs import RunPicture
-from .runs_picture import BODIES, EXACT, body, curves, errors, exact, greyed, left_picture, square, view
+from .runs_picture import BODIES, EXACT, body, curves, errors, exact, fixed, greyed, left_picture, square, view
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
@@ -31,9 +31,6 @@ DPI = 62.5
 TRAIL = 0.1
 TRAIL_OF_PERIOD = 0.3
 
-#: A page that holds an animation of this many megabytes is still shown.
-LIMIT = 500.0
-
 Show = Callable[[int], None]
 
 
@@ -51,11 +48,13 @@ def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
     ending = _checks.file("path", path).suffix.lower()
     if ending not in ENDINGS:
         raise ArgumentError(f"path: expected an ending of an animation, one of {', '.join(ENDINGS)}, got {str(path)!r}")
+    if ending == ".html":
+        return seconds, fps
     new_figure(1.0, 1.0)  # raises if matplotlib is missing
     from matplotlib.animation import FFMpegWriter
 
     if ending == ".mp4" and not FFMpegWriter.isAvailable():
-        raise UnsupportedError("animate: an .mp4 needs the program ffmpeg, which is not found; .gif and .html need nothing more")
+        raise UnsupportedError("animate: an .mp4 needs the program ffmpeg, which is not found; .gif and .html do not")
     return seconds, fps
 
 
@@ -69,12 +68,7 @@ def write(chart: RunPicture, path: str | Path, seconds: float, fps: float) -> No
     rate: Any = count / seconds
     ending = Path(path).suffix.lower()
     writer: Any
-    if ending == ".gif":
-        writer = animation.PillowWriter(fps=rate)
-    elif ending == ".mp4":
-        writer = animation.FFMpegWriter(fps=rate)
-    else:
-        writer = animation.HTMLWriter(fps=rate, embed_frames=True, default_mode="loop", embed_limit=LIMIT)
+    writer = animation.PillowWriter(fps=rate) if ending == ".gif" else animation.FFMpegWriter(fps=rate)
     with rc_context(FONT):
         figure, show = stage(chart)
         with writer.saving(figure, str(path), DPI):
@@ -126,14 +120,15 @@ def _errors(figure: Figure, chart: RunPicture, left: float) -> list[Axes]:
 def _orbits(figure: Figure, chart: RunPicture) -> Show:
     """Bodies with trails; those in space are seen along z."""
     plane = (0, 1)
-    run, bodies = chart.run, chart.run.y.shape[1]
+    run, bodies = chart.run, chart.places.shape[1]
     centre, size = view(chart, plane)
     axes = figure.add_axes((0.06, 0.1, 0.43, 0.76))
-    square(axes, centre, size, plane, run.y.shape[2])
-    y = np.clip(run.y, -1e9, 1e9)[..., plane]
-    if chart.exact is not None:
+    square(axes, centre, size, plane, chart.places.shape[2])
+    y = np.clip(chart.places, -1e9, 1e9)[..., plane]
+    fixed(axes, chart, plane)
+    if chart.exact_places is not None:
         for i in range(bodies):
-            exact(axes, chart.exact[2][:, i, plane].T)
+            exact(axes, chart.exact_places[:, i, plane].T)
     if left_picture(chart, [(centre, size)], size):
         figure.text(0.06, 0.02, "A body leaves the picture.", size=13, color=GREY)
     many = bodies > len(BODIES)

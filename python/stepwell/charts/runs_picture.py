@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from ..systems import Chain
 from .runs import RunPicture
-from .style import FONT, GREY, new_figure
+from .style import FAMILIES, FONT, GREY, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Greys, lines and marks of bodies, told apart without colour. More bodies than these are drawn alike.
+#: Hues, lines and marks of bodies. The hues are those of ``FAMILIES``, told apart in grey, too. More bodies are drawn alike.
 BODIES: tuple[dict[str, Any], ...] = (
-    {"color": "#000000", "linestyle": "-", "marker": "o"},
-    {"color": "#5a5a5a", "linestyle": (0, (6, 2)), "marker": "s"},
-    {"color": "#8c8c8c", "linestyle": (0, (1.5, 1.2)), "marker": "^"},
-    {"color": "#3a3a3a", "linestyle": (0, (6, 2, 1.2, 2)), "marker": "D"},
-    {"color": "#a3a3a3", "linestyle": "-", "marker": "v"},
+    {"color": FAMILIES["Runge-Kutta"], "linestyle": "-", "marker": "o"},
+    {"color": FAMILIES["Heun"], "linestyle": (0, (6, 2)), "marker": "s"},
+    {"color": FAMILIES["leapfrog"], "linestyle": (0, (1.5, 1.2)), "marker": "^"},
+    {"color": FAMILIES["PEFRL"], "linestyle": (0, (6, 2, 1.2, 2)), "marker": "D"},
+    {"color": FAMILIES["Euler"], "linestyle": "-", "marker": "v"},
 )
 EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "solid_capstyle": "round"}
 
@@ -60,7 +61,7 @@ def draw(chart: RunPicture) -> Figure:
             return figure
         if chart.kind == "orbits":
             _orbits(figure, chart, notes)
-            left = 0.55 if chart.run.y.shape[2] == 2 else 0.735
+            left = 0.55 if chart.places.shape[2] == 2 else 0.735
         else:
             panels = curves(figure, chart, notes)
             left = 0.66
@@ -78,13 +79,13 @@ def draw(chart: RunPicture) -> Figure:
 
 def _orbits(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     """One panel for bodies in a plane; two projections side by side, on one scale, for bodies in space."""
-    planes = ((0, 1),) if chart.run.y.shape[2] == 2 else ((0, 1), (0, 2))
+    planes = ((0, 1),) if chart.places.shape[2] == 2 else ((0, 1), (0, 2))
     views = [view(chart, plane) for plane in planes]
     size = max(half for _, half in views)
     side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.295, 0.055, 0.05)
     for i, (plane, (centre, _)) in enumerate(zip(planes, views, strict=True)):
         axes = figure.add_axes((left + i * (side + gap), BOTTOM, side, TOP - BOTTOM))
-        square(axes, centre, size, plane, chart.run.y.shape[2])
+        square(axes, centre, size, plane, chart.places.shape[2])
         _paths(axes, chart, plane, legend=i == 0)
     if left_picture(chart, views, size):
         notes.append("A body leaves the picture.")
@@ -92,17 +93,19 @@ def _orbits(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
 
 def view(chart: RunPicture, plane: tuple[int, int]) -> tuple[Array, float]:
     """The middle and half the side of a square that holds all that is not far away."""
-    known, far = (chart.scene.y[np.newaxis], VIEW_FACTOR_FROM_START) if chart.exact is None else (chart.exact[2], VIEW_FACTOR)
+    exact = chart.exact_places
+    known, far = (chart.places[:1], VIEW_FACTOR_FROM_START) if exact is None else (exact, VIEW_FACTOR)
     reach = far * max(float(np.abs(known).max()), 1e-300)
-    points = np.concatenate([known[..., plane].reshape(-1, 2), chart.run.y[chart.finite][..., plane].reshape(-1, 2)])
+    points = np.concatenate([known[..., plane].reshape(-1, 2), chart.places[chart.finite][..., plane].reshape(-1, 2)])
     points = points[(np.abs(points) <= reach).all(axis=1)]
+    points = np.concatenate([points, *(np.array([[at[i] for i in plane]]) for _, at, _ in chart.fixed_points)])
     low, high = points.min(axis=0), points.max(axis=0)
     return 0.5 * (low + high), 0.54 * float((high - low).max())
 
 
 def left_picture(chart: RunPicture, views: list[tuple[Array, float]], size: float) -> bool:
     """Whether a body goes where the panels do not reach."""
-    y = chart.run.y[chart.finite]
+    y = chart.places[chart.finite]
     return any(
         bool((np.abs(y[..., plane] - centre) > size).any()) for plane, (centre, _) in zip(((0, 1), (0, 2)), views, strict=False)
     )
@@ -131,7 +134,18 @@ def exact(axes: Axes, curve: Array, *, above: bool = False) -> None:
 
 def body(chart: RunPicture, i: int) -> dict[str, Any]:
     """Colour, line and mark of a body."""
-    return BODIES[i] if chart.run.y.shape[1] <= len(BODIES) else BODIES[0]
+    return BODIES[i] if chart.places.shape[1] <= len(BODIES) else BODIES[0]
+
+
+def fixed(axes: Axes, chart: RunPicture, plane: tuple[int, int]) -> None:
+    """The bodies, and the ends of rods, that do not move."""
+    for name, at, _ in chart.fixed_points:
+        x, y = (at[i] for i in plane)
+        axes.plot([x], [y], linestyle="", marker="o", markersize=9.0 if name else 5.0, color=GREY, zorder=4)
+        low, high = axes.get_xlim()
+        side = -1 if x > 0.5 * (low + high) else 1  # towards the middle, where there is room
+        way: dict[str, Any] = {"ha": "right" if side < 0 else "left", "textcoords": "offset points"}
+        axes.annotate(name, (x, y), (10 * side, 9), size=12, color=GREY, zorder=6, **way)
 
 
 def links(chart: RunPicture) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -146,17 +160,18 @@ def links(chart: RunPicture) -> np.ndarray[Any, np.dtype[np.int64]]:
 def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: bool) -> None:
     from matplotlib.lines import Line2D
 
-    y = np.clip(chart.run.y[chart.finite], -1e9, 1e9)[..., plane]
+    y = np.clip(chart.places[chart.finite], -1e9, 1e9)[..., plane]
     bodies = y.shape[1]
+    fixed(axes, chart, plane)
     if (joined := links(chart)).size:
         from matplotlib.collections import LineCollection
 
         for state, colour in ((y[0], "#b0b0b0"), (y[-1], "#000000")):
             axes.add_collection(LineCollection(state[joined], colors=colour, linewidths=1.0, zorder=3))
     long, many = len(y) > LONG_CURVE, bodies > len(BODIES)
-    if chart.exact is not None:
+    if chart.exact_places is not None:
         for i in range(bodies):
-            exact(axes, chart.exact[2][:, i, plane].T, above=long)
+            exact(axes, chart.exact_places[:, i, plane].T, above=long)
     for i in range(bodies):
         look = body(chart, i)
         line: dict[str, Any] = {"color": look["color"], "linestyle": "-" if long or many else look["linestyle"]}
@@ -180,7 +195,8 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
     for i in range(0 if many else bodies):
         look = body(chart, i)
         handles.append(Line2D([], [], **(look | {"linestyle": "-" if long else look["linestyle"]}), linewidth=1.4, markersize=8))
-        labels.append(f"body {i + 1}" if np.ptp(masses) == 0.0 else f"mass {masses[i]:g}")
+        alike = f"body {i + 1}" if bodies > 1 else chart.run.method.title
+        labels.append(alike if np.ptp(masses) == 0.0 else f"mass {masses[i]:g}")
     if chart.exact is not None:
         dashed = {"color": "black", "linewidth": 1.5, "linestyle": (0, (3, 1.5))}
         handles.append(Line2D([], [], **(dashed if long else EXACT)))
@@ -265,7 +281,8 @@ def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
         )
     axes.set_yticks([place * step for place in range(len(chosen))], [str(i + 1) for i in chosen.tolist()])
     axes.set_ylim(-1.15 * size, (len(chosen) - 1) * step + 1.15 * size)
-    axes.set_ylabel(f"coordinate; from line to line {step:.3g}")
+    what = "mass" if isinstance(chart.run.system, Chain) else "coordinate"
+    axes.set_ylabel(f"number of the {what}; from line to line {step:.3g}")
     over_time(axes, chart)
 
 

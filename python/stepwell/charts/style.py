@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,8 @@ FAMILIES = {
 COLOURS = tuple(FAMILIES.values())
 #: What is not the finding.
 PALE = "#b8b8b8"
+#: For a second, third and fourth method of one family.
+SECOND = ("#111111", "#666666", "#999999")
 PEERS = "1234+|"
 #: The line shows the order: the higher, the more solid.
 LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
@@ -48,6 +50,20 @@ def look(method: Method) -> dict[str, Any]:
         "linewidth": 1.6,
         "markersize": 7.5,
     }
+
+
+def apart(methods: Iterable[Method], method: Method) -> dict[str, Any]:
+    """Keywords for a line of a method in a chart where each has a colour of its own: the second of a family is black.
+
+    The third and fourth are grey. Where curves have their names beside them, methods of a family share its colour.
+    """
+    before: list[str] = []
+    for each in methods:
+        if each.name == method.name:
+            break
+        before.append(family(each))
+    place = before.count(family(method))
+    return look(method) | ({} if place == 0 else {"color": SECOND[min(place, len(SECOND)) - 1]})
 
 
 def family(method: Method) -> str:

@@ -13,7 +13,6 @@ from ..errors import ArgumentError, UnsupportedError
 from ..methods import Method, choice
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody
 from . import measure
 from .data import Curve, WorkPrecision
 from .known import chartable
@@ -29,8 +28,11 @@ EXTRA_RUNGS = 2
 #: The most steps of a run of the ladder; more would take minutes.
 MAX_STEPS = 2_000_000
 
-#: For blocks of more numbers than this it is divided by the ratio; for bodies by its square, as the number of their pairs grows.
+#: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
 SMALL_BLOCK = 16
+
+#: But it is so many times the number of steps that the scene takes: large nets are stable only near that.
+TIMES_THE_SCENE = 10.0
 
 #: Steps of the ladder per factor of ten.
 RUNGS_PER_DECADE = 10
@@ -134,9 +136,9 @@ def work_precision(
 
 def _ladder(scene: Scene) -> list[int]:
     """Numbers of steps, evenly spread on a logarithmic scale."""
-    share = min(1.0, SMALL_BLOCK / max(1, scene.y.size))
-    most = MAX_STEPS * (share**2 if isinstance(scene.system, NBody) else share)
-    few, many = scene.horizon / (LARGEST * scene.dt), min(most, scene.horizon / (SMALLEST * scene.dt))
+    usual = scene.horizon / scene.dt
+    most = MAX_STEPS * min(1.0, SMALL_BLOCK / max(1, scene.y.size)) ** 2
+    few, many = usual / LARGEST, min(max(most, TIMES_THE_SCENE * usual), MAX_STEPS, usual / SMALLEST)
     few = max(4.0, few)
     gaps = round(RUNGS_PER_DECADE * np.log10(many / few))
     rungs = few * (many / few) ** (np.arange(-EXTRA_RUNGS, gaps + 1) / gaps)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks import Array
 from ..stability.eigen import Complex
-from .style import FONT, GREY, new_figure
+from .style import FAMILIES, FONT, GREY, family, new_figure
 from .zplane import Locus, Stability
 
 if TYPE_CHECKING:
@@ -32,14 +33,22 @@ MARKED, ASIDE = 0.5, 0.17
 #: by at usual steps must be seen.
 LINEAR_BELOW, GROWTH_MIN, GROWTH_MAX = 1e-6, -1.6, 10.0
 
+#: Methods whose eigenvalues differ by less than this at every Φ share a panel. They are the same but for rounding, of which a
+#: double eigenvalue shows the root, some 10⁻⁸; methods that are not the same differ by far more at the largest Φ.
+ALIKE = 1e-6
+
+#: Letters in a line of names above a panel.
+LETTERS = 34
+
 #: Ψ/Φ is shown up to here.
 TURNS = 2.3
 
 
 def loci(chart: Stability) -> Figure:
     """The eigenvalues in the z-plane, a panel for each method."""
-    across, down = _grid(len(chart.loci))
-    width, height = max(WIDTH, 3.7 * across + 0.9), 4.15 * down + 2.0
+    shared = groups(chart)
+    across, down = _grid(len(shared))
+    width, height = max(WIDTH, 3.7 * across + 0.9), 4.15 * down + 2.2
     figure = new_figure(width, height)
     from matplotlib import rc_context
 
@@ -48,26 +57,26 @@ def loci(chart: Stability) -> Figure:
             "left": 0.8 / width,
             "right": 1.0 - 0.1 / width,
             "bottom": 1.15 / height,
-            "top": 1.0 - 1.4 / height,
+            "top": 1.0 - 1.6 / height,
             "wspace": 0.06,
             "hspace": 0.2,
         }
         panels: Any = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False, gridspec_kw=places)
-        for axes in panels.ravel()[len(chart.loci) :]:
+        for axes in panels.ravel()[len(shared) :]:
             axes.set_visible(False)
-        for i, (axes, locus) in enumerate(zip(panels.ravel(), chart.loci, strict=False)):
+        for i, (axes, same) in enumerate(zip(panels.ravel(), shared, strict=False)):
             _plane(axes)
-            _path(axes, locus)
-            axes.set_title(_title(locus), size=13, linespacing=1.25)
+            _path(axes, same[0], _colour(same))
+            axes.set_title(_title(same), size=13, linespacing=1.25)
             if i % across == 0:
                 axes.set_ylabel("Im z")
-            if i + across >= len(chart.loci):
+            if i + across >= len(shared):
                 axes.set_xlabel("Re z")
                 axes.tick_params(labelbottom=True)
         _text(
             figure,
-            "Where the eigenvalues of a step go as Φ = ω₀·dt grows",
-            "Undamped oscillator: roots of z² − 2pz + q = 0 (§4). Inside the unit circle samples decay, outside they grow.",
+            finding(chart),
+            "Eigenvalues of a step as Φ = ω₀·dt grows, undamped oscillator (§4). Inside the circle samples decay.",
             "Solid: bounded samples; dashed: growing ones. Dots: Φ in radians. Diamond: where a root leaves the circle.\n"
             "Rays: Ψ = 30°, 90°, 150°, that is 12, 4 and 2.4 samples per period.",
         )
@@ -88,7 +97,7 @@ def _plane(axes: Axes) -> None:
     axes.set(xlim=(-REACH, REACH), ylim=(-REACH, REACH), aspect="equal", xticks=(-1, 0, 1), yticks=(-1, 0, 1))
 
 
-def _path(axes: Axes, locus: Locus) -> None:
+def _path(axes: Axes, locus: Locus, colour: str) -> None:
     """Both eigenvalues, with the angles at which they are there, and where one leaves the circle."""
     z, stable = branches(locus.eigenvalues), np.asarray(locus.stable)
     # Between a pair and two real ones both meet on the axis; without that point a line would cut the corner.
@@ -98,8 +107,8 @@ def _path(axes: Axes, locus: Locus) -> None:
     bounded = np.insert(stable, meet + 1, stable[meet] & stable[meet + 1])
     for branch in path:
         inside = np.where(bounded, branch, np.nan)
-        axes.plot(branch.real, branch.imag, color="black", linewidth=1.3, linestyle=(0, (3, 1.5)), zorder=2)
-        axes.plot(inside.real, inside.imag, color="black", linewidth=2.4, zorder=3)
+        axes.plot(branch.real, branch.imag, color=colour, linewidth=1.3, linestyle=(0, (3, 1.5)), zorder=2)
+        axes.plot(inside.real, inside.imag, color=colour, linewidth=2.4, zorder=3)
     taken = list(GUIDES.values())
     if locus.limit.mode is not None:
         edge = locus.limit.mode.eigenvalue
@@ -150,8 +159,9 @@ def branches(eigenvalues: Complex) -> Complex:
 
 def curves(chart: Stability) -> Figure:
     """r₁² − 1 and Ψ/Φ over Φ, a pair of panels for each method."""
-    across, down = _grid(len(chart.loci))
-    width, height = max(WIDTH, 3.8 * across + 1.4), 4.5 * down + 2.0
+    shared = groups(chart)
+    across, down = _grid(len(shared))
+    width, height = max(WIDTH, 3.8 * across + 1.4), 4.6 * down + 2.2
     figure = new_figure(width, height)
     from matplotlib import rc_context
     from matplotlib.ticker import MaxNLocator
@@ -163,29 +173,29 @@ def curves(chart: Stability) -> Figure:
             left=1.25 / width,
             right=1.0 - 0.15 / width,
             bottom=1.3 / height,
-            top=1.0 - 1.4 / height,
+            top=1.0 - 1.6 / height,
             wspace=0.06,
-            hspace=0.25,
+            hspace=0.28,
         )
         first: dict[int, Axes] = {}
-        for i, locus in enumerate(chart.loci):
+        for i, same in enumerate(shared):
             inner = outer[i // across, i % across].subgridspec(2, 1, hspace=0.06)
             pair = []
             for row, draw in enumerate((_radius, _ratio)):
                 axes = figure.add_subplot(inner[row], sharex=first.get(0), sharey=first.get(row))
                 first.setdefault(row, axes)
-                draw(axes, locus)
+                draw(axes, same[0], _colour(same))
                 axes.grid(which="major", color="#dddddd", linewidth=0.8)
                 axes.tick_params(labelleft=i % across == 0)
                 pair.append(axes)
             pair[0].tick_params(labelbottom=False)
-            pair[0].set_title(_title(locus), size=13, linespacing=1.25)
+            pair[0].set_title(_title(same), size=13, linespacing=1.25)
             if i % across == 0:
                 pair[0].set_ylabel("r₁² − 1")
                 pair[1].set_ylabel("Ψ/Φ")
                 for axes in pair:
                     axes.yaxis.set_label_coords(-0.72 * across / (width - 1.35), 0.5)
-            if i + across >= len(chart.loci):
+            if i + across >= len(shared):
                 pair[1].set_xlabel("Φ = ω₀·dt (rad)")
         first[0].set_xlim(0.0, float(chart.phi[-1]))
         first[0].xaxis.set_major_locator(MaxNLocator(4, prune="upper"))
@@ -199,7 +209,7 @@ def curves(chart: Stability) -> Figure:
     return figure
 
 
-def _radius(axes: Axes, locus: Locus) -> None:
+def _radius(axes: Axes, locus: Locus, colour: str) -> None:
     from matplotlib.ticker import NullLocator
 
     axes.set_yscale("symlog", linthresh=LINEAR_BELOW, linscale=0.6)
@@ -208,19 +218,19 @@ def _radius(axes: Axes, locus: Locus) -> None:
     axes.set_yticks(ticks, ["−1", "−10⁻²", "−10⁻⁴", "0", "10⁻⁴", "10⁻²", "1"])
     axes.yaxis.set_minor_locator(NullLocator())
     axes.axhspan(0.0, GROWTH_MAX, facecolor="none", edgecolor="#cccccc", hatch="//", linewidth=0.0, zorder=0)
-    _lines(axes, locus, locus.r1_squared - 1.0, locus.r1_squared_series - 1.0)
+    _lines(axes, locus, colour, locus.r1_squared - 1.0, locus.r1_squared_series - 1.0)
 
 
-def _ratio(axes: Axes, locus: Locus) -> None:
+def _ratio(axes: Axes, locus: Locus, colour: str) -> None:
     axes.set_ylim(-0.08, TURNS)
     axes.set_yticks((0.0, 0.5, 1.0, 1.5, 2.0))
     axes.axhline(1.0, color=GREY, linewidth=0.8)
-    _lines(axes, locus, locus.ratio, locus.ratio_series)
+    _lines(axes, locus, colour, locus.ratio, locus.ratio_series)
 
 
-def _lines(axes: Axes, locus: Locus, exact: Array, approximate: Array) -> None:
+def _lines(axes: Axes, locus: Locus, colour: str, exact: Array, approximate: Array) -> None:
     pair = locus.eigenvalues[0].imag != 0.0
-    axes.plot(locus.phi, np.where(pair, exact, np.nan), color="black", linewidth=2.0, zorder=3)
+    axes.plot(locus.phi, np.where(pair, exact, np.nan), color=colour, linewidth=2.4, zorder=3)
     axes.plot(locus.phi, np.where(pair, np.nan, exact), color=GREY, linewidth=1.4, linestyle=(0, (3, 1.5)), zorder=3)
     axes.plot(locus.phi, approximate, color="black", linewidth=1.6, linestyle=(0, (1, 1.6)), zorder=4)
     if 0.0 < locus.limit <= locus.phi[-1]:
@@ -233,9 +243,44 @@ def _grid(panels: int) -> tuple[int, int]:
     return across, -(-panels // across)
 
 
-def _title(locus: Locus) -> str:
-    limit = f"stable for Φ < {locus.limit:.5g}" if locus.limit else "never stable"
-    return f"{locus.method.title} ({locus.method.section})\n{limit}"
+def groups(chart: Stability) -> list[tuple[Locus, ...]]:
+    """The methods with the same eigenvalues together, each group where its first one is."""
+    found: list[list[Locus]] = []
+    for locus in chart.loci:
+        for same in found:
+            if np.allclose(same[0].eigenvalues, locus.eigenvalues, rtol=ALIKE, atol=ALIKE):
+                same.append(locus)
+                break
+        else:
+            found.append([locus])
+    return [tuple(same) for same in found]
+
+
+def finding(chart: Stability) -> str:
+    """How many methods are never stable, and which are the same."""
+    if len(chart.loci) == 1:
+        return f"{chart.loci[0].method.title}: {_limit(chart.loci[0])}"
+    never = sum(1 for locus in chart.loci if not locus.limit)
+    said = f"{never} of {len(chart.loci)} methods {'is' if never == 1 else 'are'} never stable"
+    most = max(groups(chart), key=len)
+    others = " others" if never and most[0].limit else ""
+    return f"{said}; {len(most)}{others} have the same eigenvalues" if len(most) > 1 else said
+
+
+def _colour(same: tuple[Locus, ...]) -> str:
+    """That of the family, if all are of one."""
+    families = {family(locus.method) for locus in same}
+    return FAMILIES[families.pop()] if len(families) == 1 else "black"
+
+
+def _limit(locus: Locus) -> str:
+    return f"stable for Φ < {locus.limit:.5g}" if locus.limit else "never stable"
+
+
+def _title(same: tuple[Locus, ...]) -> str:
+    first = same[0].method
+    names = f"{first.title} ({first.section})" if len(same) == 1 else ", ".join(locus.method.title for locus in same)
+    return "\n".join([*textwrap.wrap(names, LETTERS), _limit(same[0])] if len(same) > 1 else [names, _limit(same[0])])
 
 
 def _text(figure: Figure, title: str, below: str, notes: str) -> None:

@@ -1,4 +1,7 @@
-"""Show scenes in a browser: two methods side by side, with sliders; or write that page, which needs no server."""
+"""Show scenes in the browser, by two methods side by side.
+
+The page has sliders for the step and the parameters, and needs no server; -o writes it to a file.
+"""
 
 from __future__ import annotations
 

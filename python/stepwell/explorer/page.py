@@ -45,11 +45,6 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
     scene's parameters. It is one file that needs no server and no network; its steps are those that ``stepwell.export`` writes in
     JavaScript, and so have the numbers of ``integrate``, to the last bit.
 
-    ::
-
-        >>> sw.explore().save("explorer.html")
-        >>> sw.explore("kepler").open()
-
     Args:
         scenes: a scene or a name of one, or a list of these; all built-in scenes that are short enough for a page if None.
         methods: names of the methods to choose from, or what ``stepwell.methods`` returns; all if None.
@@ -60,6 +55,11 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.
+
+    Example:
+        >>> page = sw.explore("kepler", methods=["leapfrog", "rk4"])
+        >>> page.save("kepler.html").name
+        'kepler.html'
     """
     page = Explorer(tuple(_scenes(scenes)), tuple(chosen_methods(methods)))
     _ = page.data  # so that what cannot be shown is an error here
@@ -93,6 +93,11 @@ class Explorer(Value):
     Attributes:
         scenes: the scenes that it offers, the first is shown at first.
         methods: the methods that it offers.
+
+    Example:
+        >>> page = sw.explore(["clover", "oscillator"], methods=["false_euler", "rk4"])
+        >>> [scene.name for scene in page.scenes]
+        ['clover', 'oscillator']
     """
 
     scenes: tuple[Scene, ...]

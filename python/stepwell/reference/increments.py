@@ -90,7 +90,7 @@ class Rewriting:
                 return increment._replace(x=self.plain(x))
         return self.same(line)
 
-    def sum(self, line: int) -> int | Increment:
+    def addition(self, line: int) -> int | Increment:
         """A sum or a difference: an increment if both terms are increments of one factor."""
         name, (a, b), _ = self.tape[line]
         is_difference = name == "subtract"
@@ -126,7 +126,7 @@ class Rewriting:
             case "negate" if isinstance(value := self.values[of[0]], Increment):
                 return value._replace(c=-value.c)
             case "add" | "subtract":
-                return self.sum(line)
+                return self.addition(line)
             case _:
                 return self.same(line)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,11 @@ from . import eigen, maps
 from .eigen import Complex
 from .exact import MAX_ROWS
 from .parts import spectra
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
 
 #: How a sequence of samples behaves (§4), by the dominant eigenvalue. A single negative eigenvalue, which the document does not
 #: list, changes the sign at every step: an oscillation of two samples per period. If so many eigenvalues nearly
@@ -178,6 +183,28 @@ class Analysis(Value):
         for k in range(1, self._run.steps):  # the last saved state makes no step in the run
             product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw the eigenvalues of the step in the z-plane, with those of the exact solution, and write the picture if asked.
+
+        Args:
+            path: the file; its ending says in which format.
+
+        Returns:
+            The figure; a notebook shows it.
+
+        Raises:
+            ArgumentError: if there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
+        Example:
+            >>> import stepwell as sw
+            >>> figure = sw.analyse(sw.Oscillator(), "rk4", dt=0.5).plot()
+        """
+        from ..charts.roots_picture import draw
+        from ..charts.style import drawn
+
+        return drawn(path, lambda: draw(self))
 
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks."""

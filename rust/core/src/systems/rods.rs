@@ -162,9 +162,7 @@ impl<N: Number> Links<N> {
     pub(crate) fn given(p: &Parameters<N>) -> Option<Self> {
         match p.given.system.as_str() {
             "rods" => Some(Links::new(p)),
-            "pendulum_3d" => {
-                Some(Links::of(3, vec![[1, 0]], vec![N::of(1.0)], vec![p.number("length")], vec![N::of(0.0); 3]))
-            }
+            "pendulum_3d" => Some(Links::of(3, vec![[1, 0]], vec![N::of(1.0)], vec![p.number("length")], vec![N::of(0.0); 3])),
             _ => None,
         }
     }
@@ -313,7 +311,10 @@ impl<N: Number> System<N> for Rods<N> {
             }
             "angular_momentum" => {
                 let of = |(i, mass): (usize, &N)| {
-                    cross(self.links.at(y.as_slice(), i), self.links.at(v.as_slice(), i)).into_iter().map(|part| *mass * part).collect::<Vec<N>>()
+                    cross(self.links.at(y.as_slice(), i), self.links.at(v.as_slice(), i))
+                        .into_iter()
+                        .map(|part| *mass * part)
+                        .collect::<Vec<N>>()
                 };
                 let sum = |whole: Vec<N>, each: Vec<N>| whole.iter().zip(each).map(|(a, b)| *a + b).collect();
                 self.links.masses.iter().enumerate().map(of).reduce(sum)
