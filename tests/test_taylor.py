@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import mpmath
@@ -17,6 +19,10 @@ from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
 from test_graphs import assert_one_graph
 from truths import DRIVE, END, FORCE, OMEGA, forced_exact
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benches.compare.chosen import solar  # noqa: E402
 
 TAYLOR = sw.method("taylor")
 EPS = 2.0**-52
@@ -221,7 +227,7 @@ def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
         tolerated = tolerance * max(1.0, reach)
         reach = min((tolerated * math.factorial(k)) ** (1.0 / k) for k in (order - 1, order)) * math.exp(-0.7 / (order - 1))
     assert abs(run.paces.h / reach - 1.0) < 1e-7
-    assert run.paces.evaluations == order * (run.paces.accepted + 2)  # the held step twice, and one to the saved time
+    assert run.paces.evaluations == order * (run.paces.accepted + 1)  # the step with the saved time is held, not taken
     assert abs(run.y[-1] / math.exp(5.0) - 1.0) < (5.0 / reach + 1.0) * (2.0 * tolerance + 10 * EPS)
 
 
@@ -306,6 +312,36 @@ def test_energy_at_rounding_level() -> None:
     speed, place = run.v[:, 1], run.y[:, 1]
     energy = 0.5 * (speed**2).sum(axis=1) - 1.0 / np.sqrt((place**2).sum(axis=1))
     assert np.abs(energy + 0.5).max() < 10 * math.sqrt(float(run.paces.accepted)) * 2 * EPS
+
+
+def _growth_of_energy_errors(tolerance: float) -> float:
+    """The power of the time with which energy errors of the outer solar system grow: root mean squares of 64 turned systems."""
+    members, years = 64, np.array([25.0, 1600.0])
+    rng = np.random.default_rng(1937)
+    turns = np.linalg.qr(rng.normal(size=(members, 3, 3)))[0]
+    v, y = (np.einsum("mij,bj->bim", turns, block) for block in solar.at_rest())
+    run = sw.integrate(
+        sw.NBody(solar.MASSES, force="newton", G=solar.G), "taylor", v=v, y=y, tolerance=tolerance, at=[*solar.YEAR * years]
+    )
+    assert not run.status.any()
+    start = np.stack([solar.energy(v[None, ..., i], y[None, ..., i]) for i in range(members)], axis=-1)
+    end = np.stack([solar.energy(run.v[..., i], run.y[..., i]) for i in range(members)], axis=-1)
+    rms = np.sqrt(np.mean(((end - start) / start).astype(float) ** 2, axis=-1))
+    return float(np.log(rms[1] / rms[0]) / np.log(years[1] / years[0]))
+
+
+def test_energy_errors_grow_as_the_square_root_of_the_time() -> None:
+    """Of a walk at random (Brouwer 1937) the power is 1/2; of a bias, however small, it is 1 at last.
+
+    A turned system has other roundings, so 64 of them are as many walks. A root mean square of n of them is known to
+    1/√(2n) of itself, so the power between the two times, 64 apart, to √2/√(2n)/ln 64 = 0.03; four times that is allowed.
+    """
+    assert abs(_growth_of_energy_errors(2.0**-53) - 0.5) < 0.12
+
+
+def test_a_bias_of_the_energy_is_noticed() -> None:
+    """At a tolerance at which the terms that are cut off count: these always err to the same side."""
+    assert _growth_of_energy_errors(1e-7) > 0.5 + 2 * 0.12
 
 
 def test_motion_without_forces_is_exact_however_long_the_step() -> None:

@@ -425,8 +425,10 @@ def _adapt(
         pace = pace._replace(work=np.zeros(batch))
         plan = plan._replace(order=_order(how, pace))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
-    attempts = engine.evaluations(how, system, order=plan.order, paced=True)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
+    # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
+    again = out.pace.held > 0.0 if how.has_series and not fused else extra_steps
+    evaluations = engine.evaluations(how, system, order=plan.order, paced=True) * (accepted + rejected + again)
     run = Run(
         t=times,
         v=out.v,
@@ -441,7 +443,7 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, attempts * (accepted + rejected + extra_steps)),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, evaluations),
         stand=AdaptiveState(
             out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
         ),

@@ -19,10 +19,17 @@ const BOUNDS: [f64; 2] = [1e-280, 1e280];
 /// The margin of a step of order p is exp(−MARGIN/(p − 1)).
 const MARGIN: f64 = 0.7;
 
-/// One step, or one extra step, which leaves the pace as it is and whose state has to be put back. The system is scaled to a step of 1.
+/// Coefficients of v and y, from the first on.
+pub type Terms<N> = Vec<(Block<N>, Block<N>)>;
+
+/// The coefficients at the start of a step. The system is scaled to a step of 1.
+pub fn terms<N: Number>(order: u32, system: &dyn System<N>, pace: &Pace<N>, v: &Block<N>, y: &Block<N>) -> Terms<N> {
+    coefficients(system, order, [pace.t, N::of(1.0)], v, y)
+}
+
+/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back.
 pub fn attempt<N: Number>(
-    order: u32,
-    system: &dyn System<N>,
+    terms: &[(Block<N>, Block<N>)],
     projected: &dyn System<N>,
     pace: Pace<N>,
     budget: N,
@@ -30,8 +37,7 @@ pub fn attempt<N: Number>(
     y: &Block<N>,
 ) -> (Pace<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
-    let terms = coefficients(system, order, [pace.t, N::of(1.0)], v, y);
-    let reach = reach(order, &pace, [v, y], &terms);
+    let reach = reach(terms.len() as u32, &pace, [v, y], terms);
     let step = N::choose(outlook.is_extra, pace.extra, reach);
     let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), step), value(y, terms.iter().map(|term| &term.1), step));
     let new = [length2(&new_v), length2(&new_y)];

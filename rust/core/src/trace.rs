@@ -63,8 +63,11 @@ pub struct Scene {
 
 /// The tapes of a scene.
 pub struct Tapes {
-    /// One step, or one attempt, of the whole state.
+    /// One step, or one attempt, of the whole state. Attempts by a series return its coefficients behind the state.
     pub step: Stage,
+    /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not where
+    /// operations are fused, for the attempt may fuse what made the coefficients.
+    pub by_terms: Option<Stage>,
     /// Turns velocities into what the method carries.
     pub start: Option<Stage>,
     /// Turns what the method carries into velocities.
@@ -111,6 +114,8 @@ pub struct Steps {
     pub shape: Shape,
     /// Whether a tally stands behind them.
     pub tally: bool,
+    /// The coefficients of a series, of adaptive steps.
+    pub terms: Vec<Id>,
 }
 
 /// The leaves of a tape: parameters, sampled inputs, the step.
@@ -175,12 +180,12 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
     match how {
         How::Matrix { nodes } => {
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
-            Ok(Steps { tape, next, shape, tally: false })
+            Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
         }
         How::Method { name, choice } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
-            Ok(Steps { tape, next, shape, tally })
+            Ok(Steps { tape, next, shape, tally, terms: Vec::new() })
         }
         How::Attempts { name, order } => {
             let (kind, method) = (kind(given)?, method(name)?);
@@ -188,17 +193,21 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             if contact::is_given(given) {
                 return Err(given.unknown("contact_0"));
             }
-            let series = match program.series_order() {
-                0 => None,
-                own if *order == 0 => Some(own),
-                _ => Some(*order),
-            };
-            let (tape, next) = record(tape, || match series {
+            let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
                 Some(order) => series_attempts(kind, given, shape, order),
-                None => attempts(kind, given, shape, &program, estimate.order),
+                None => (attempts(kind, given, shape, &program, estimate.order), Vec::new()),
             });
-            Ok(Steps { tape, next, shape, tally: false })
+            Ok(Steps { tape, next, shape, tally: false, terms })
         }
+    }
+}
+
+/// The order of the series of attempts, if the method has one: the one that was asked for, or that of steps of fixed length.
+fn series_order(program: &Program, asked: u32) -> Option<u32> {
+    match program.series_order() {
+        0 => None,
+        own if asked == 0 => Some(own),
+        _ => Some(asked),
     }
 }
 
@@ -251,16 +260,38 @@ fn pace(shape: Shape) -> Pace<Symbol> {
     Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32))))
 }
 
-/// Steps by a series of that order.
-fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> Vec<Id> {
+/// Steps by a series of that order, and its coefficients.
+fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let system = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
+    let terms = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
+    let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
+    (attempt_by(kind, given, shape, &terms), numbers)
+}
+
+/// One attempt by coefficients of a series.
+fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let one = parameters(given, Symbol::of(1.0));
-    let (plain, projected) = ((kind.symbols)(&one), controls::wrap(&one, (kind.symbols)(&one), Symbol::of(0.0)));
+    let projected = controls::wrap(&one, (kind.symbols)(&one), Symbol::of(0.0));
     let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = series_pace::attempt(order, plain.as_ref(), projected.as_ref(), pace(shape), budget, &v, &y);
+    let (pace, v, y) = series_pace::attempt(terms, projected.as_ref(), pace(shape), budget, &v, &y);
     let mut next = ids([&v, &y]);
     next.extend(pace.numbers().map(|symbol| symbol.0));
     next
+}
+
+/// Traces an attempt by coefficients that stand behind the state and the pace, where they stay.
+fn trace_by_terms(given: &Given, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
+    let kind = kind(given)?;
+    Ok(record(Tape::default(), || {
+        let (state, first) = (shape.v + shape.y, shape.v + shape.y + Pace::<Symbol>::NUMBERS);
+        let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
+        let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let mut next = attempt_by(kind, given, shape, &terms);
+        next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
+        next
+    }))
 }
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
@@ -498,7 +529,12 @@ impl Scene {
         }
         let written = steps.tape.written(steps.next.iter().copied());
         let series_evaluations = steps.tape.series_evaluations();
-        let step = fused(steps.tape, steps.next);
+        let (mut next, mut by_terms) = (steps.next, None);
+        if !steps.terms.is_empty() && !self.fused {
+            by_terms = Some(cut(&self.given, &trace_by_terms(&self.given, steps.shape, steps.terms.len())?));
+            next.extend(steps.terms);
+        }
+        let step = fused(steps.tape, next);
         let shown = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
             let (mut both, mut next) = step.clone();
             let place = both.take_over(tape);
@@ -507,7 +543,7 @@ impl Scene {
         });
         let [start, finish, shown] = [start, finish, shown].map(|made| made.map(|made| cut(&self.given, &made)));
         let step = cut(&self.given, &step);
-        Ok(Tapes { step, start, finish, shown, record: quantities, written, series_evaluations })
+        Ok(Tapes { step, by_terms, start, finish, shown, record: quantities, written, series_evaluations })
     }
 }
 
