@@ -146,7 +146,10 @@ def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend:
     assert alone.paces is not None
     for name in ("t", "h", "accepted", "rejected"):
         assert np.array_equal(getattr(alone.paces, name), getattr(many.paces, name))
-    assert (alone.paces.evaluations < many.paces.evaluations).all()
+    if sw.method(method).has_series:  # whose coefficients make all saved states of a step
+        assert np.array_equal(alone.paces.evaluations, many.paces.evaluations)
+    else:
+        assert (alone.paces.evaluations < many.paces.evaluations).all()
     # The step in which a run ends starts where the step before it ended: the state there is the one that is asked for there.
     assert alone.stand is not None
     for member, t in enumerate(alone.paces.t):

@@ -184,6 +184,15 @@ def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     return names + [name + mark for name in beside]
 
 
+def coefficients(plan: Plan) -> list[str]:
+    """What the coefficients are called that an attempt by a series returns behind the state: ``y_3[0]`` is of order 3."""
+    if not plan.method.has_series or plan.fused:
+        return []
+    blocks = [("v", plan.system.v_shape), ("y", plan.system.y_shape)]
+    orders = range(1, (plan.order or plan.method.order) + 1)
+    return [indexed(f"{name}_{k}", index) for k in orders for name, shape in blocks for index in np.ndindex(shape)]
+
+
 # ---- values on a tape
 
 
@@ -472,6 +481,7 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
             case _:
                 return entry(i)
 
+    next_state += coefficients(plan) if attempts else []
     body, _ = writer.section("member step", split["body"], hot, 4, "a", next_state)
     return run, member, step, body
 

@@ -43,6 +43,11 @@ pub trait AdaptiveBatch: Send {
         false
     }
 
+    /// Writes whether each lane has a step of the run to try.
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        runs.iter_mut().enumerate().for_each(|(lane, runs)| *runs = self.pace(lane).runs(budget));
+    }
+
     /// One attempt of one lane, at the start of a step whose coefficients are known.
     fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
@@ -129,6 +134,15 @@ impl AdaptiveBatch for AdaptiveLanes {
 
     fn has_terms(&self) -> bool {
         self.by_terms.is_some()
+    }
+
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        // Row by row, as they lie: this is asked after every attempt.
+        let lanes = self.step.lanes();
+        let rows: [&[f64]; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| &self.state[(self.numbers + i) * lanes..][..lanes]);
+        for (lane, runs) in runs.iter_mut().enumerate().take(lanes) {
+            *runs = Pace::of(rows.map(|row| row[lane])).runs(budget);
+        }
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {

@@ -163,9 +163,11 @@ impl<'a> Worker<'a> {
             self.group.set_pace(lane, pace.idle());
             *assigned = waiting.next().map(|member| self.assign_member(&part, lane, member));
         }
+        // Of a series: which lanes have a step to try, and how many calls were made.
+        let (mut runs, mut calls) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
-                if self.group.has_terms() && self.group.pace(lane).runs(self.plan.budget as f64) {
+                if runs[lane] {
                     continue;
                 }
                 if let Some(taken) = assigned.take() {
@@ -175,7 +177,9 @@ impl<'a> Worker<'a> {
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
                 self.group.attempt(self.attempts_by_series(&assignments));
-                if !go_on(0) {
+                self.group.find_running(self.plan.budget as f64, &mut runs);
+                calls += 1;
+                if calls % ATTEMPTS_BETWEEN_CHECKS == 0 && !go_on(0) {
                     return Err(Error::Interrupted);
                 }
                 continue;
