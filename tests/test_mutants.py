@@ -91,7 +91,7 @@ def _true(method: str) -> bool:
         np.allclose(matrix_of(method, phi, "canonical", "numpy"), CLOSED_FORMS[method](phi), rtol=0, atol=1e-11)
         for phi in (0.1, 0.7, 1.9)
     )
-    if sw.method(method).has_series:  # of its order and of its times, see ``test_taylor.py``
+    if sw.method(method).has_series:  # its error vanishes at some steps; of its order and its times, see ``test_taylor.py``
         return closed
     order = sw.method(method).order
     return (

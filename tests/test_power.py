@@ -108,6 +108,7 @@ def test_a_million_million_steps_at_once() -> None:
     assert limit[0] < 0.02
 
 
+# A series takes the derivatives of the wave, which a transition matrix has not, and refuses (test_taylor.py).
 @pytest.mark.parametrize("method", [m for m in METHODS if not (m.needs_acceleration or m.has_series)], ids=lambda m: m.name)
 def test_a_thousand_million_driven_steps(method: sw.Method) -> None:
     """Damped, so that only the last steps count: stepping the last few thousand ends in the same state."""

@@ -5,7 +5,6 @@ from copy import copy
 import numpy as np
 
 from . import trig
-from .series import at_start
 from .types import Array
 
 #: A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
@@ -52,6 +51,8 @@ class Held:
 
     def at(self, t: float) -> Array:
         """The value at time t."""
+        from .series import at_start  # which importing the package does not need
+
         sample = self.sample(at_start(t))
         return sample if self.factor is None else np.asarray(self.factor * sample)
 

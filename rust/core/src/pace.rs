@@ -90,6 +90,20 @@ impl Pace<f64> {
         self.outlook(budget).runs
     }
 
+    /// The same of many members, from rows of their numbers: without moving what is not needed, for this is asked after every attempt.
+    pub fn find_running<'a>(row: impl Fn(usize) -> &'a [f64], budget: f64, runs: &mut [bool]) {
+        let places = Pace::of(std::array::from_fn(|i| i as f64));
+        let row = |place: f64| row(place as usize);
+        let (t, h, target, held) = (row(places.t), row(places.h), row(places.target), row(places.held));
+        let (extra, accepted, rejected) = (row(places.extra), row(places.accepted), row(places.rejected));
+        let times = t.iter().zip(h).zip(target);
+        let counts = held.iter().zip(extra).zip(accepted.iter().zip(rejected));
+        for (runs, (((t, h), target), ((held, extra), (accepted, rejected)))) in runs.iter_mut().zip(times.zip(counts)) {
+            let moves = (*t < *target) & (*t < *t + *h);
+            *runs = moves & (*accepted + *rejected < budget) & (*held <= 0.0) & (*extra <= 0.0);
+        }
+    }
+
     /// Whether the next output time is within the held step.
     pub fn holds(&self) -> bool {
         self.held > 0.0 && self.target < self.t + self.h

@@ -137,12 +137,8 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn find_running(&self, budget: f64, runs: &mut [bool]) {
-        // Row by row, as they lie: this is asked after every attempt.
         let lanes = self.step.lanes();
-        let rows: [&[f64]; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| &self.state[(self.numbers + i) * lanes..][..lanes]);
-        for (lane, runs) in runs.iter_mut().enumerate().take(lanes) {
-            *runs = Pace::of(rows.map(|row| row[lane])).runs(budget);
-        }
+        Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
