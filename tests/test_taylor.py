@@ -22,7 +22,7 @@ from truths import DRIVE, END, FORCE, OMEGA, forced_exact
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benches.compare.chosen import solar  # noqa: E402
+from benches.compare.chosen import solar
 
 TAYLOR = sw.method("taylor")
 EPS = 2.0**-52
