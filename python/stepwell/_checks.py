@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from . import _core
 from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
 from .reference.types import Array as Array
 from .reference.types import Whole
@@ -26,11 +27,6 @@ Word = TypeVar("Word", bound=str)
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
-
-_FLOAT64 = np.dtype(np.float64)
-
-#: Up to so many booleans are checked as bytes, which costs a copy but is faster than a call of NumPy.
-_FEW_TRUTHS = 1 << 16
 
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
 MOST_AXES = 24
@@ -59,13 +55,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     """Return ``value`` as float64 if it is real, and by the options finite and positive."""
     if type(value) is float and isfinite(value) and (not positive or value > 0.0):
         return np.array(value)  # the most frequent case: nothing more to check
-    if (
-        type(value) is np.ndarray
-        and value.dtype is _FLOAT64
-        and value.flags.aligned
-        and (not finite or all_true(np.isfinite(value)))
-        and (not positive or all_true(value > 0.0))
-    ):
+    if type(value) is np.ndarray and _core.sound(value, finite, positive):
         return value  # likewise; the checks below say what is wrong with any other
     try:
         array = np.asarray(value)
@@ -89,11 +79,6 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
-
-
-def all_true(truths: Any) -> bool:
-    """Whether all booleans of an array, or a single one, are true."""
-    return b"\0" not in truths.tobytes() if truths.size <= _FEW_TRUTHS else bool(truths.all())
 
 
 def _masked(value: Any) -> int:
@@ -198,13 +183,16 @@ def over(array: Array, shape: Shape) -> Array:
 
 def batch_shape(shapes: dict[str, Shape]) -> Shape:
     """Return the shape to which all batches broadcast, the arguments by name."""
-    different = set(shapes.values()) - {()}
-    if not different:
-        return ()
-    if len(different) == 1:
-        (shape,) = different
-        if len(shape) <= MOST_AXES and 0 not in shape:
-            return shape
+    one: Shape = ()
+    for shape in shapes.values():
+        if shape and shape != one:
+            if one:
+                break
+            one = shape
+    else:  # the most frequent case: all have one shape, or none
+        if len(one) <= MOST_AXES and 0 not in one:
+            return one
+    different = set(shapes.values())
     if longest := ", ".join(name for name, shape in shapes.items() if len(shape) > MOST_AXES):
         raise ShapeError(f"{longest}: expected at most {MOST_AXES} batch axes, got {max(map(len, different))}")
     try:

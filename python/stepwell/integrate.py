@@ -382,7 +382,7 @@ def _adapt(
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
     carry = None if went is None else _paces_of(how, *went)
     since = t0 if carry is None else float(carry.target.max(initial=t0))
-    if times[0] < since or (np.diff(times) <= 0).any():
+    if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
     system.check_time(max(abs(t0), abs(float(times[-1]))))
@@ -543,6 +543,8 @@ def _warn_of_stops(run: Run) -> None:
 
 def _warn_of_lost(run: Run, pace: Any) -> None:
     """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
+    if not pace.absolute.any():
+        return
     lost = np.zeros(run.status.shape, dtype=bool)
     for square in (pace.longest_v, pace.longest_y):
         longest = np.sqrt(square)

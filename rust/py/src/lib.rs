@@ -5,8 +5,8 @@ mod tape;
 mod world;
 
 use numpy::{
-    PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn,
-    ndarray::Dimension,
+    PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2,
+    PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
@@ -51,6 +51,21 @@ fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
 #[pyfunction]
 fn catalogue(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     steppers::RECORDS.iter().map(|r| describe(py, r)).collect()
+}
+
+/// Whether something is an array of floats that can be used as it is: contiguous, aligned, and finite or above zero where that is
+/// asked. What is wrong with any other is for others to say; this is asked of every array of every call.
+#[pyfunction]
+fn sound(value: &Bound<'_, PyAny>, finite: bool, positive: bool) -> bool {
+    let Ok(array) = value.cast::<PyArrayDyn<f64>>() else { return false };
+    let Ok(array) = array.try_readonly() else { return false };
+    if !array.data().is_aligned() {
+        return false;
+    }
+    let Ok(numbers) = array.as_slice() else { return false };
+    // Over all numbers, without an early end: so the loop is over vectors.
+    let finite = !finite || numbers.iter().fold(true, |all, x| all & x.is_finite());
+    finite && (!positive || numbers.iter().fold(true, |all, x| all & (*x > 0.0)))
 }
 
 /// The names of all systems that the core has.
@@ -378,6 +393,7 @@ fn in_parts(
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_function(wrap_pyfunction!(catalogue, m)?)?;
+    m.add_function(wrap_pyfunction!(sound, m)?)?;
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;

@@ -1,6 +1,6 @@
 //! The driver of adaptive steps: every member has its own time and step, and when one is done its lane takes the next.
 
-use std::{ops::Range, sync::Arc, thread};
+use std::{ops::Range, sync::Arc};
 
 use super::{
     Machine, Model,
@@ -103,12 +103,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let worker = || Worker::new(plan, &traced, &stop);
     let mine = worker()?;
     let lanes = mine.group.lanes();
-    let threads = match plan.machine.threads {
-        0 if lanes > 1 && b < MIN_MEMBERS_FOR_THREADS => 1,
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        n => n,
-    };
-    let threads = threads.min(b.div_ceil(lanes)).max(1);
+    let threads = plan.machine.threads_for(b.div_ceil(lanes), lanes == 1 || b >= MIN_MEMBERS_FOR_THREADS);
     plan.model.room(traced.shape, threads)?;
     // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };

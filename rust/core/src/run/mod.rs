@@ -11,7 +11,10 @@ pub mod stage;
 pub mod workers;
 pub mod world;
 
-use std::sync::Arc;
+use std::{
+    sync::{Arc, OnceLock},
+    thread,
+};
 
 use self::{
     adaptive::{AdaptiveBatch, AdaptiveLanes, NO_CLOCK},
@@ -50,6 +53,20 @@ pub struct Machine {
     pub level: Level,
     /// How many threads the forces of one large system may use; zero for as many as there are.
     pub threads: usize,
+}
+
+impl Machine {
+    /// How many threads to use for work that can be divided into so many parts, if more than one are worthwhile.
+    pub fn threads_for(self, parts: usize, worthwhile: bool) -> usize {
+        /// The operating system reads files to tell it, which takes as long as a short run, so it is asked once.
+        static AVAILABLE: OnceLock<usize> = OnceLock::new();
+        let threads = match self.threads {
+            0 if !worthwhile || parts <= 1 => 1,
+            0 => *AVAILABLE.get_or_init(|| thread::available_parallelism().map_or(1, usize::from)),
+            given => given,
+        };
+        threads.min(parts).max(1)
+    }
 }
 
 impl Model<'_> {
