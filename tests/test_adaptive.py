@@ -88,8 +88,8 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
         assert alone.paces.accepted == whole.paces.accepted[member]
         assert alone.paces.h == whole.paces.h[member]
     assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
-    # For each of the two asked times the step that passes it is made twice, and an extra one; a series has the coefficients already, so
-    # it adds the last step alone, which is not taken. It has order 10 by the tolerance; how many evaluations that is, see test_taylor.py.
+    # For each of the two asked times the step that passes it is made twice, and an extra one. A series has the coefficients
+    # already, so it adds the last step alone, which is not taken. How many evaluations an order of 10 is, see test_taylor.py.
     again = 1 if sw.method(method).has_series else 2 * 2
     tried = whole.paces.accepted + whole.paces.rejected + again
     evaluations = engine.evaluations(sw.method(method), whole.system, order=10, paced=True)

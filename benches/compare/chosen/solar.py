@@ -16,8 +16,8 @@ import stepwell as sw
 from ..report import Table, number
 from ..workloads import Array
 
-#: The Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto on 5 September 1994, in solar masses, astronomical units
-#: and days: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration (Springer 2006), section I.2.4.
+#: The Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto on 5 September 1994, in solar masses, astronomical
+#: units and days: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration (Springer 2006), section I.2.4.
 G = 2.95912208286e-4
 MASSES = np.array([1.00000597682, 0.000954786104043, 0.000285583733151, 0.0000437273164546, 0.0000517759138449, 1.0 / 1.3e8])
 PLACES = np.array(
