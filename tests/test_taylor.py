@@ -371,3 +371,40 @@ def test_what_is_refused() -> None:
     with pytest.raises(UnsupportedError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
         sw.integrate(bodies, "taylor", v=0.0 * state, y=state, dt=0.01, steps=3)
     assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
+
+
+def three_bodies(members: int) -> dict[str, Any]:
+    rng = np.random.default_rng(3)
+    return {"v": rng.normal(size=(3, 2, members)), "y": 2.0 * rng.normal(size=(3, 2, members))}
+
+
+@pytest.mark.parametrize("control", [None, sw.Projection()], ids=["free", "projected"])
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, fused: bool) -> None:
+    """Several within a step, and steps without any; a projection acts on the saved states, too, and counts its work once."""
+    bodies = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1)
+    ask: dict[str, Any] = three_bodies(40) | {"tolerance": 1e-8, "control": control, "fused": fused}
+    ask["at"] = np.sort(np.random.default_rng(5).uniform(0.0, 3.0, 30))
+    ours = sw.integrate(bodies, "taylor", **ask)
+    few = {name: ask[name][..., :3] for name in ("v", "y")}
+    theirs = sw.integrate(bodies, "taylor", **ask | few, backend="numpy")
+    assert np.array_equal(ours.v[..., :3], theirs.v)
+    assert np.array_equal(ours.y[..., :3], theirs.y)
+    assert ours.paces is not None
+    assert theirs.paces is not None
+    assert all(np.array_equal(a[:3], b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+    if control is not None:
+        assert np.array_equal(ours.work[:3], theirs.work)
+
+
+def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> None:
+    bodies, at = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1), np.linspace(0.02, 3.0, 60)
+    whole = sw.integrate(bodies, "taylor", **three_bodies(20), tolerance=1e-8, at=at)
+    done, state = 0, three_bodies(20) | {"tolerance": 1e-8}
+    for until in (1, 2, 3, 11, 30, 60):
+        run = sw.integrate(bodies, "taylor", at=at[done:until], **state)
+        assert np.array_equal(run.y, whole.y[done:until])
+        done, state = until, run.resume
+    assert run.paces is not None
+    assert whole.paces is not None
+    assert all(np.array_equal(a, b) for a, b in zip(run.paces, whole.paces, strict=True))

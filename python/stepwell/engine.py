@@ -581,7 +581,8 @@ def evaluations(method: Method, system: System, *, order: int = 0, paced: bool =
         UnsupportedError: if the series of the system is too long.
     """
     if method.has_series:
-        plan = Plan(system, method, system.batch, 1.0, order=order)
+        batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
+        plan = Plan(system, method, batch, 1.0, order=order)
         return _core.series_evaluations(model(plan), attempts=paced)
     return method.attempt_evaluations if paced else method.evaluations
 
