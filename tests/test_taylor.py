@@ -383,18 +383,18 @@ def three_bodies(members: int) -> dict[str, Any]:
 def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, fused: bool) -> None:
     """Several within a step, and steps without any; a projection acts on the saved states, too, and counts its work once."""
     bodies = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1)
-    ask: dict[str, Any] = three_bodies(40) | {"tolerance": 1e-8, "control": control, "fused": fused}
-    ask["at"] = np.sort(np.random.default_rng(5).uniform(0.0, 3.0, 30))
+    ask: dict[str, Any] = three_bodies(20) | {"tolerance": 1e-4, "control": control, "fused": fused}
+    ask["at"] = np.sort(np.random.default_rng(5).uniform(0.0, 1.0, 9))
     ours = sw.integrate(bodies, "taylor", **ask)
-    few = {name: ask[name][..., :3] for name in ("v", "y")}
+    few = {name: ask[name][..., :2] for name in ("v", "y")}
     theirs = sw.integrate(bodies, "taylor", **ask | few, backend="numpy")
-    assert np.array_equal(ours.v[..., :3], theirs.v)
-    assert np.array_equal(ours.y[..., :3], theirs.y)
+    assert np.array_equal(ours.v[..., :2], theirs.v)
+    assert np.array_equal(ours.y[..., :2], theirs.y)
     assert ours.paces is not None
     assert theirs.paces is not None
-    assert all(np.array_equal(a[:3], b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+    assert all(np.array_equal(a[:2], b) for a, b in zip(ours.paces, theirs.paces, strict=True))
     if control is not None:
-        assert np.array_equal(ours.work[:3], theirs.work)
+        assert np.array_equal(ours.work[:2], theirs.work)
 
 
 def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> None:
