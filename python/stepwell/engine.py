@@ -39,7 +39,10 @@ class Watched(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇."""
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
+
+    ``order`` is that of a series with adaptive steps.
+    """
 
     system: System
     method: Method
@@ -58,6 +61,7 @@ class Plan(NamedTuple):
     fused: bool = False
     force: Array | None = None
     watched: Watched | None = None
+    order: int = 0
 
     @property
     def saves(self) -> Whole:
@@ -186,7 +190,7 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
         case "step":
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
-            symbols = tracer.attempt(plan.method)
+            symbols = tracer.attempt(plan.method, plan.order)
         case _:
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))
@@ -310,14 +314,15 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
-    given = plan.system.parameters(plan.batch)
+    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if plan.watched is not None:
         given.append(("watched()", plan.watched.quantities))
-    if not plan.record and not plan.fused:
+    if not plan.record and not plan.fused and not plan.order:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
+    options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
 
 
 def _rust(
@@ -572,7 +577,8 @@ def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, a
     wide = np.zeros(plan.batch) if absolute is None else absolute
     first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
     tolerance = relative, wide, 1.0 if absolute is None else 0.0
-    return adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    pace = adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    return pace._replace(before=pace.h) if plan.method.has_series else pace
 
 
 def pace_of(numbers: Array) -> Pace:
@@ -580,6 +586,32 @@ def pace_of(numbers: Array) -> Pace:
     from .reference import adaptive
 
     return adaptive.Pace(*numbers)
+
+
+def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
+    """Function evaluations of a step, or of an attempt at an adaptive one by a series of that order.
+
+    Of a series: operations of all coefficients of the rates over those of one evaluation, rounded up. All operations count alike.
+
+    Raises:
+        UnsupportedError: if the series of the system is too long.
+    """
+    if method.has_series:
+        batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
+        plan = Plan(system, method, batch, 1.0, order=order)
+        return _core.series_evaluations(model(plan), attempts=paced)
+    return method.attempt_evaluations if paced else method.evaluations
+
+
+def attempts(method: Method, system: Any, block_axes: tuple[int, int], order: int = 0) -> Any:
+    """An attempt at an adaptive step by the reference: a function of a pace, a budget, v and y."""
+    from .reference import adaptive, series_pace
+
+    steps: Any = method.steps
+    if method.has_series:
+        return partial(series_pace.attempt, order or steps.ORDER, system, block_axes)
+    assert method.error_order is not None
+    return partial(adaptive.attempt, steps, system, method.error_order, block_axes)
 
 
 def _fused_attempt(plan: Plan, budget: int) -> Any:
@@ -600,10 +632,8 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
     if plan.backend == "numpy":
         if plan.fused:
             return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
-        pair: Any = plan.method.steps
-        assert plan.method.error_order is not None
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
-        attempt = partial(adaptive.attempt, pair, system, plan.method.error_order, plan.block_axes)
+        attempt = attempts(plan.method, system, plan.block_axes, plan.order)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members

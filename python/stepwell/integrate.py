@@ -14,7 +14,7 @@ import numpy as np
 from . import _checks, _core, _encounters, _memory, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
-from .control import AnyControl, a_control
+from .control import AnyControl, EnergyControl, a_control
 from .errors import (
     ArgumentError,
     DivergenceWarning,
@@ -28,7 +28,7 @@ from .methods import method as find_method
 from .methods import methods as every_method
 from .reference.types import Whole
 from .result import AdaptiveState, Collision, Paces, Run, Status
-from .systems import NBody, Sampled, System
+from .systems import NBody, Sampled, Sinusoid, System
 from .systems.base import TINY, a_system
 
 if TYPE_CHECKING:
@@ -200,6 +200,11 @@ def integrate(
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
     asked = None if events is None else _asked(events, form)
     control = a_control(control)
+    if form != "direct" and how.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
+        raise UnsupportedError(
+            f"form: {how.name} takes the derivatives of inputs too, and the transition matrix their values only; "
+            f"use form='direct'"
+        )
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
@@ -394,6 +399,8 @@ def _adapt(
     if system.contacts:
         raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
     control = a_control(control)
+    if how.has_series:
+        _has_series(system, control)
     not_of_a_step(system.keeper if control is None else control)
     if at is None or (tolerance is None) == (went is None):
         if at is not None and went is not None:
@@ -446,8 +453,12 @@ def _adapt(
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
         pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
         pace = pace._replace(work=np.zeros(batch))
+        plan = plan._replace(order=_order(how, pace))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
+    # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
+    again = out.pace.held > 0.0 if how.has_series and not fused else extra_steps
+    evaluations = engine.evaluations(how, system, order=plan.order, paced=True) * (accepted + rejected + again)
     run = Run(
         t=times,
         v=out.v,
@@ -462,7 +473,7 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.attempt_evaluations * (accepted + rejected + extra_steps)),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, evaluations),
         stand=AdaptiveState(
             out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
         ),
@@ -474,6 +485,36 @@ def _adapt(
     _warn_of_stops(run)
     _warn_of_lost(run, out.pace)
     return run, None if carry is not None else (v, y)
+
+
+def _has_series(system: System, control: Any) -> None:
+    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
+    instead = "use another method, such as dop853"
+    if system.samples[0] < np.inf:
+        raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
+    if isinstance(control or system.control, EnergyControl):
+        raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
+    if system.chooses:
+        raise UnsupportedError(
+            f"tolerance: {system!r} chooses between values (np.where, abs, minimum, floor, …), and a series does not see that "
+            f"another one is chosen within a step; {instead}"
+        )
+
+
+def _order(method: Method, pace: Pace) -> int:
+    """The order of a series for the tolerance; 0 of a method that has one order."""
+    if not method.has_series or not pace.relative.size:
+        return 0
+    from .reference import series_pace  # only such runs need it
+
+    least, most = float(pace.relative.min()), float(pace.relative.max())
+    order = series_pace.order_of(least)
+    if series_pace.order_of(most) != order:
+        raise UnsupportedError(
+            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
+            f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
+        )
+    return order
 
 
 def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
@@ -569,6 +610,10 @@ def _kept(array: Array) -> Array:
 
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot do the system."""
+    if method.has_series and getattr(system, "push", None) is not None:
+        raise UnsupportedError(
+            f"control: {method.name} goes with projections, not with {system.keeper!r}, which is a part of the rates; use dop853"
+        )
     if not method.needs_acceleration:
         return
     if not system.second_order:

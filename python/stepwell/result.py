@@ -75,7 +75,8 @@ class Paces(NamedTuple):
         h: the length of the next step to try.
         accepted: number of accepted steps, since the first piece of the run.
         rejected: number of steps whose error was above the tolerance, likewise.
-        evaluations: function (rate) evaluations of both, and of the extra steps for the output times, likewise.
+        evaluations: function (rate) evaluations of both, and of the extra steps for the output times, likewise; of a series, the
+            operations of its coefficients over those of one evaluation, and none for output times.
     """
 
     t: Array

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks import Shape
 from ..errors import TraceError
+from ..reference.series import among
 from ..reference.types import Array as Numbers
 from .arrays import QUICK_SINES
 from .namespace import rebound
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from .definition import Definition
     from .invariants import Invariant, Traced
+    from .series import Rates
 
 #: The most lines of a traceback that are searched for the user's own.
 MOST_FRAMES = 200
@@ -44,6 +46,7 @@ class Equations:
     kept: str | None = None
     limited = False
     pushed = False
+    _series: Rates | None = None
 
     def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
         self.definition = definition
@@ -81,7 +84,7 @@ class Equations:
         return kept
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_invariants": {}}
+        return {**vars(self), "_invariants": {}, "_series": None}
 
     @property
     def name(self) -> str:
@@ -107,6 +110,8 @@ class Equations:
 
     def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
         """v̇ and ẏ: symbols from symbols, arrays over all members from numbers. Where ẏ is v, it is not computed."""
+        if among((t, v, y)):
+            return self._of_series(given)(t, v, y, given)
         batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
         with np.errstate(all="ignore"):
             parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
@@ -117,6 +122,14 @@ class Equations:
         dv, dy = self._checked(made)
         v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
+
+    def _of_series(self, given: dict[str, Any]) -> Rates:
+        """The rates of series, traced when they are first asked for."""
+        from .series import Rates
+
+        if self._series is None:
+            self._series = Rates(self, given)
+        return self._series
 
     def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""

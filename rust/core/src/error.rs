@@ -48,6 +48,16 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A system whose series has too many operations.
+    #[error(
+        "method: the series of this system has about {operations} operations a step, and may have {most}; take dop853 for a large system"
+    )]
+    TooLongForSeries {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// Adaptive steps under a control whose push depends on the step, of a system too long for one tape.
     #[error(
         "control: with a tolerance a step that is too long for one list of operations goes with a projection or the printed form only"

@@ -24,6 +24,8 @@ pub mod number;
 pub mod pace;
 pub mod program;
 pub mod run;
+pub mod series;
+pub mod series_pace;
 pub mod signal;
 pub mod spec;
 pub mod system;

@@ -173,7 +173,7 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
         if method.estimate.is_some() {
             // Adaptive steps.
             let attempts = |model: Model<'static>| {
-                let how = How::Attempts { name: name.to_owned() };
+                let how = How::Attempts { name: name.to_owned(), order: 0 };
                 Model { scene: Scene { how, ..model.scene }, ..model }
             };
             models.extend([pendulum(name, true), restricted(name), three_bodies(name)].map(attempts));

@@ -305,6 +305,8 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
             Entry::Add(..) => ("add", 0.0),
             Entry::Sub(..) => ("subtract", 0.0),
             Entry::Scale(by, _) => ("scale", by),
+            Entry::SeriesV(order, ..) => ("series of v", f64::from(order)),
+            Entry::SeriesY(order, ..) => ("series of y", f64::from(order)),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
     };
@@ -316,6 +318,16 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
 fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
+}
+
+/// To how many function evaluations a step with a series is equal: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, *, attempts=false))]
+fn series_evaluations(py: Python<'_>, model: &ModelSpec, attempts: bool) -> PyResult<usize> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let how = if attempts { model.attempts() } else { model.started(0) };
+    let tapes = model.model(how, &rows, &tables)?.traced().and_then(|traced| traced.tapes()).map_err(core_error)?;
+    Ok(tapes.series_evaluations)
 }
 
 /// The tape and machine code of a step, made anew for so many members: see `_core.pyi`.
@@ -392,6 +404,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
+    m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;

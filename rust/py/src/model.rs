@@ -35,7 +35,12 @@ pub fn error_of(name: &str, message: String) -> PyErr {
 
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
-    error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
+    let name = match error {
+        Error::Memory { .. } => "TooLargeError",
+        Error::TooLongForSeries { .. } => "UnsupportedError",
+        _ => "ArgumentError",
+    };
+    error_of(name, error.to_string())
 }
 
 /// The rates of a user's own system.
@@ -48,6 +53,12 @@ impl Equations {
     #[getter]
     fn reads_v(&self) -> bool {
         self.0.reads_v()
+    }
+
+    /// Whether the rates are made of pieces, one of which is chosen by the state or the time.
+    #[getter]
+    fn chooses(&self) -> bool {
+        self.0.chooses()
     }
 }
 
@@ -93,6 +104,7 @@ pub struct ModelSpec {
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     record: Vec<String>,
     fused: bool,
+    order: u32,
 }
 
 /// The parameters, borrowed for a run.
@@ -119,9 +131,9 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 #[pymethods]
 impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
-    /// in its v slot, if it is asked for.
+    /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0))]
     fn new(
         py: Python<'_>,
         system: String,
@@ -130,6 +142,7 @@ impl ModelSpec {
         matrix: Option<(Vec<f64>, usize)>,
         record: Vec<String>,
         fused: bool,
+        order: u32,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
         let (mut rows, mut tables) = (Vec::new(), Vec::new());
@@ -157,7 +170,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record, fused }
+        ModelSpec { given: names, how, rows, tables, record, fused, order }
     }
 }
 
@@ -183,7 +196,7 @@ impl ModelSpec {
     /// Adaptive steps.
     pub fn attempts(&self) -> How {
         match &self.how {
-            How::Method { name, .. } => How::Attempts { name: name.clone() },
+            How::Method { name, .. } => How::Attempts { name: name.clone(), order: self.order },
             other => other.clone(),
         }
     }

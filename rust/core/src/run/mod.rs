@@ -90,7 +90,7 @@ impl Model<'_> {
         let (rates, step) = traced.operations;
         let single = members == 1;
         // Operations are fused on the tape of the whole step, and friction needs the state at its start.
-        if self.scene.fused || controls::friction::is_given(&self.scene.given) {
+        if self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {
