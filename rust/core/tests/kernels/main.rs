@@ -15,7 +15,8 @@ use stepwell_core::{
     kernel::{
         Kernel,
         interpret::Interpreter,
-        writer::{Shape, Written, choose, write},
+        pack::Trial,
+        writer::{Shape, Written, choose, write, write_packed},
     },
     tape::{Op, split::Body},
 };
@@ -83,6 +84,57 @@ fn random_bodies_have_the_bits_of_the_interpreter() {
         seed += 1;
     }
     println!("{seed} bodies, {seen} pairs of a body and an input");
+}
+
+/// Compares a random body, some operations of which are lanes of one vector, with the interpreter; returns on how many inputs, and how many
+/// instructions that move numbers between lanes there are.
+fn one_packed(seed: u64) -> [usize; 2] {
+    let random = &mut Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let operations = random.one_of(&[12, 30, 60, 250]);
+    let states = 1 + random.below(10);
+    // As often as not one body several times, as the bodies, pairs or coordinates of a member are.
+    let body = if random.once_in(2) {
+        random::body(random, operations, states)
+    } else {
+        let copies = 2 + random.below(4);
+        random::alike(random, operations / copies + 3, states.div_ceil(copies), copies)
+    };
+    let (level, _) = random.one_of(&widths());
+    let trial = Trial { together: 1 + random.below(4), roots: 1 + random.below(4), again: random.once_in(2) };
+    let Some(kernel) = write_packed(&body, level, trial) else { return [0, 0] };
+    #[cfg(target_arch = "x86_64")]
+    let moves = {
+        let is_fused = body.ops.iter().any(|op| matches!(op, Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..)));
+        code::read(&kernel, is_fused)
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    let moves = 0;
+    let oracle = Interpreter::new(&body, 1, Level::Baseline);
+    let mut scratch = Vec::new();
+    for steps in [0, 1, 2, 7] {
+        let inputs = Inputs::new(random, &body, 1, steps);
+        let (want, got) = (inputs.run(&oracle, &mut Vec::new()), inputs.run(&kernel, &mut scratch));
+        for (s, (want, got)) in want.iter().zip(&got).enumerate() {
+            assert!(same(*want, *got), "seed {seed}, {trial:?}, {level:?}, {steps} steps: state {s} is {got:?}, not {want:?}");
+        }
+    }
+    [4, moves]
+}
+
+#[test]
+fn packed_bodies_have_the_bits_of_the_interpreter() {
+    if !widths().iter().any(|(level, _)| *level >= Level::Avx2) {
+        return;
+    }
+    let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse::<usize>().ok()).map_or(20_000, |n| n / 20);
+    let (mut seen, mut moves, mut seed) = (0, 0, 0);
+    while seen < wanted {
+        let [inputs, moved] = one_packed(seed);
+        (seen, moves, seed) = (seen + inputs, moves + moved, seed + 1);
+        assert!(seed < 10 * wanted as u64, "hardly any of the bodies is packed");
+    }
+    println!("{seed} bodies, {seen} pairs of a body and an input, {moves} moves between lanes");
+    assert!(moves > wanted / 8, "{moves}");
 }
 
 fn oscillator() -> Body {
