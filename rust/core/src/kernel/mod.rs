@@ -25,7 +25,7 @@ pub mod writer {
         choose::{choose, choose_long, choose_trail},
         frame::Frame,
         shape::Shape,
-        written::{Assembled, Written, allowed, assemble, assemble_packed, write, write_packed},
+        written::{Assembled, Written, allowed, assemble, write, write_if_it_gains, write_packed},
     };
 }
 

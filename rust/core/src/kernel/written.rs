@@ -5,7 +5,7 @@ use super::{
     frame::Frame,
     loops,
     machine::Machine,
-    pack::{self, MOST_LANES, Packed, Trial, Verdict},
+    pack::{self, MOST_LANES, Packed, Verdict},
     pages::Pages,
     plan::{Plan, is_sound},
     shape::Shape,
@@ -46,25 +46,7 @@ pub fn assemble(body: &Body, shape: Shape) -> Option<Assembled> {
     }
 }
 
-/// The machine code of a body for a single member, whose numbers are lanes of vectors. None if there is none for this CPU.
-pub fn assemble_packed(body: &Body, packed: &Packed, shape: Shape) -> Option<Assembled> {
-    match shape.level {
-        Level::Baseline | Level::Neon => None,
-        Level::Avx2 | Level::Avx512 => assemble_plan::<x86::encode::Code>(body, Some(packed), shape),
-    }
-}
-
 fn assemble_for<M: Machine>(body: &Body, shape: Shape) -> Option<Assembled> {
-    if M::PACKS
-        && shape.lanes() == 1
-        && shape.resident
-        && is_sound(body)
-        && let Some((verdict, Some(packed))) = pack::best(body)
-        && verdict.gains()
-        && let Some(assembled) = assemble_plan::<M>(body, Some(&packed), shape)
-    {
-        return Some(Assembled { packing: Some(verdict), ..assembled });
-    }
     assemble_plan::<M>(body, None, shape)
 }
 
@@ -104,14 +86,24 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     execute(assemble(body, shape)?)
 }
 
-/// Writes a kernel for a single member, whose numbers are lanes of vectors as one packing has them, whether it gains or not. None as above, or
-/// if nothing can be packed.
-pub fn write_packed(body: &Body, level: Level, trial: Trial) -> Option<Written> {
-    if !level.here() || !is_sound(body) {
+/// Writes a kernel for a single member, whose equal operations are lanes of one vector, if that gains. None as above, or if it does not.
+pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
+    if !shape.packs() || !is_sound(body) {
         return None;
     }
+    let (verdict, packed) = pack::best(body)?;
+    let packed = packed.filter(|_| verdict.gains())?;
+    let written = write_packed(body, shape.level, &packed)?;
+    Some(Written { assembled: Assembled { packing: Some(verdict), ..written.assembled }, ..written })
+}
+
+/// Writes a kernel for a single member, whose numbers are lanes of these vectors. None as above, or if they are no such vectors.
+pub fn write_packed(body: &Body, level: Level, packed: &Packed) -> Option<Written> {
     let shape = Shape { level, width: 1, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
-    execute(assemble_packed(body, &pack::pack(body, trial)?, shape)?)
+    if !level.here() || !shape.packs() || !is_sound(body) || !packed.is_sound(body) {
+        return None;
+    }
+    execute(assemble_plan::<x86::encode::Code>(body, Some(packed), shape)?)
 }
 
 fn execute(assembled: Assembled) -> Option<Written> {

@@ -21,7 +21,12 @@ pub fn read(kernel: &Written, is_fused: bool) -> usize {
         assert!(is_known(i.mnemonic()) || is_fused && is_multiply_add(i.mnemonic()), "{i}");
         moves += usize::from(matches!(
             i.mnemonic(),
-            Mnemonic::Vshufpd | Mnemonic::Vinsertf128 | Mnemonic::Vinsertf64x2 | Mnemonic::Vextractf128 | Mnemonic::Vextractf64x2 | Mnemonic::Vpermpd
+            Mnemonic::Vshufpd
+                | Mnemonic::Vinsertf128
+                | Mnemonic::Vinsertf64x2
+                | Mnemonic::Vextractf128
+                | Mnemonic::Vextractf64x2
+                | Mnemonic::Vpermpd
         ));
         match i.flow_control() {
             FlowControl::Next => {}

@@ -14,8 +14,8 @@ const ISSUED: usize = 6;
 /// Operations under way at once.
 const WINDOW: usize = 256;
 /// Steps that are gone through, and after how many of them the count begins.
-const STEPS: usize = 8;
-const WARM: usize = 4;
+const STEPS: usize = 6;
+const WARM: usize = 3;
 
 /// Units: how many there are of each kind.
 const UNITS: [u8; 5] = [2, 2, 1, 2, 2];
@@ -50,14 +50,15 @@ fn timing(make: &Make) -> Option<(usize, u64, u64)> {
 struct Unit {
     busy: Vec<u8>,
     units: u8,
-    /// All cycles before it are full.
+    /// All cycles before it are full, or earlier than anything that is still to come: operations ask in the order in which they are ready.
     from: u64,
 }
 
 impl Unit {
     /// The first cycle from `ready` on at which a unit is free for so long, which it then is not any more.
     fn take(&mut self, ready: u64, cycles: u64) -> u64 {
-        let mut start = ready.max(self.from);
+        self.from = self.from.max(ready);
+        let mut start = self.from;
         loop {
             let end = (start + cycles) as usize;
             if self.busy.len() < end {

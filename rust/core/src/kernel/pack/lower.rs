@@ -225,7 +225,12 @@ impl Lower<'_> {
             return (0, None);
         };
         let made = places.iter().map(|(at, _)| self.times[*at as usize]).max().unwrap_or(0);
-        let moved = made + if ids.len() == 2 { estimate::wait(&Make::Move(Move::Pick(0))) } else { estimate::wait(&Make::Move(Move::Permute(0))) };
+        let moved = made
+            + if ids.len() == 2 {
+                estimate::wait(&Make::Move(Move::Pick(0)))
+            } else {
+                estimate::wait(&Make::Move(Move::Permute(0)))
+            };
         if ids.iter().enumerate().any(|(at, id)| ids[..at].contains(id)) {
             return (moved, None);
         }

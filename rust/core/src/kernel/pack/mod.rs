@@ -14,6 +14,7 @@ mod estimate;
 mod find;
 mod lower;
 mod planned;
+mod sound;
 
 use crate::tape::{Id, Op, split::Body};
 
@@ -23,10 +24,14 @@ pub const MOST_LANES: usize = 4;
 const LEAST_GAIN: f64 = 0.04;
 /// Steps of fewer operations are not looked at.
 const FEWEST_OPERATIONS: usize = 8;
-/// Of longer steps only some packings are tried, so that writing a kernel does not take longer than it saves.
+/// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations that do not
+/// wait for what is moved.
 const LONG_STEP_OPERATIONS: usize = 600;
 /// Of steps longer than that none is: their code does not stay in the instruction cache either way.
 const MOST_OPERATIONS: usize = 2500;
+
+/// What is tried: how many successive numbers of the state are made by one vector, and how many roots.
+const TRIALS: [(usize, usize); 6] = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2, 2)];
 
 /// How numbers of one member are moved between lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -135,16 +140,8 @@ impl Verdict {
     }
 }
 
-/// The trials for a body of so many operations, those most likely to gain first.
-fn trials(work: usize) -> impl Iterator<Item = Trial> {
-    let kinds = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2, 2)];
-    let few = if work > LONG_STEP_OPERATIONS { 4 } else { kinds.len() };
-    let again: &[bool] = if work > LONG_STEP_OPERATIONS { &[false] } else { &[false, true] };
-    kinds.into_iter().take(few).flat_map(move |(together, roots)| again.iter().map(move |again| Trial { together, roots, again: *again }))
-}
-
-/// The best packing of a body and what the model says of it. None for the packing if no operations are alike; None at all if the step is
-/// too short or too long to be looked at.
+/// The best packing of a body and what the model says of it. None for the packing if no operations are alike or the step is a chain
+/// already; None at all if the step is too short or too long to be looked at.
 pub fn best(body: &Body) -> Option<(Verdict, Option<Packed>)> {
     let operations = body.work();
     if !(FEWEST_OPERATIONS..=MOST_OPERATIONS).contains(&operations) {
@@ -153,22 +150,28 @@ pub fn best(body: &Body) -> Option<(Verdict, Option<Packed>)> {
     let alone = lower::lower(body, &find::Packs::none(body), false)?;
     let (single, chain) = (estimate::cycles(&alone, true), estimate::cycles(&alone, false));
     let mut verdict = Verdict { single, packed: None, chain, operations, vectors: operations, moves: 0 };
-    let mut best: Option<Packed> = None;
-    // A step that is a chain already cannot become shorter.
     if single <= chain / (1.0 - LEAST_GAIN) {
         return Some((verdict, None));
     }
-    for trial in trials(operations) {
-        let Some(packed) = pack(body, trial) else { continue };
+    let mut best: Option<(Trial, Packed)> = None;
+    let mut attempt = |trial: Trial, best: &mut Option<(Trial, Packed)>| {
+        let Some(packed) = pack(body, trial) else { return };
         let cycles = estimate::cycles(&packed, true);
         if verdict.packed.is_none_or(|least| cycles < least) {
             let made = packed.vectors.iter().filter(|vector| matches!(vector.make, Make::Op(_) | Make::Move(_)));
             let moves = packed.vectors.iter().filter(|vector| matches!(vector.make, Make::Move(_))).count();
             verdict = Verdict { packed: Some(cycles), vectors: made.count(), moves, ..verdict };
-            best = Some(packed);
+            *best = Some((trial, packed));
         }
+    };
+    let trials = if operations > LONG_STEP_OPERATIONS { &TRIALS[..3] } else { &TRIALS };
+    for &(together, roots) in trials {
+        attempt(Trial { together, roots, again: false }, &mut best);
     }
-    Some((verdict, best))
+    if let Some((trial, _)) = best.as_ref().filter(|_| operations <= LONG_STEP_OPERATIONS) {
+        attempt(Trial { again: true, ..*trial }, &mut best);
+    }
+    Some((verdict, best.map(|(_, packed)| packed)))
 }
 
 /// Cycles of a step, as the model has them.
