@@ -27,8 +27,8 @@ const FEWEST_OPERATIONS: usize = 8;
 /// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations that do not
 /// wait for what is moved.
 const LONG_STEP_OPERATIONS: usize = 600;
-/// Of steps longer than that none is: their code does not stay in the instruction cache either way.
-const MOST_OPERATIONS: usize = 2500;
+/// Steps longer than that are not looked at: it would take some 50 ms. They are seldom a single tape.
+const MOST_OPERATIONS: usize = 5000;
 
 /// What is tried: how many successive numbers of the state are made by one vector, and how many roots.
 const TRIALS: [(usize, usize); 6] = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2, 2)];
