@@ -653,8 +653,8 @@ def test_why_operations_of_one_member_are_packed_or_not() -> None:
     packed = packing(three, "leapfrog")
     assert packed is not None
     assert packed.used
-    # Of each pair in the plane 2 differences, 2 squares, 2 sums, a root, 2 products, a quotient and 4 products: 3 · 15 with that by h·Gm
-    # of each body; 2 sums for each of 6 velocities, a product and a sum for each place: 45 + 12 + 12.
+    # Of each of three pairs 2 differences, 2 squares, 2 sums, a root, its product, a quotient, and 2 and 4 products with masses and
+    # differences; of each velocity a difference and a sum, of each place a product and a sum: 3 · 15 + 6 · 2 + 6 · 2.
     assert packed.operations == sum(sw.explain(three, "leapfrog").computed.values()) == 69
     assert packed.vectors < 69
     assert packed.cycles is not None

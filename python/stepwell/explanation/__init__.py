@@ -132,7 +132,9 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
     if told["interpreted"] is None:
         names = {"vectors": "block_vectors", "turns": "blocks"} | {each: each for each in ("width", "resident", "registers")}
         packing = None if told["packing"] is None else Packing(**told["packing"])
-        code = MachineCode(size=told["bytes"], spills=told["spills"], packing=packing, **{name: told[key] for name, key in names.items()})
+        code = MachineCode(
+            size=told["bytes"], spills=told["spills"], packing=packing, **{name: told[key] for name, key in names.items()}
+        )
     else:
         why = _why(told["interpreted"])
     return Explanation(

@@ -86,7 +86,8 @@ class Packing(Value):
         if self.cycles is None:
             why = f"a step takes about {self.single_cycles:.0f} cycles, and no vectors were found that would take fewer"
             if self.chain_cycles >= 0.96 * self.single_cycles:
-                why = f"nearly all of its {self.single_cycles:.0f} cycles are a chain of operations, each waiting for the one before"
+                cycles = f"nearly all of its {self.single_cycles:.0f} cycles"
+                why = f"{cycles} are a chain of operations, each waiting for the one before"
             return f"Its operations are not packed into vectors: {why}."
         if not self.used:
             return (
@@ -94,8 +95,9 @@ class Packing(Value):
                 f"and number by number it takes {self.single_cycles:.0f}."
             )
         return (
-            f"Equal operations are lanes of one vector: {self.vectors} vectors for {self.operations} operations, {self.moves} of them "
-            f"only move numbers between lanes. A step takes about {self.cycles:.0f} cycles, number by number {self.single_cycles:.0f}."
+            f"Equal operations are lanes of one vector: {self.vectors} vectors for {self.operations} operations, {self.moves} of "
+            f"them only move numbers between lanes. A step takes about {self.cycles:.0f} cycles, "
+            f"number by number {self.single_cycles:.0f}."
         )
 
 

@@ -189,25 +189,6 @@ pub fn body(random: &mut Random, operations: usize, states: usize) -> Body {
     if random.once_in(5) { body } else { needed(body) }
 }
 
-/// A body of several equal parts, each with numbers of the state of its own; some operations read those of another part instead.
-pub fn alike(random: &mut Random, operations: usize, states: usize, copies: usize) -> Body {
-    let part = body(random, operations, states);
-    let (n, count) = (part.ops.len() as Id, part.next.len() as u32);
-    let mut whole = Body { per_step: part.per_step, uniforms: part.uniforms, rows: part.rows * copies, ..Body::default() };
-    for copy in 0..copies as u32 {
-        for op in &part.ops {
-            let other = if random.once_in(8) { random.below(copy as usize + 1) as u32 } else { copy };
-            whole.ops.push(match *op {
-                Op::State(s) => Op::State(s + copy * count),
-                Op::Row(i) => Op::Row(i + copy * part.rows as u32),
-                op => op.with(|of| if matches!(part.ops[of as usize], Op::State(_)) { of + other * n } else { of + copy * n }),
-            });
-        }
-        whole.next.extend(part.next.iter().map(|id| id + copy * n));
-    }
-    whole
-}
-
 /// Without operations whose result is not used.
 fn needed(body: Body) -> Body {
     let mut needed = vec![false; body.ops.len()];
