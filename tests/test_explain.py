@@ -653,8 +653,8 @@ def test_why_operations_of_one_member_are_packed_or_not() -> None:
     packed = packing(three, "leapfrog")
     assert packed is not None
     assert packed.used
-    # Of each of three pairs 2 differences, 2 squares, 2 sums, a root, its product, a quotient, and 2 and 4 products with masses and
-    # differences; of each velocity a difference and a sum, of each place a product and a sum: 3 · 15 + 6 · 2 + 6 · 2.
+    # Of each of three pairs 2 differences, 2 squares, 2 sums, a root, its product, a quotient, and 2 and 4 products with masses
+    # and differences; of each velocity a difference and a sum, of each place a product and a sum: 3 · 15 + 6 · 2 + 6 · 2.
     assert packed.operations == sum(sw.explain(three, "leapfrog").computed.values()) == 69
     assert packed.vectors < 69
     assert packed.cycles is not None
@@ -686,3 +686,15 @@ def test_packed_steps_have_the_bits_of_the_reference() -> None:
         run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=50, every=None, backend="numpy")
         assert np.array_equal(world.y, run.y[-1])
         assert np.array_equal(world.v, run.v[-1])
+
+
+def test_a_run_that_changes_to_packed_code_keeps_its_bits() -> None:
+    """After 30 000 steps of a kernel that no other test has; a world, made afterwards, has packed code from its first step on."""
+    system = sw.NBody([1.0, 2.0, 3.0], force="printed", softening=1.0)
+    start = np.array([[0.0, 1.0], [1.0, -0.2], [-1.0, 0.1]])
+    run = sw.integrate(system, "damped_euler", v=np.zeros((3, 2)), y=start, dt=1e-4, steps=70_000)
+    world = sw.World(system, "damped_euler", v=np.zeros((3, 2)), y=start.copy(), dt=1e-4)
+    for _ in range(7):
+        world.step(10_000)
+    assert np.array_equal(run.y[-1], world.y)
+    assert np.array_equal(run.v[-1], world.v)
