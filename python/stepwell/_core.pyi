@@ -217,7 +217,8 @@ def compiled(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     ``level``; ``written`` and ``computed``, numbers of operations by kind: before equal ones were merged, but for those that a
     method does to blocks, and as every member makes them in every step; ``per_run``, ``per_member`` and ``per_step``, how many
     are made before; ``lanes``, how many members go together; ``bytes`` of machine code, 0 where it is interpreted; ``spills``,
-    how many values are kept beside the registers at most; ``trace`` and ``compile``, how long both took, in seconds.
+    how many values are kept beside the registers at most; ``packing``, the fields of ``explanation.Packing``, or None where equal
+    operations of one member were not considered; ``trace`` and ``compile``, how long both took, in seconds.
     ``attempts``: at adaptive steps.
 
     ``interpreted`` is None, and ``width`` (numbers in a vector), ``block_vectors`` (vectors in a turn of the loop), ``blocks``

@@ -368,6 +368,18 @@ fn compiled<'py>(
     d.set_item("lanes", made.lanes)?;
     d.set_item("bytes", made.bytes)?;
     d.set_item("spills", made.spills)?;
+    let packing = made.packing.map(|(is_packed, verdict)| {
+        let d = PyDict::new(py);
+        d.set_item("used", is_packed)?;
+        d.set_item("cycles", verdict.packed)?;
+        d.set_item("single_cycles", verdict.single)?;
+        d.set_item("chain_cycles", verdict.chain)?;
+        d.set_item("operations", verdict.operations)?;
+        d.set_item("vectors", verdict.vectors)?;
+        d.set_item("moves", verdict.moves)?;
+        PyResult::Ok(d)
+    });
+    d.set_item("packing", packing.transpose()?)?;
     d.set_item("trace", made.trace.as_secs_f64())?;
     d.set_item("compile", made.compile.as_secs_f64())?;
     Ok(Some(d))

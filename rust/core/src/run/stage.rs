@@ -5,7 +5,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::aligned::Aligned;
 use crate::{
     isa::Level,
-    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner, writer},
+    kernel::{
+        Kernel, Tile,
+        interpret::Interpreter,
+        runner::{By, Runner},
+        writer,
+    },
     spec::{Row, Spec},
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
@@ -187,12 +192,12 @@ pub struct PreparedStage {
     given: Vec<f64>,
     /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
     given_pool: Vec<f64>,
-    given_for: Option<bool>,
+    given_for: Option<By>,
     /// The uniforms of the hot loop.
     uniforms: Vec<f64>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
     pool: Aligned,
-    pool_for: Option<bool>,
+    pool_for: Option<By>,
     rows: Aligned,
     held: Aligned,
     /// Where in `held` the samples of each input begin.
@@ -214,7 +219,7 @@ pub struct PreparedStage {
     /// A state with a trail of states behind it, and the pool of its kernel.
     trail: Aligned,
     trail_pool: Aligned,
-    trail_pool_for: Option<bool>,
+    trail_pool_for: Option<By>,
 }
 
 impl PreparedStage {
@@ -386,10 +391,10 @@ impl PreparedStage {
             table = std::mem::take(&mut self.tables[at].1);
             from = (at, (k - first) as usize * entries);
         }
-        let (kernel, written) = trail.runner.kernel(1);
-        if self.trail_pool_for != Some(written) {
+        let (kernel, by) = trail.runner.kernel(1);
+        if self.trail_pool_for != Some(by) {
             self.trail_pool = Aligned::from(&kernel.pool(&self.uniforms));
-            self.trail_pool_for = Some(written);
+            self.trail_pool_for = Some(by);
         }
         self.trail[..numbers].copy_from_slice(state);
         let (rows, pool, held) = (&self.rows, &self.trail_pool, &self.held);
@@ -418,10 +423,10 @@ impl PreparedStage {
 
     #[inline]
     fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [f64]) {
-        let (kernel, written) = self.kit.runner.kernel(steps);
-        if self.pool_for != Some(written) {
+        let (kernel, by) = self.kit.runner.kernel(steps);
+        if self.pool_for != Some(by) {
             self.pool = Aligned::from(&kernel.pool(&self.uniforms));
-            self.pool_for = Some(written);
+            self.pool_for = Some(by);
         }
         let tile = &mut Tile { state, rows: &self.rows, pool: &self.pool, steps, per_step, held: &self.held };
         kernel.run(tile, &mut self.scratch);
@@ -454,9 +459,9 @@ impl PreparedStage {
     fn fill(&mut self, stage: &Stage, step: &Runner, times: &[f64], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
         self.values.resize(entries.len() * steps, 0.0); // all of them are written anew
-        let (kernel, written) = step.kernel(1);
-        if self.given_for != Some(written) {
-            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(written));
+        let (kernel, by) = step.kernel(1);
+        if self.given_for != Some(by) {
+            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(by));
         }
         let (values, pool) = (&mut self.values, &self.given_pool);
         let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };
