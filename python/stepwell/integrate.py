@@ -144,7 +144,7 @@ def integrate(
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
             sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
