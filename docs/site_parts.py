@@ -34,10 +34,11 @@ class Public(SphinxDirective):
         names = []
         for name in getattr(module, "__all__", None) or dir(module):
             thing = getattr(module, name)
-            known = (inspect.isclass(thing) or inspect.isfunction(thing)) and _within(thing.__module__, wanted)
+            if name.startswith("_") or not (inspect.isclass(thing) or inspect.isfunction(thing)):
+                continue
             # What stepwell itself lists is told of by the name that it has there; what a module only imports, elsewhere.
-            elsewhere = module is not stepwell and (name in stepwell.__all__ or not _within(thing.__module__, (module.__name__,)))
-            if known and not elsewhere and not name.startswith("_"):
+            here = _within(thing.__module__, (module.__name__,)) and (module is stepwell or name not in stepwell.__all__)
+            if here and _within(thing.__module__, wanted):
                 names.append((name, thing))
         if not names:
             raise self.error(f"{self.arguments[0]} lists nothing from {wanted}")
