@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ import stepwell
 
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
+# Notebooks choose the way that shows figures below their cells, unless this names another.
+os.environ.pop("MPLBACKEND", None)
 
 project = "stepwell"
 author = "The stepwell developers"
@@ -59,7 +62,6 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     # The scripts right in examples/ print; those in its folders draw.
     "ignore_pattern": f"^({'|'.join(file.name for file in (DOCS.parent / 'examples').glob('*.py'))})$",
-    "image_scrapers": ("matplotlib", "site_parts.figures"),
     "reset_argv": "site_parts.folder_for_pictures",
     "abort_on_example_error": True,
     "write_computation_times": False,
@@ -86,6 +88,8 @@ toc_object_entries_show_parents = "hide"
 # ---- look
 
 html_theme = "furo"
+pygments_style = "default"
+pygments_dark_style = "github-dark"
 html_title = "stepwell"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
@@ -126,5 +130,6 @@ def setup(app: Any) -> None:
 
     app.add_directive("public", site_parts.Public)
     app.connect("autodoc-process-docstring", site_parts.as_text, priority=400)  # before Napoleon
+    app.connect("autodoc-process-signature", site_parts.without_constructor)
     app.connect("source-read", _page_read)
     app.connect("include-read", _file_included)

@@ -1,4 +1,4 @@
-"""What the site needs beside ``conf.py``: the names of a reference page, docstrings as text, and pictures of the gallery."""
+"""What the site needs beside ``conf.py``: reference pages, docstrings as text, arguments of the gallery's scripts."""
 
 from __future__ import annotations
 
@@ -79,19 +79,9 @@ def folder_for_pictures(gallery_conf: dict[str, Any], script: dict[str, Any]) ->
     return [_folder().name]
 
 
-def figures(block: Any, script: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """The figures that charts have drawn, which the script holds by a name; each is shown once."""
-    from matplotlib import pyplot
-    from matplotlib.figure import Figure
-    from sphinx_gallery.scrapers import figure_rst
-
-    known = {id(pyplot.figure(number)) for number in pyplot.get_fignums()}
-    shown = script.setdefault("figures_shown", set())
-    paths = []
-    for value in list(script["example_globals"].values()):
-        if isinstance(value, Figure) and id(value) not in known | shown:
-            path = next(script["image_path_iterator"])
-            value.savefig(path, dpi=100, facecolor="white")
-            shown.add(id(value))
-            paths.append(path)
-    return figure_rst(paths, gallery_conf["src_dir"])
+def without_constructor(
+    app: Any, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: str | None
+) -> tuple[str, str | None] | None:
+    """What is returned and not made by a user, and so has attributes and no arguments, is shown without its arguments."""
+    told = inspect.getdoc(thing) or ""
+    return ("", returns) if what == "class" and "Attributes:" in told and "Args:" not in told else None
