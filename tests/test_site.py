@@ -192,6 +192,8 @@ def test_every_tutorial_ends_in_a_picture_or_an_animation(site: Path) -> None:
         page = read(site / "tutorials" / f"{name}.html")
         drawn = [load for load in page.loads if "_images/" in load]
         assert drawn or page.frames, name
+        text = (site / "tutorials" / f"{name}.html").read_text(encoding="utf-8")
+        assert "output stderr" not in text, f"{name} shows a warning"
         assert f"tutorials/{name}.html" in "".join(read(site / "index.html").links), "it is in the navigation"
 
 

@@ -106,7 +106,7 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), dpi=100)
     FigureCanvasAgg(figure)
     # A notebook knows how to show matplotlib's figures only after pyplot was imported.
-    figure._repr_png_ = partial(png, figure)
+    vars(figure)["_repr_png_"] = partial(png, figure)
     return figure
 
 
