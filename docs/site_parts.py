@@ -37,7 +37,9 @@ class Public(SphinxDirective):
             if name.startswith("_") or not (inspect.isclass(thing) or inspect.isfunction(thing)):
                 continue
             # What stepwell itself lists is told of by the name that it has there; what a module only imports, elsewhere.
-            here = _within(thing.__module__, (module.__name__,)) and (module is stepwell or name not in stepwell.__all__)
+            here = _within(thing.__module__, (module.__name__,)) and (
+                module is stepwell or thing is not getattr(stepwell, name, None)
+            )
             if here and _within(thing.__module__, wanted):
                 names.append((name, thing))
         if not names:
