@@ -4,6 +4,7 @@ import re
 import runpy
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -37,6 +38,13 @@ MISTAKES = {
     "star_orbits": ("- y[0] ** 2 + y[1] ** 2", "- y[0] ** 2 + 1.01 * y[1] ** 2"),
     "turing": ("b * u - made + dy", "b * u - made + 0.7 * dy"),
 }
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed():
+    """Pyplot keeps every figure of the examples, and warns of the twenty-first."""
+    yield
+    plt.close("all")
 
 
 def run(code, name, folder):
