@@ -44,12 +44,13 @@ nb_execution_in_temp = True
 nb_execution_timeout = 120
 nb_merge_streams = True
 
-#: Files beside docs/ that the site shows, and the page that includes each.
+#: Files beside docs/ that the site shows, and the page that includes each or is made from it.
 INCLUDED = {
     "CHANGELOG.md": "developing/changelog.md",
     "CONTRIBUTING.md": "developing/contributing.md",
     "benches/CONTROL.md": "benchmarks/control.md",
     "benches/RESULTS.md": "benchmarks/results.md",
+    "examples/GALLERY_HEADER.rst": "gallery/index.rst",
 }
 
 # ---- the gallery: scripts of examples/, run and shown
@@ -101,7 +102,7 @@ html_theme_options = {
 }
 copybutton_exclude = ".linenos, .gp, .go"
 
-LINK = re.compile(r"(?<=\]\()([\w./-]+\.md)(?=[)#])")
+LINK = re.compile(r"(?<=\]\()([\w./-]+\.(?:md|rst))(?=[)#])")
 
 
 def _to_pages(text: str, folder: Path) -> str:
