@@ -1,4 +1,4 @@
-"""Writes the tables of README.md and docs/*.md that are made from the methods' records.
+"""Writes the tables of README.md and of the pages in docs that are made from the methods' records.
 
 A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->``. After a change to a record run
 ``.venv/bin/python docs/generate.py``; the tests fail while a table is stale.
@@ -168,7 +168,7 @@ def current(text: str) -> str:
 
 def pages() -> list[Path]:
     """The pages that may hold tables."""
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and docs/*.md anew into docs/images. Takes some minutes.
+"""Draws the pictures of README.md and of the pages in docs anew into docs/images. Takes some minutes.
 
 Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and look at what it drew.
 """
@@ -71,9 +71,9 @@ def write_best(charts: Iterable[sw.charts.WorkPrecision]) -> None:
         found = [chart.best(error) for error in ERRORS]
         lines.append([f"`{chart.scene.name}`", *(f"{row['method']}: {row['cost']:.3g}" if row else "—" for row in found)])
     made = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    page = DOCS / "work-precision.md"
+    page = DOCS / "benchmarks" / "work-precision.md"
     page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
-    print("docs/work-precision.md")
+    print("docs/benchmarks/work-precision.md")
 
 
 def wing_nut() -> None:

@@ -1,4 +1,4 @@
-"""Speeds beside peers, from the report of ``make bench``: the table of docs/speed.md, and its picture.
+"""Speeds beside peers, from the report of ``make bench``: the table of docs/benchmarks/speed.md, and its picture.
 
 Run ``.venv/bin/python docs/speed.py`` to draw the picture; ``docs/generate.py`` writes the table.
 """

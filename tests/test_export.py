@@ -646,7 +646,7 @@ def test_it_can_be_kept(tmp_path: Path) -> None:
 
 # ---- the page
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "export.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "export.md"
 
 
 @pytest.mark.parametrize("fence", [pytest.param(each, id=each) for each in ("c", "javascript", "rust")])

@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import json
 import math
+import pickle
 import sys
 from itertools import pairwise
 
@@ -542,3 +543,12 @@ def test_without_matplotlib_the_numbers_are_still_there(monkeypatch, tmp_path):
         with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
             draw()
     chart.to_csv(tmp_path / "run.csv")
+
+
+def test_a_notebook_shows_a_figure_without_pyplot():
+    """IPython asks an object for ``_repr_png_``; what it knows of matplotlib's figures it learns from pyplot."""
+    run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=2.0, dt=0.1, steps=30, every=1)
+    figure = run.plot()
+    assert figure._repr_png_() == style.png(figure)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")

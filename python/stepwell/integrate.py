@@ -116,7 +116,7 @@ def integrate(
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
         events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
             g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed steps in the direct form
-            (docs/events.md).
+            (docs/howto/events.md).
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
@@ -151,7 +151,7 @@ def integrate(
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
             sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)

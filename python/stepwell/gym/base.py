@@ -25,7 +25,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
 
     An environment whose episode ended begins anew at the next call of ``step``, whose action for it is ignored
     (``AutoresetMode.NEXT_STEP``). A kind of environment is a subclass with the spaces of one, which makes the world, draws
-    states, lets actions act, and says what is seen and rewarded; see docs/interop.md.
+    states, lets actions act, and says what is seen and rewarded; see docs/howto/interop.md.
 
     Args:
         num_envs: how many.
