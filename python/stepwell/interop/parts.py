@@ -21,8 +21,8 @@ from ..control import Projection
 from ..equations.definition import Definition
 from ..equations.trace import Equations
 from ..errors import ArgumentError
-from ..integrate import _collision
 from ..events.result import Occurrences
+from ..integrate import _collision
 from ..methods import Method
 from ..methods import method as find_method
 from ..reference.traced import Tracer

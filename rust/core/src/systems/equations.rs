@@ -119,7 +119,8 @@ impl Equations {
         });
         let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
         let functions = self.functions.into_iter().filter(|(value, _)| needed[*value as usize]);
-        let functions = functions.map(|(value, by)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect()));
+        let functions =
+            functions.map(|(value, by)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect()));
         let functions = functions.collect();
         Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions)
     }
@@ -307,7 +308,13 @@ fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
 }
 
 /// The values of these quantities for a state of any system with these parameters.
-pub fn values_of(equations: &std::sync::Arc<Equations>, p: &Parameters<Symbol>, t: Symbol, v: &Block<Symbol>, y: &Block<Symbol>) -> Vec<Symbol> {
+pub fn values_of(
+    equations: &std::sync::Arc<Equations>,
+    p: &Parameters<Symbol>,
+    t: Symbol,
+    v: &Block<Symbol>,
+    y: &Block<Symbol>,
+) -> Vec<Symbol> {
     let roots: Vec<Id> = equations.quantities.iter().map(|(_, id)| *id).collect();
     let (of_v, of_y) = (Vec::new(), Vec::new());
     let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: equations.clone(), of_v, of_y };
