@@ -134,6 +134,7 @@ impl ModelSpec {
     /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps.
     #[new]
     #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0))]
+    #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn new(
         py: Python<'_>,
         system: String,
