@@ -378,7 +378,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "sweep of histories": (
         sw.sweep,
-        {"system": sw.Oscillator, "axes": {"y": ("y", [1.0, 2.0])}, "method": "rk4", "v": 0.0, "dt": 0.1, "steps": 4, "every": 2},
+        {
+            "system": sw.Oscillator,
+            "axes": {"omega": ("omega", [1.0, 2.0])},
+            "method": "rk4",
+            "v": 0.0,
+            "y": 1.0,
+            "dt": 0.1,
+            "steps": 4,
+            "every": 2,
+        },
     ),
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
