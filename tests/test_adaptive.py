@@ -324,7 +324,7 @@ def test_out_of_steps() -> None:
     system, state = kepler(np.array([0.1, 0.999, 0.1]))
     at = np.linspace(0.0, 6.0, 7)
     with pytest.warns(
-        sw.ToleranceWarning, match=r"1 of 3 member\(s\) stopped before t = 6; first member 1 at t = .*out of max_steps"
+        sw.ToleranceWarning, match=r"1 of 3 members stopped before t = 6: member 1 at t = .*; out of max_steps"
     ):
         run = sw.integrate(system, "merson", tolerance=1e-6, at=at, max_steps=100, **state)
     assert run.status.tolist() == [Status.OK, Status.BUDGET, Status.OK]

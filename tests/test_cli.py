@@ -178,7 +178,7 @@ def test_a_diverged_run_is_a_warning_and_a_result(capsys):
     code, out, err = told(capsys, *words)
     report = json.loads(out)
     assert code == 0
-    assert err.startswith("stepwell: warning: 1 of 1 member(s) diverged")
+    assert err.startswith("stepwell: warning: the run diverged at step")
     assert err.count("\n") == 1
     assert report["diverged_at_step"] == 155
     assert report["largest_state_error"] is report["last_y"] is None
@@ -430,7 +430,7 @@ def test_the_documents_pair_is_reached(capsys, tmp_path):
     words = ("--method", "standard_euler", "--control", "0.3:printed", "--steps", "1000", "--json")
     code, out, err = told(capsys, "run", "energy_control:pair=printed", *words)
     assert code == 0
-    assert "bodies 0 and 1 of the only member met within step 370" in err
+    assert "bodies 0 and 1 met within step 370" in err
     printed = json.loads(out)
     scene = sw.scenes.energy_control("printed", form="printed")
     with pytest.warns(sw.AccuracyWarning, match="met within step 370"):

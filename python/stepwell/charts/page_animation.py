@@ -13,8 +13,8 @@ import numpy as np
 
 from .._checks import Array
 from . import attitude_picture, body_picture
+from .orbits_picture import BODIES, links, view
 from .runs import RunPicture
-from .runs_picture import BODIES, links, view
 from .style import FAMILIES
 
 WEB = Path(__file__).parent / "web"

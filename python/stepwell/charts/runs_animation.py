@@ -11,8 +11,9 @@ import numpy as np
 from .. import _checks
 from ..errors import ArgumentError, UnsupportedError
 from . import attitude_picture, body_picture
+from .orbits_picture import BODIES, EXACT, body, exact, fixed, left_picture, square, view
 from .runs import RunPicture
-from .runs_picture import BODIES, EXACT, body, curves, errors, exact, fixed, greyed, left_picture, square, view
+from .runs_picture import curves, errors, greyed
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:

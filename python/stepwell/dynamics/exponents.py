@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from .._members import share
 from .._value import Value
 from ..derivatives.traced import Traced, together
 from ..errors import ArgumentError, DivergenceWarning
@@ -272,8 +273,10 @@ def _warn(exponents: Array) -> None:
     """Say how many members have none."""
     lost = np.isnan(exponents).any(axis=0)
     if lost.any():
+        some = int(lost.sum())
         warnings.warn(
-            f"{int(lost.sum())} of {lost.size} member(s) left the range of finite numbers; their exponents are NaN",
+            f"{share(some, lost.shape, lost.size)} left the range of finite numbers; "
+            f"{'its' if some == 1 else 'their'} exponents are NaN",
             DivergenceWarning,
             stacklevel=3,
         )

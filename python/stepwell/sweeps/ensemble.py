@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _checks
+from .._members import counted
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError
 from ..methods import Method
 from ..methods import method as find_method
@@ -282,15 +283,15 @@ class _Tally:
     def warn(self) -> None:
         if self.bad:
             warnings.warn(
-                f"{self.bad} of {self.members} member(s) diverged; the first of them at {self.grid.place(self.first)}, at step "
-                f"{self.step}; status and first_bad_step tell which and when",
+                f"{self.bad} of {counted(self.members, 'member')} diverged, {'the first of them' if self.bad > 1 else 'that'} at "
+                f"{self.grid.place(self.first)}, at step {self.step}; status and first_bad_step tell which and when",
                 DivergenceWarning,
                 stacklevel=4,
             )
         if self.doubts:
             chunk = min(self.doubts)
             warnings.warn(
-                f"in {len(self.doubts)} chunk(s), the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
+                f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
                 AccuracyWarning,
                 stacklevel=4,
             )
