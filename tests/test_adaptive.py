@@ -323,9 +323,7 @@ def test_out_of_steps() -> None:
     """Who has no steps left stops where it is; what was reached before is there, and the neighbours go on."""
     system, state = kepler(np.array([0.1, 0.999, 0.1]))
     at = np.linspace(0.0, 6.0, 7)
-    with pytest.warns(
-        sw.ToleranceWarning, match=r"1 of 3 members stopped before t = 6: member 1 at t = .*; out of max_steps"
-    ):
+    with pytest.warns(sw.ToleranceWarning, match=r"1 of 3 members stopped before t = 6: member 1 at t = .*; out of max_steps"):
         run = sw.integrate(system, "merson", tolerance=1e-6, at=at, max_steps=100, **state)
     assert run.status.tolist() == [Status.OK, Status.BUDGET, Status.OK]
     assert run.paces is not None

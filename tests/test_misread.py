@@ -94,9 +94,7 @@ def test_an_angle_without_a_sine() -> None:
 def test_bodies_whose_energy_the_method_made() -> None:
     scene = sw.scenes.pythagorean()
     for method, steps in (("rk4", 30_000), ("false_heun", 3000)):
-        match = (
-            rf"^the run has another energy at the end: .* instead of -12\.8, so {method} did not"
-        )
+        match = rf"^the run has another energy at the end: .* instead of -12\.8, so {method} did not"
         with pytest.warns(sw.AccuracyWarning, match=match):
             scene.run(method, scene.horizon / steps, every=100, record="energy")
     scene.run("dop853", scene.horizon / 30_000, every=100, record="energy")
@@ -136,9 +134,7 @@ def test_bodies_in_a_batch_whose_energy_the_method_made() -> None:
     scene = sw.scenes.pythagorean()
     y = np.stack([10.0 * scene.y, scene.y], axis=-1)
     batch: dict[str, Any] = {"v": 0.0, "dt": 10.0 / 30_000, "steps": 30_000}
-    with pytest.warns(
-        sw.AccuracyWarning, match=r"1 of 2 members has another energy .* member 1 has 5.69e\+04 instead of -12.8"
-    ):
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 2 members has another energy .* member 1 has 5.69e\+04 instead of -12.8"):
         sw.integrate(scene.system, "rk4", y=y, **batch)
     # A controlled energy is kept, or said to be missed by the control.
     sw.integrate(scene.system, "dop853", y=scene.y, control=sw.Projection(), **batch | {"steps": 3000})

@@ -15,6 +15,7 @@ from .._checks import Array
 from . import attitude_picture, body_picture
 from .orbits_picture import BODIES, links, view
 from .runs import RunPicture
+from .runs_finding import broke_off, steps_of
 from .style import FAMILIES
 
 WEB = Path(__file__).parent / "web"
@@ -63,9 +64,9 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     number = max(2, min(len(good), STATES, room // each))
     shown = good[np.round(np.linspace(0, len(good) - 1, number)).astype(int)]
     run, t = chart.run, chart.run.t[shown]
-    about = f"{run.steps} steps of {run.dt:.6g}; {textwrap.shorten(repr(run.system), 90, placeholder=' …')}"
+    about = f"{steps_of(run)}; {textwrap.shorten(repr(run.system), 90, placeholder=' …')}"
     if run.status:
-        about += f" Diverged at step {int(run.first_bad_step)}: shown as far as it is finite."
+        about += f" {broke_off(run)}: shown as far as it is finite."
     between = number < len(good) and number < seconds * fps
     if between:
         about += f" {number} of {len(run.t)} saved states, and straight lines between them."

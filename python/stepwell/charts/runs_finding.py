@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from .._members import counted
 from ..result import Run
 
 if TYPE_CHECKING:
@@ -39,6 +40,10 @@ SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def finding(chart: RunPicture) -> str:
     """The most that can be said of the run in a title: how it ended, or how far it is from the truth, or what it did."""
+    return _said(chart).replace(" -", " −")
+
+
+def _said(chart: RunPicture) -> str:
     run = chart.run
     if run.status:
         if run.paces is None:
@@ -112,12 +117,29 @@ def _of_attitude(chart: RunPicture) -> str:
     roll, pitch = np.asarray(system.angles(chart.run.y, axis=1))[:, :2].T
     last = chart.run.t >= chart.run.t[-1] - LAST_SHARE * (chart.run.t[-1] - chart.run.t[0])
     if max(np.ptp(roll[last]), np.ptp(pitch[last])) < SETTLED:
-        return f"settles at {roll[-1]:.1f}° roll and {pitch[-1]:.1f}° pitch".replace("-", "−")
+        return f"settles at {roll[-1]:.1f}° roll and {pitch[-1]:.1f}° pitch"
     ways = (f"{name} from {angle.min():.0f}° to {angle.max():.0f}°" for name, angle in (("roll", roll), ("pitch", pitch)))
-    return ", ".join(ways).replace("-", "−")
+    return ", ".join(ways)
 
 
 # ---- numbers in words
+
+
+def steps_of(run: Run) -> str:
+    """How many steps of which length, or how many adaptive ones."""
+    if run.paces is not None:
+        return counted(int(run.paces.accepted), "adaptive step")
+    return f"{counted(run.steps, 'step')} of {run.dt:.6g}"
+
+
+def broke_off(run: Run) -> str:
+    """When a run diverged or stopped, as a sentence without its end; nothing if it did not."""
+    if not run.status:
+        return ""
+    if run.paces is not None:
+        return f"Stopped at t = {float(run.paces.t):.6g}"
+    step = int(run.first_bad_step)
+    return f"Diverged at step {step} (t = {run.t0 + step * run.dt:g})"
 
 
 def percent(share: float) -> str:

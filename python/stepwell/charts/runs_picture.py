@@ -12,7 +12,7 @@ from ..systems import Chain
 from .labels import title
 from .orbits_picture import BOTTOM, EXACT, LONG_CURVE, RIGHT, TOP, orbits, radii, turning
 from .runs import RunPicture
-from .runs_finding import finding
+from .runs_finding import broke_off, finding, steps_of
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
@@ -214,18 +214,18 @@ def text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     """Title, what was run, and what the numbers are relative to."""
     scene, run = chart.scene, chart.run
     title(figure, 0.012, 0.955, f"{chart.title}: {finding(chart)}", 20)
-    what = f"{run.steps} steps of {run.dt:.6g} from t = {run.t[0]:g} to {run.t[-1]:.6g}; {run.system!r} ({scene.section})"
+    where = f" ({scene.section})" if scene.section else ""
+    what = f"{steps_of(run)} from t = {run.t[0]:g} to {run.t[-1]:.6g}; {run.system!r}{where}"
     figure.text(0.012, 0.918, textwrap.shorten(what, 165, placeholder=" …"), size=13, color=GREY)
     said = []
     if run.status:
-        step = int(run.first_bad_step)
-        said.append(f"Diverged at step {step} (t = {run.t0 + step * run.dt:g}): drawn as far as it is finite.")
+        said.append(f"{broke_off(run)}: drawn as far as it is finite.")
     if chart.state_error is not None:
         said.append(f"State error 1: {scene.error}.")
     if chart.energy_error is not None:
         said.append(f"Energy error: relative to {chart.energy_scale}.")
     said += dict.fromkeys(notes)
-    if len(run.t) < run.steps + 1:
+    if run.paces is None and len(run.t) < run.steps + 1:
         said.append(f"{len(run.t)} states of {run.steps + 1} were saved and are drawn.")
     figure.text(0.012, 0.02, "\n".join(_lines(said)), size=12, color=GREY, linespacing=1.4)
 
