@@ -166,7 +166,7 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
-    some = np.count_nonzero(wrong)
+    some = int(np.count_nonzero(wrong))
     text = (
         f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another energy at the end: "
         f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "

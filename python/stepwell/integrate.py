@@ -564,7 +564,7 @@ def _warn_of_stops(run: Run) -> None:
     stopped = run.status != 0
     time = float(run.paces.t[stopped].min())
     first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
-    some = np.count_nonzero(stopped)
+    some = int(np.count_nonzero(stopped))
     warnings.warn(
         f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
         f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {_WHY[Status(int(run.status[first]))]}",
@@ -583,7 +583,7 @@ def _warn_of_lost(run: Run, pace: Any) -> None:
         lost |= (longest > 0.0) & (pace.absolute > pace.relative * longest) & (pace.absolute > MAX_ABSOLUTE_SHARE * longest)
     if lost.any():
         warnings.warn(
-            f"tolerance: for {share(np.count_nonzero(lost), lost.shape, lost.size)} the absolute part lets a step err by more "
+            f"tolerance: for {share(int(lost.sum()), lost.shape, lost.size)} the absolute part lets a step err by more "
             f"than {MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or "
             f"a smaller absolute part",
             ToleranceWarning,
@@ -698,7 +698,7 @@ def _warn(run: Run, before: Whole | None) -> None:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
-    some = np.count_nonzero(bad)
+    some = int(np.count_nonzero(bad))
     warnings.warn(
         f"{share(some, bad.shape, bad.size)} diverged{first_of(some, first, bad.size)} at step {step} "
         f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",

@@ -280,7 +280,7 @@ class Run(Value):
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
-        if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
+        if (stopped := int(np.count_nonzero(self.status == Status.EVENT))) > 0:
             raise UnsupportedError(
                 f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
                 f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run"

@@ -72,8 +72,9 @@ def _before_and_after(figure: Figure, chart: RunPicture, before: RunPicture, not
     (_, old), (centre, new) = view(before, plane), view(chart, plane)
     size = min(max(old, new), BEFORE_FACTOR * new)
     for i, (each, name) in enumerate(((before, "without control"), (chart, "with control"))):
-        axes = figure.add_axes((0.058 + 0.35 * i, BOTTOM, 0.29, TOP - BOTTOM))
+        axes = figure.add_axes((0.055 + 0.33 * i, BOTTOM, 0.275, TOP - BOTTOM))
         square(axes, centre, size, plane, dim)
+        axes.locator_params(nbins=6)
         _paths(axes, each, plane, legend=i == 0, below=True)
         axes.set_title(name if dim == 2 else f"{name}, seen along z", loc="left", size=13)
         if left_picture(each, [(centre, size)], size):

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._checks import Array
 from .._members import counted
+from ..control import ConstraintControl
 from ..result import Run
 
 if TYPE_CHECKING:
@@ -32,7 +33,10 @@ MOST_DIGITS = 15
 #: An angle that changes by less, in degrees, over this last share of the run has settled.
 SETTLED, LAST_SHARE = 0.5, 0.1
 
-#: Control that changes the energy error by less than this factor makes no difference.
+#: What constraints keep is no energy.
+CONSTRAINTS = ("length", "norm")
+
+#: Control that changes an error by less than this factor makes no difference.
 MIN_DIFFERENCE = 1.5
 
 SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -51,7 +55,7 @@ def _said(chart: RunPicture) -> str:
         return f"stops at t = {float(run.paces.t):.4g}"
     growth, known = growth_of(chart)
     if growth >= (MIN_GROWTH if known else MIN_GROWTH_UNKNOWN):
-        return f"unstable, grows by {tenfold(growth)}"
+        return f"grows to {_times(growth)} the {'exact motion' if known else 'start'}"
     if chart.before is not None and (said := _of_control(chart, chart.before)):
         return said
     if chart.state_error is not None and np.isfinite(chart.state_error).any():
@@ -83,20 +87,40 @@ def _of_energy(error: Array, energy: Array) -> str:
 
 
 def _of_control(chart: RunPicture, before: RunPicture) -> str:
-    """What the control changed, beside the same run without it; nothing where there is no energy that should be constant."""
+    """What the control changed, beside the same run without it; nothing where it is not the energy that it keeps.
+
+    Medians of the saved states are compared: at a close encounter the largest error may be the same with and without control.
+    """
     if before.run.status:
         return f"finite with control, diverges at step {int(before.run.first_bad_step)} without"
-    if chart.energy_error is None or before.energy_error is None:
+    keeper: Any = chart.run.system.keeper
+    if isinstance(keeper, ConstraintControl) or getattr(keeper, "way", None) in CONSTRAINTS:
         return ""
-    after, plain = float(chart.energy_error.max()), float(before.energy_error.max())
-    if not (0.0 < after < math.inf and 0.0 < plain < math.inf):
-        return ""
-    factor = plain / after
-    if factor >= MIN_DIFFERENCE:
-        return f"control makes the energy error {_times(factor)} smaller"
-    if factor <= 1.0 / MIN_DIFFERENCE:
-        return f"control makes the energy error {_times(1.0 / factor)} larger"
-    return "control leaves the energy error as it was"
+    changes = []
+    for name, after, plain in (
+        ("energy", chart.energy_error, before.energy_error),
+        ("state", chart.state_error, before.state_error),
+    ):
+        change = None if after is None or plain is None else _change(after, plain)
+        if change is None and name == "energy":
+            return ""
+        if change is not None:
+            changes.append(f"the median {name} error {change}")
+    return f"control makes {' and '.join(changes)}"
+
+
+def _change(after: Array, plain: Array) -> str | None:
+    """How the median of errors changed; nothing where one of the medians is zero or not known."""
+    known = np.isfinite(after) & np.isfinite(plain)
+    if not known.any():
+        return None
+    old, new = float(np.median(plain[known])), float(np.median(after[known]))
+    if old <= 0.0 or new <= 0.0:
+        return None
+    factor = old / new
+    if 1.0 / MIN_DIFFERENCE < factor < MIN_DIFFERENCE:
+        return "neither smaller nor larger"
+    return f"{_times(factor)} smaller" if factor > 1.0 else f"{_times(1.0 / factor)} larger"
 
 
 def _of_motion(chart: RunPicture) -> str:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MOST_ROWS = 24
 
 #: The errors of the run without control, and how far its curve may widen the scale.
-BEFORE, FARTHEST_BEFORE = "#9a9a9a", 1e6
+BEFORE, FARTHEST_BEFORE = "#9a9a9a", 1e14
 
 
 def draw(chart: RunPicture) -> Figure:
@@ -180,7 +180,10 @@ def errors(energy: Axes, state: Axes, chart: RunPicture, *, compared: bool = Fal
         low, high = (float(error[shown].min()), float(error[shown].max())) if shown.any() else (1e-17, 1e-15)
         if old is not None and (known := old[np.isfinite(old) & (old > 0.0)]).size:
             high = max(high, min(float(known.max()), FARTHEST_BEFORE * high))
-        low = max(low, 1e-9 * high)  # the first steps, or a passage through zero, would press the rest together
+            low = min(low, max(float(np.median(known)), low / FARTHEST_BEFORE))
+        low = max(
+            low, (1e-9 if old is None else 1.0 / FARTHEST_BEFORE) * high
+        )  # the first steps, or a passage through zero, would press the rest together
         # Before the curve: a scale that is still free would look for room beyond the largest float.
         axes.set_ylim(0.4 * low, 3.0 * min(high, 1e300))
         axes.plot(chart.run.t, np.where(shown, error, np.nan), color="black", linewidth=1.0, rasterized=len(error) > LONG_CURVE)

@@ -279,7 +279,7 @@ def _limit(locus: Locus) -> str:
 
 def _title(same: tuple[Locus, ...]) -> str:
     first = same[0].method
-    names = named(first.method) if len(same) == 1 else ", ".join(locus.method.title for locus in same)
+    names = named(first) if len(same) == 1 else ", ".join(locus.method.title for locus in same)
     return "\n".join([*textwrap.wrap(names, LETTERS), _limit(same[0])] if len(same) > 1 else [names, _limit(same[0])])
 
 
