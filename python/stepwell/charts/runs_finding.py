@@ -105,8 +105,8 @@ def _of_control(chart: RunPicture, before: RunPicture) -> str:
         if change is None and name == "energy":
             return ""
         if change is not None:
-            changes.append(f"the median {name} error {change}")
-    return f"control makes {' and '.join(changes)}"
+            changes.append(f"the {name} error {change}")
+    return f"control makes {', '.join(changes)}"
 
 
 def _change(after: Array, plain: Array) -> str | None:

@@ -216,7 +216,8 @@ def greyed(energy: Axes, state: Axes, chart: RunPicture) -> list[Axes]:
 def text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     """Title, what was run, and what the numbers are relative to."""
     scene, run = chart.scene, chart.run
-    title(figure, 0.012, 0.955, f"{chart.title}: {finding(chart)}", 20)
+    told = finding(chart)
+    title(figure, 0.012, 0.955, f"{chart.title}: {told}", 20)
     where = f" ({scene.section})" if scene.section else ""
     what = f"{steps_of(run)} from t = {run.t[0]:g} to {run.t[-1]:.6g}; {run.system!r}{where}"
     figure.text(0.012, 0.918, textwrap.shorten(what, 165, placeholder=" …"), size=13, color=GREY)
@@ -228,6 +229,8 @@ def text(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     if chart.energy_error is not None:
         said.append(f"Energy error: relative to {chart.energy_scale}.")
     said += dict.fromkeys(notes)
+    if "control makes" in told:
+        said.append("What control changes: medians of the saved states.")
     if run.paces is None and len(run.t) < run.steps + 1:
         said.append(f"{len(run.t)} states of {run.steps + 1} were saved and are drawn.")
     figure.text(0.012, 0.02, "\n".join(_lines(said)), size=12, color=GREY, linespacing=1.4)
