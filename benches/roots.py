@@ -177,7 +177,7 @@ def draw(path: Path) -> None:
     looks = {"512 bits": ("plain", FAMILIES["Runge-Kutta"], "o"), "fused, 512 bits": ("fused", FAMILIES["Heun"], "D")}
     with rc_context(FONT):
         figure: Any = new_figure(10.0, 4.6)
-        for left, what, title in ((0.285, ALONE, "1/r³ alone"), (0.655, WITHIN, "within a force")):
+        for left, what, title in ((0.3, ALONE, "1/r³ alone"), (0.665, WITHIN, "within a force")):
             axes = figure.add_axes((left, 0.14, 0.33, 0.62))
             for column, (name, colour, mark) in looks.items():
                 cycles = [float(row[column].split(" / ")[what]) for _, row in rows]
@@ -185,6 +185,7 @@ def draw(path: Path) -> None:
                 axes.axvline(cycles[0], color=colour, linewidth=1.0, linestyle=(0, (4, 3)), zorder=0)
             axes.set(xlim=(0.0, 42.0), ylim=(len(rows) - 0.5, -0.5), xlabel="cycles for a vector of 8")
             axes.set_yticks(range(len(rows)), [f"{name}, error {row['error']}" for name, row in rows] if what == ALONE else [])
+            axes.tick_params(axis="y", labelsize=12)
             axes.set_title(title, loc="left", size=13.5)
             axes.grid(color="#e6e6e6", linewidth=0.8)
             axes.set_axisbelow(True)
