@@ -295,7 +295,7 @@ def test_what_is_pushed_out_of_a_rest(rest: float, tolerance: float, method: str
 
 def test_an_absolute_tolerance_in_which_the_motion_is_lost_is_warned_of() -> None:
     ask: dict[str, Any] = {"v": 0.0, "y": np.array([1.0, 1e-9, 0.0]), "at": [10.0]}
-    with pytest.warns(sw.ToleranceWarning, match=r"for 1 of 3 member\(s\) the absolute part lets a step err by more than 0.01"):
+    with pytest.warns(sw.ToleranceWarning, match=r"for 1 of 3 members the absolute part lets a step err by more than 0.01"):
         sw.integrate(sw.Oscillator(1.0), "merson", tolerance=(1e-3, 1e-3), **ask)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
