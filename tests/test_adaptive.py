@@ -400,7 +400,9 @@ def test_bad_input_before_any_work(more: dict[str, Any], error: type[StepwellErr
 
 
 def test_fixed_steps_need_dt_and_steps() -> None:
-    with pytest.raises(ArgumentError, match="dt and steps: expected with fixed steps; or give tolerance= and at="):
+    with pytest.raises(
+        ArgumentError, match="dt and steps: needed for fixed steps, got None; for adaptive steps give tolerance= and at="
+    ):
         sw.integrate(sw.Oscillator(1.0), "merson", v=0.0, y=1.0)
 
 

@@ -190,7 +190,7 @@ def integrate(
     dt = dt_before if dt is None else dt
     if dt is None or steps is None:
         missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)
-        raise ArgumentError(f"{missing}: expected with fixed steps; or give tolerance= and at= for adaptive steps")
+        raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
     if fused and form != "direct":
@@ -338,7 +338,7 @@ def velocities(system: System, v: Any) -> Any:
         return 0.0
     if v is None:
         raise ArgumentError(
-            f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none"
+            f"v: expected the velocities at the start, got None; {system!r} has velocities, unlike a system of first order"
         )
     return v
 
