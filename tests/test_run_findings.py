@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -149,6 +150,52 @@ def test_a_run_that_broke_off_says_when() -> None:
     words = " ".join(text.get_text() for text in picture.plot().texts)
     assert "Stopped at t = " in words
     assert f"{int(run.paces.accepted)} adaptive steps" in words
+
+
+# ---- where nothing is known
+
+
+@sw.system(order=1)
+def decay(t: Any, y: Any, *, k: Any = 1.0) -> Any:
+    return -k * y
+
+
+@sw.system(order=1)
+def lorenz(t: Any, y: Any) -> Any:
+    return np.array([10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]])
+
+
+@sw.system
+def duffing(t: Any, v: Any, y: Any, *, gamma: Any = 0.5) -> Any:
+    return gamma * np.cos(1.2 * t) - 0.3 * v + y - y**3
+
+
+def test_equations_of_first_order_are_drawn(tmp_path: Path) -> None:
+    """They have no v; each curve has the whole width, for no error is known."""
+    run = sw.integrate(decay, "rk4", y=1.0, dt=0.01, steps=200, every=1)
+    assert finding(own_picture(run)) == f"y from {math.exp(-2.0):.3g} to 1"
+    (axes,) = run.plot().axes
+    assert np.array_equal(axes.lines[0].get_ydata(), run.y)
+    assert axes.get_position().width > 0.85
+    three = sw.integrate(lorenz, "rk4", y=np.ones(3), dt=0.01, steps=500, every=1)
+    (axes,) = three.plot().axes
+    drawn = [line.get_ydata() for line in axes.lines if len(line.get_xdata()) == len(three.t)]
+    assert len(drawn) == 3
+    for each in (run, three):
+        for name in ("run.html", "run.gif"):
+            each.animate(tmp_path / name, seconds=0.2, fps=10)
+            assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_a_motion_of_which_no_error_is_known_shows_its_phase_plane() -> None:
+    run = sw.integrate(duffing, "rk4", dt=0.01, steps=2000, **START)
+    above, below, plane = run.plot().axes
+    assert np.array_equal(above.lines[0].get_ydata(), run.y)
+    assert np.array_equal(below.lines[0].get_ydata(), run.v)
+    assert plane.get_title(loc="left").startswith("phase plane")
+    assert np.array_equal(plane.lines[0].get_xydata(), np.stack([run.y, run.v], axis=1))
+    words = [text.get_text() for text in run.plot().texts]
+    assert "Its energy and its exact solution are not known, so neither are errors." in words
 
 
 # ---- with and without control

@@ -160,12 +160,16 @@ def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
     t = chart.run.t[shown]
     known = chart.scene.exact(t) if chart.scene.exact is not None and t[-1] <= chart.scene.until else None
     panels = []
-    for k, (name, values, colour) in enumerate((("y", chart.run.y[shown], BLUE), ("v", chart.run.v[shown], GREEN))):
+    blocks = (("y", chart.run.y[shown], BLUE), ("v", chart.run.v[shown], GREEN))
+    given = [block for block in blocks if block[1][0].size]  # a system of first order has no v
+    for k, (name, values, colour) in enumerate(given):
         lines = [] if known is None else [{"data": encoded(known[1 - k]), "exact": True}]
         size = float(np.abs(values if known is None else known[1 - k]).max()) or 1.0
         size = min(3.0 * size, max(size, float(np.abs(values).max())))
         lines.append({"data": encoded(np.clip(values, -4.0 * size, 4.0 * size)), "colour": colour})
-        panels.append(_series(name, lines, t, (-1.1 * size, 1.1 * size), (0.07, 0.06 + 0.48 * k, 0.46, 0.4)))
+        panels.append(
+            _series(name, lines, t, (-1.1 * size, 1.1 * size), (0.07, 0.06 + 0.48 * k, 0.46, 0.4 if len(given) > 1 else 0.88))
+        )
     return panels
 
 

@@ -50,9 +50,17 @@ def draw(chart: RunPicture) -> Figure:
             orbits(figure, chart, notes)
             left = 0.55 if chart.places.shape[2] == 2 and chart.before is None else 0.735
         else:
-            panels = curves(figure, chart, notes)
+            unknown = chart.state_error is None and chart.energy is None
+            planar = unknown and chart.kind == "swing" and chart.run.v[0].size > 0
+            panels = curves(figure, chart, notes, width=RIGHT - 0.065 if unknown and not planar else 0.515)
             left = 0.66
             panels[-1].set_xlabel("time")
+            if unknown:  # panels of errors would be empty
+                if planar:
+                    _phase_plane(figure.add_axes((left, BOTTOM, RIGHT - left, TOP - BOTTOM)), chart)
+                notes.append("Its energy and its exact solution are not known, so neither are errors.")
+                text(figure, chart, notes)
+                return figure
         if chart.kind == "orbits" and turning(chart):
             radii(figure.add_axes((left, 0.68, RIGHT - left, TOP - 0.68)), chart)
             energy = figure.add_axes((left, 0.4225, RIGHT - left, 0.145))
@@ -69,17 +77,23 @@ def draw(chart: RunPicture) -> Figure:
 # ---- curves over time
 
 
-def curves(figure: Figure, chart: RunPicture, notes: list[str]) -> list[Axes]:
+def curves(figure: Figure, chart: RunPicture, notes: list[str], *, width: float = 0.515) -> list[Axes]:
     """The panels of what is not bodies in space, and the states in them."""
+    if chart.kind == "swing" and not chart.run.v[0].size:
+        axes = figure.add_axes((0.065, BOTTOM, width, TOP - BOTTOM))
+        _swing(axes, chart, chart.run.y, None if chart.exact is None else chart.exact[2], notes)
+        axes.set_ylabel("y", rotation=0, labelpad=10)
+        _curve_legend(axes, chart)
+        return [axes]
     if chart.kind == "swing":
-        above = figure.add_axes((0.065, 0.545, 0.515, TOP - 0.545))
-        below = figure.add_axes((0.065, BOTTOM, 0.515, 0.455 - BOTTOM))
+        above = figure.add_axes((0.065, 0.545, width, TOP - 0.545))
+        below = figure.add_axes((0.065, BOTTOM, width, 0.455 - BOTTOM))
         for axes, name, block, index in ((above, "y", chart.run.y, 2), (below, "v", chart.run.v, 1)):
             _swing(axes, chart, block, None if chart.exact is None else chart.exact[index], notes)
             axes.set_ylabel(name, rotation=0, labelpad=10)
         _curve_legend(above, chart)
         return [above, below]
-    axes = figure.add_axes((0.065, BOTTOM, 0.515, TOP - BOTTOM))
+    axes = figure.add_axes((0.065, BOTTOM, width, TOP - BOTTOM))
     _rows(axes, chart, notes)
     _curve_legend(axes, chart)
     return [axes]
@@ -111,6 +125,18 @@ def _swing(axes: Axes, chart: RunPicture, block: Array, exact: Array | None, not
     axes.axhline(0.0, color="#cccccc", linewidth=0.8, zorder=0)
     axes.set(ylim=(-1.12 * (size or 1.0), 1.12 * (size or 1.0)))
     over_time(axes, chart)
+
+
+def _phase_plane(axes: Axes, chart: RunPicture) -> None:
+    """The velocity over the coordinate, with start and end."""
+    y, v = (np.clip(block[chart.finite], -1e9, 1e9) for block in (chart.run.y, chart.run.v))
+    axes.plot(y, v, color="black", linewidth=1.1, rasterized=len(y) > LONG_CURVE)
+    for i, face in ((0, "white"), (-1, "black")):
+        axes.plot(y[i], v[i], "o", markersize=8, markerfacecolor=face, markeredgecolor="black", zorder=4)
+    axes.set_title("phase plane: v over y; circle: start, dot: end", loc="left", size=13.5)
+    axes.set_xlabel("y")
+    axes.grid(color="#e6e6e6", linewidth=0.8)
+    axes.set_axisbelow(True)
 
 
 def _rows(axes: Axes, chart: RunPicture, notes: list[str]) -> None:
