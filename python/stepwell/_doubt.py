@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _encounters
+from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
-from ._members import in_words, of_member, share
 from .control import EnergyControl
 from .errors import AccuracyWarning, ControlWarning
 from .result import Run

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _checks, _core, _encounters, _memory, engine
+from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
-from ._members import first_of, share
 from .control import AnyControl, EnergyControl, a_control
 from .errors import (
     ArgumentError,

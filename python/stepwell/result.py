@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import _checks
-from ._brief import MAX_LINE, facts, shortened
+from ._brief import MAX_LINE, counted, facts, share, shortened
 from ._checks import Array
 from ._encounters import Encounter
-from ._members import counted, share
 from ._value import Value, by_value
 from .errors import UnsupportedError
 from .methods import Method

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._brief import counted
 from .._checks import Array
-from .._members import counted
 from ..control import ConstraintControl
 from ..result import Run
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import share
 from .._checks import Array
-from .._members import share
 from .._value import Value
 from ..derivatives.traced import Traced, together
 from ..errors import ArgumentError, DivergenceWarning

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _checks
+from .._brief import counted
 from .._checks import Array
-from .._members import counted
 from .._value import Value
 from ..errors import ArgumentError
 from ..reference.types import Whole

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _checks
-from .._members import counted
+from .._brief import counted
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError
 from ..methods import Method
 from ..methods import method as find_method
