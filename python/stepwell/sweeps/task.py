@@ -271,6 +271,12 @@ def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Arr
             each.check(system)
         if task.kinds(History) and task.every is None and task.at is None:
             raise UnsupportedError("every: expected how many steps are between the states of a history")
+        if task.at is not None:
+            few = min(PROBED_STEPS, given.get("max_steps", PROBED_STEPS))
+            begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
+            _as_many(begun, 1)
+            assert begun.stand is not None
+            return begun.system, (begun.stand.v, begun.stand.y)
         first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
         _as_many(first, 1)
     return first.system, (first.v[-1], first.y[-1])
