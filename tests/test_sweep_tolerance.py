@@ -309,7 +309,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "times that fall": ({"at": [2.0, 1.0]}, "at: expected times that ascend"),
     "times as a table": ({"at": [[1.0, 2.0]]}, "at: expected times along one axis"),
     "no step budget": ({"max_steps": 0}, "max_steps: expected 1 or more"),
-    "one time for an extreme": ({"at": 1.0, "outcomes": "extremes"}, "at: expected two or more times, since with a tolerance Ext"),
+    "one time for an extreme": (
+        {"at": 1.0, "outcomes": "extremes"},
+        "at: expected two or more times, since with a tolerance Ext",
+    ),
     "one time for a mean": ({"at": [1.0], "outcomes": ["last", "mean"]}, "since with a tolerance Mean sees the states at these"),
     "Lyapunov exponents": ({"outcomes": "lyapunov"}, "outcomes: Exponents: Lyapunov exponents are those of fixed steps"),
     "a method without an estimate": ({"method": "rk4"}, "tolerance: rk4 does not estimate its error"),

@@ -7,4 +7,17 @@ from .exponents import Exponents
 from .outcomes import Extremes, Function, History, Last, Mean
 from .samples import random, sobol
 
-__all__ = ["Crossing", "Evaluations", "Exponents", "Extremes", "Function", "History", "Last", "Mean", "Period", "random", "sobol", "sweep"]
+__all__ = [
+    "Crossing",
+    "Evaluations",
+    "Exponents",
+    "Extremes",
+    "Function",
+    "History",
+    "Last",
+    "Mean",
+    "Period",
+    "random",
+    "sobol",
+    "sweep",
+]

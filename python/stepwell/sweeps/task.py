@@ -96,7 +96,9 @@ class Task(NamedTuple):
     def most_members(self, system: System) -> int:
         """How many members may be in a chunk, for its memory."""
         state = prod(system.v_shape) + prod(system.y_shape)
-        least = 0 if self.between is None and self.at is None else 3 * COPIES_OF_A_STATE * state  # two states of a piece, and the one before
+        least = (
+            0 if self.between is None and self.at is None else 3 * COPIES_OF_A_STATE * state
+        )  # two states of a piece, and the one before
         return int(self.memory / (8.0 * (self.numbers(system) + least)))
 
     def states_at_once(self, system: System, members: int) -> int:
