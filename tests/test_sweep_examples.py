@@ -1,4 +1,4 @@
-"""The examples of sweeps: each prints what it did, draws, and notices a mistake. Their sizes here are those of the gallery, or less."""
+"""The examples of sweeps: each prints what it did, draws, and notices a mistake."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ MAX_SECONDS = 1800
 
 
 def lines(contestant: str, name: str) -> int:
-    """How many lines of code a contestant takes: without blank ones, comments and docstrings, and without ``work.py``, which all have."""
+    """Lines of code of a contestant: without blank ones, comments and docstrings, and without ``work.py``, which all share."""
     text = (HERE / f"{contestant}_{name}.py").read_text(encoding="utf-8")
     told: set[int] = set()
     for node in ast.walk(ast.parse(text)):

@@ -1,4 +1,7 @@
-"""By leapfrog, in blocks whose members are side by side; a block ends when all of its members are apart. Chunks by joblib's threads."""
+"""By leapfrog, in blocks whose members are side by side; a block ends when all of its members are apart.
+
+Chunks by joblib's threads.
+"""
 
 from math import sqrt
 

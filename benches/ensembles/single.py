@@ -1,4 +1,4 @@
-"""One sweep by one contestant, in a process of its own: ``python -m benches.ensembles.single CONTESTANT SWEEP SIZE SMALL OUTCOMES``.
+"""One sweep by one contestant, in a process of its own: its name, the sweep, two sizes, and a file for the outcomes.
 
 It makes a small sweep first, so that everything is imported and compiled, then the one that is timed. Prints a line of JSON.
 """

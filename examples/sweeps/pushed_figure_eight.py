@@ -46,16 +46,15 @@ def thrown_out(size, method, **options):
 
 def draw(turns, share):
     figure, axes = plt.subplots(figsize=(7.2, 6.2), dpi=120, layout="constrained")
-    colours = plt.get_cmap("cividis").copy()
+    colours = plt.get_cmap("cividis_r").copy()
     colours.set_bad("#111111")
     mapped = axes.imshow(turns, cmap=colours, norm=LogNorm(1, TURNS), origin="lower", extent=2 * (-WIDTH, WIDTH))
     axes.plot(0.0, 0.0, "o", markerfacecolor="none", markeredgecolor="#ffffff", markeredgewidth=2, markersize=12)
     arrow = {"arrowstyle": "->", "color": "#ffffff"}
     axes.annotate("the figure-eight", (0.0, 0.0025), (-0.045, 0.045), color="#ffffff", arrowprops=arrow)
     axes.set(xlabel="velocity off by Δa, to the right", ylabel="velocity off by Δb, upwards")
-    axes.set_title(
-        f"Pushed off the figure-eight, three bodies stay together\nalong a ridge (black): {share:.0%} of starts, for {TURNS} turns"
-    )
+    together = f"along a ridge (black): {share:.0%} of starts, for {TURNS} turns"
+    axes.set_title(f"Pushed off the figure-eight, three bodies stay together\n{together}")
     figure.colorbar(mapped, ax=axes, label="turns until one body is thrown out", ticks=[1, 3, 10, 30, 100], format="%d")
     return figure
 

@@ -121,8 +121,8 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
             )
         if each.observes and times.size < 2:
             raise ArgumentError(
-                f"at: expected two or more times, since with a tolerance {name} sees the states at these times and no others, got "
-                f"{times.tolist()}"
+                f"at: expected two or more times, since with a tolerance {name} sees the states at these times and no others, "
+                f"got {times.tolist()}"
             )
 
 
@@ -132,8 +132,8 @@ def refuse_fixed(outcomes: Iterable[Outcome], max_steps: Any) -> None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
     if any(isinstance(each, Evaluations) for each in outcomes):
         raise UnsupportedError(
-            "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes with "
-            "tolerance= and at="
+            "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "
+            "with tolerance= and at="
         )
 
 
@@ -151,6 +151,6 @@ def why(status: int) -> str:
 
 #: What is told of members that are lost in the absolute tolerance.
 LOST = (
-    f"tolerance: for {{lost}} of {{members}} member(s) the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the "
-    f"longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
+    f"tolerance: for {{lost}} of {{members}} member(s) the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of "
+    f"the longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
 )

@@ -314,8 +314,8 @@ class Function(Outcome):
     """What a function finds in the run of a chunk of members.
 
     It is called with a ``Run`` whose batch is the chunk, one axis of members, with the states after the transient that ``every``
-    asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any others, so what is found of one must not depend on
-    the others.
+    asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any
+    others, so what is found of one must not depend on the others.
 
     Args:
         function: returns an array whose last axis is that of the members, or a dictionary of them by name; in place of an array,
