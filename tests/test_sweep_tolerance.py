@@ -74,7 +74,7 @@ def test_members_are_those_of_integrate(method: str) -> None:
         {"fused": True},
         {"t0": -1.0},
         {"max_steps": 5000},
-        {"control": sw.Projection()},
+        {"control": sw.Projection("energy")},
     ],
     ids=lambda options: next(iter(options)),
 )
@@ -172,14 +172,42 @@ def test_every_division_gives_the_same_bits(whole: Any, division: dict[str, Any]
     assert whole.attrs == found.attrs
 
 
+def in_pieces(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
+    """As if memory sufficed for so many states at once."""
+    monkeypatch.setattr(task.Task, "states_at_once", lambda *_: times)
+
+
+@pytest.mark.parametrize("times", [1, 2, 7, 24])
+def test_every_division_of_time_gives_the_same_bits(whole: Any, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_pieces(monkeypatch, times)
+    assert unlike(whole, adaptive(chunk=20)) == []
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_goes_on(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = adaptive(method=method)
+    in_pieces(monkeypatch, 3)
+    assert unlike(before, adaptive(method=method)) == []
+
+
+def test_little_memory_is_more_pieces() -> None:
+    """Of 45 members, whose states at 25 times take 18 kB, some at once."""
+    some = task.Task(duffing, "dop853", {}, 0, 0, 1, None, (sw.sweeps.Last(),), 150_000.0, AT)
+    system = duffing()
+    members = some.most_members(system)
+    assert 45 < members < 1000
+    assert 2 <= some.states_at_once(system, members) < AT.size < some.states_at_once(system, 5)
+
+
 def test_pieces_that_begin_anew_would_be_noticed(whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A piece that goes on from the last saved state, and not from where the members are, has other steps."""
 
     def anew(given: dict[str, Any], run: sw.Run) -> dict[str, Any]:
         return given | {"v": run.v[-1], "y": run.y[-1], "t0": float(run.t[-1])}
 
+    in_pieces(monkeypatch, 4)
     monkeypatch.setattr(task, "_going_on", anew)
-    assert "y_last" in unlike(whole, adaptive(memory=20_000.0))
+    assert "y_last" in unlike(whole, adaptive())
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
@@ -222,7 +250,7 @@ def explosion(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
     return rate * y * y
 
 
-def test_what_stops_leaves_the_others_alone() -> None:
+def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     rate = np.array([0.1, 0.8, 0.2, 2.0, 0.3])
     at = np.linspace(0.0, 3.0, 31)
     given: dict[str, Any] = {"y": 1.0, "tolerance": 1e-9, "at": at}
@@ -230,7 +258,8 @@ def test_what_stops_leaves_the_others_alone() -> None:
         run = sw.integrate(explosion(rate=rate), "dop853", **given)
     message = r"2 of 5 member\(s\) stopped before t = 3; the first of them at rate = 0.8: (the step that|no step)"
     results = []
-    for options in ({}, {"chunk": 2}, {"chunk": 3, "memory": 9000.0}):
+    for options, times in (({}, 31), ({"chunk": 2}, 31), ({"chunk": 3}, 4)):
+        in_pieces(monkeypatch, times)
         with pytest.warns(sw.ToleranceWarning, match=message) as caught:
             found = sw.sweep(
                 explosion, {"rate": rate}, "dop853", outcomes=["last", "history", "extremes", "evaluations"], **given, **options
@@ -248,15 +277,16 @@ def test_what_stops_leaves_the_others_alone() -> None:
     np.testing.assert_allclose(results[0].y_last[[0, 2, 4]], 1.0 / (1.0 - 3.0 * rate[[0, 2, 4]]), rtol=1e-6)
 
 
-def test_a_budget_is_that_of_the_whole_run() -> None:
+def test_a_budget_is_that_of_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many pieces there are."""
-    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 60}
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 200}
     omega = np.array([0.5, 1.0, 20.0])
     with pytest.warns(sw.ToleranceWarning):
         run = sw.integrate(sw.Oscillator(omega), "dop853", **given)
-    for memory in (64.0 * 2**20, 9000.0):
+    for times in (41, 3):
+        in_pieces(monkeypatch, times)
         with pytest.warns(sw.ToleranceWarning, match=r"the first of them at omega = 20: out of max_steps; status tells"):
-            found = sw.sweep(sw.Oscillator, {"omega": omega}, "dop853", outcomes=["history", "last"], memory=memory, **given)
+            found = sw.sweep(sw.Oscillator, {"omega": omega}, "dop853", outcomes=["history", "last"], **given)
         np.testing.assert_array_equal(found.status, run.status)
         np.testing.assert_array_equal(found.y, run.y.T)
     assert run.status[-1] == sw.Status.BUDGET
