@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import stepwell
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -34,8 +35,8 @@ def share(name: str, contestant: str, right: Any) -> float:
     return truth.right(name, found[truth.sampled(name, SMALL[name])], *right)
 
 
-#: Chaos, and fractal borders, are right by luck.
-LEAST = {"bifurcation": 0.5, "basins": 0.7, "figure_eight": 0.6}
+#: What two very exact computations agree on is found again by others, but for what is nearly chaotic.
+LEAST = {"bifurcation": 0.8, "basins": 0.9, "figure_eight": 0.8}
 
 
 @pytest.mark.parametrize("contestant", ["stepwell", "numba", "heyoka"])
@@ -51,7 +52,11 @@ def test_a_wrong_one_is_told_of(name: str, monkeypatch: pytest.MonkeyPatch) -> N
     """By other physics."""
     right = truth.outcomes(name, SMALL[name])
     module = importlib.import_module(f"benches.ensembles.stepwell_{name}")
-    changed = {"bifurcation": ("DELTA", 0.35), "basins": ("FRICTION", 0.1), "figure_eight": ("APART", 3.0)}[name]
+    changed = {
+        "bifurcation": ("DELTA", 0.35),
+        "basins": ("FRICTION", 0.1),
+        "figure_eight": ("BODIES", stepwell.NBody([1.0, 1.0, 1.0], force="logarithmic")),
+    }[name]
     monkeypatch.setattr(module, *changed)
     assert share(name, "stepwell", right) < LEAST[name]
 
@@ -91,7 +96,7 @@ def test_the_page_has_what_was_measured(tmp_path: Path) -> None:
 def test_what_was_measured_is_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, str]] = []
 
-    def measured(contestant: str, name: str, size: int, small: int) -> dict[str, Any]:
+    def measured(contestant: str, name: str, size: int, small: int, times: int) -> dict[str, Any]:
         asked.append((contestant, name))
         if len(asked) == 3:
             raise KeyboardInterrupt

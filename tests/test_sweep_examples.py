@@ -14,9 +14,9 @@ EXAMPLES = Path(__file__).resolve().parent.parent / "examples" / "sweeps"
 
 #: Equal bits make the last line the same everywhere.
 LAST_LINES: dict[str, str] = {
-    "basins": "",
+    "basins": "31.9% have a neighbour that ends elsewhere; with half the step 0.0% end elsewhere",
     "bifurcation": "periods at γ = 0.20, 0.28, 0.29, 0.37, 0.50, 0.65: 1, 2, 4, 5, chaos, 2",
-    "pushed_figure_eight": "",
+    "pushed_figure_eight": "together after 30 turns: 11.8% by leapfrog, 57.7% with adaptive steps",
 }
 #: A mistake in the equations of each, or in the start, which what is known must refute.
 MISTAKES: dict[str, tuple[str, str]] = {
@@ -69,7 +69,7 @@ def test_a_map_is_its_mirror_image_to_the_last_bit_for_the_order_of_the_sum(tmp_
         import stepwell as sw
 
         run = sw.integrate(made["pendulum"](), "rk4", v=0.0, y=starts, dt=0.04, steps=200)
-        assert (run.y[-1, 0, 0] == -run.y[-1, 0, 1] and run.y[-1, 1, 0] == run.y[-1, 1, 1]) is alike
+        assert np.array_equal(run.y[-1, :, 0], [-1.0, 1.0] * run.y[-1, :, 1]) is alike
 
 
 def test_larger_maps_go_to_a_store_and_have_the_same_bits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

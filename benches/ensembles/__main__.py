@@ -19,7 +19,7 @@ import numpy as np
 
 from ..compare import machine
 from . import truth
-from .work import SIZES, members
+from .work import SHARES, SIZES, members, smaller
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -46,8 +46,9 @@ def lines(contestant: str, name: str) -> int:
     return sum(1 for number, row in rows if row.strip() and not row.strip().startswith("#") and number not in told)
 
 
-def measured(contestant: str, name: str, size: int, small: int) -> dict[str, Any]:
+def measured(contestant: str, name: str, size: int, small: int, times: int = 1) -> dict[str, Any]:
     """Time and peak memory of a process, and its share of right outcomes; or why there is none."""
+    whole, size = members(name, size), smaller(name, size, times)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "found.npy"
         asked = [sys.executable, "-m", "benches.ensembles.single", contestant, name, str(size), str(small), str(path)]
@@ -55,6 +56,7 @@ def measured(contestant: str, name: str, size: int, small: int) -> dict[str, Any
         if done.returncode != 0:
             return {"missing": done.stderr.strip().splitlines()[-1][:120]}
         told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        told |= {"times": times, "seconds": told["seconds"] * whole / members(name, size)}
         found = np.load(path, mmap_mode="r")[truth.sampled(name, size)]
     return told | {"right": truth.right(name, np.asarray(found), *truths(name, size))}
 
@@ -82,6 +84,7 @@ def table(name: str, told: dict[str, Any]) -> str:
             rows.append([title, *4 * ["—"], each["missing"]])
             continue
         memory = f"{each['peak'] / 2**20:.0f} MiB"
+        title += f", a {each['times']}th of them, × {each['times']}" if each.get("times", 1) > 1 else ""
         rows.append([title, shown(each["seconds"]), f"{shown(each['ready'])} s", str(lines(contestant, name)), memory])
         rows[-1].append(f"{each['right']:.1%}")
     text = [head, ["---"] + ["---:"] * 5, *rows]
@@ -117,9 +120,10 @@ def main(given: list[str] | None = None) -> None:
         if known.get(name, {}).get("size") != size:
             known[name] = {"size": size, "contestants": {}}
         for contestant in CONTESTANTS:
+            times = 1 if asked.quick else SHARES.get((contestant, name), 1)
             there = known[name]["contestants"].get(contestant, {"missing": ""})
             if "missing" in there or again & {"all", name, contestant}:
-                known[name]["contestants"][contestant] = measured(contestant, name, size, min(quick, 24))
+                known[name]["contestants"][contestant] = measured(contestant, name, size, min(quick, 24), times)
                 print(name, contestant, known[name]["contestants"][contestant], flush=True)
                 asked.numbers.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
                 write(known, asked.page)

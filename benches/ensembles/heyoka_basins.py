@@ -7,7 +7,7 @@ import numpy as np
 
 from .work import END, FRICTION, GRAVITY, HEIGHT, MAGNETS, bobs, nearest
 
-#: The coarsest power of ten with which as many members are right as by the steps of the others.
+#: The coarsest power of ten with which as many members are right as by stepwell.
 TOLERANCE = 1e-4
 #: Integrators that are in memory at once.
 AT_ONCE = 1024

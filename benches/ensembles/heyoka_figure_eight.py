@@ -5,14 +5,12 @@ from functools import cache
 import heyoka as hy
 import numpy as np
 
-from .work import APART, OBSERVED_OF_A_TURN, TURN, TURNS, X, velocities
+from .work import APART, MAX_STEPS, OBSERVED_OF_A_TURN, TURN, TURNS, X, velocities
 
-#: The coarsest power of ten with which as many members are right as by the steps of the others.
-TOLERANCE = 1e-6
+#: The coarsest power of ten with which as many members are right as by stepwell.
+TOLERANCE = 1e-9
 #: Integrators that are in memory at once.
 AT_ONCE = 64
-#: Most steps of a vector of members: near a collision they become so short that it would never end.
-MAX_STEPS = 100 * TURNS
 GRID = TURN / OBSERVED_OF_A_TURN * np.arange(TURNS * OBSERVED_OF_A_TURN + 1)
 PAIRS = ((0, 1), (1, 2), (2, 0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isqrt
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,9 @@ def nearest(y: Array) -> Array:
 X = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
 V = (0.347116888118926938, 0.532724945388030229)
 TURN = 6.32591398292621167759
-WIDTH, TURNS, STEPS_OF_A_TURN, OBSERVED_OF_A_TURN = 0.06, 100, 300, 10
+WIDTH, TURNS, OBSERVED_OF_A_TURN = 0.12, 30, 10
+#: Of a step, relative; and the most steps of a member, for what comes all but to a collision.
+TOLERANCE, MAX_STEPS = 1e-10, 300 * TURNS
 APART = 4.0
 
 
@@ -52,6 +55,20 @@ def velocities(size: int) -> Array:
 
 #: Members of each sweep by its size, that of the full run, and that of a quick one.
 SIZES: dict[str, tuple[int, int]] = {"bifurcation": (1_000_000, 4000), "basins": (2000, 64), "figure_eight": (317, 24)}
+
+
+#: Who would take too long is given so many times fewer members, and shown as if it had made them all.
+SHARES: dict[tuple[str, str], int] = {
+    ("heyoka", "bifurcation"): 25,
+    ("heyoka", "basins"): 100,
+    ("heyoka", "figure_eight"): 9,
+    ("numba", "figure_eight"): 9,
+}
+
+
+def smaller(name: str, size: int, times: int) -> int:
+    """The size of a sweep with so many times fewer members."""
+    return size // times if name == "bifurcation" else size // isqrt(times)
 
 
 def members(name: str, size: int) -> int:

@@ -98,12 +98,13 @@ def draw(held, undecided):
         axes.plot(east, north, "o", color=colour, markeredgecolor="#ffffff", markeredgewidth=2.5, markersize=14)
     axes.set(xlabel="start, west to east", ylabel="start, south to north")
     axes.set_title(
-        f"Where a magnetic pendulum stops (circles: magnets)\n{undecided:.0%} of starts have a neighbour that ends elsewhere"
+        f"Near a magnet (circle) it is certain where the pendulum stops,\n"
+        f"yet {undecided:.0%} of all starts have a neighbour that ends elsewhere"
     )
     return figure
 
 
-def main(folder, size=160, store=None):
+def main(folder, size=120, store=None):
     bound = lowest_pass()
     found = basins(size, bound, progress=size > 500, **({} if store is None else {"store": store}))
     held = found.magnet.values
@@ -113,7 +114,7 @@ def main(folder, size=160, store=None):
     elsewhere[:, :-1] |= held[:, 1:] != held[:, :-1]
     draw(held, elsewhere.mean()).savefig(folder / "basins.png")
 
-    few = 48
+    few = 32
     same = basins(few, bound).magnet.values == basins(few, bound, finer=2).magnet.values
     print(f"{held.size} starts, {np.count_nonzero(held < 0)} not held yet, bits {found.attrs['bits']}")
     print(
@@ -124,6 +125,6 @@ def main(folder, size=160, store=None):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", default=".", type=Path, help="where the picture is written")
-    parser.add_argument("--size", default=160, type=int, help="starts along a side")
+    parser.add_argument("--size", default=120, type=int, help="starts along a side")
     parser.add_argument("--store", help="a path ending in .zarr or .nc for the results")
     main(**vars(parser.parse_args()))
