@@ -8,7 +8,7 @@ import numpy as np
 from .work import DELTA, OMEGA, PERIOD, PERIODS, TRANSIENT, strengths
 
 #: The coarsest power of ten with which as many members are right as by stepwell.
-TOLERANCE = 1e-3
+TOLERANCE = 1e-4
 #: Integrators that are in memory at once.
 AT_ONCE = 1024
 GRID = PERIOD * np.append(0.0, TRANSIENT + 1.0 + np.arange(PERIODS))
