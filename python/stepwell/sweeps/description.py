@@ -69,7 +69,7 @@ def _steps_told(task: Task, grid: Grid) -> dict[str, Any]:
     if task.at is None:
         dt = {} if grid.of_dt else {"dt": task.given["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
-    told = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
+    told: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
     if (tolerance := task.given.get("tolerance")) is not None:
         told["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
     return told | {"end": float(task.at[-1])}
