@@ -20,7 +20,7 @@ LAST_LINES: dict[str, str] = {
 }
 #: A mistake in the equations of each, or in the start, which what is known must refute.
 MISTAKES: dict[str, tuple[str, str]] = {
-    "basins": ("away / (r2 * np.sqrt(r2))", "away / r2"),
+    "basins": ("1.0 / (r2 * np.sqrt(r2)) * away", "1.0 / r2 * away"),
     "bifurcation": ("- delta * v", "- 1.2 * delta * v"),
     "pushed_figure_eight": ("-2.0 * first", "-2.05 * first"),
 }

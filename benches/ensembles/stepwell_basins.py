@@ -12,7 +12,7 @@ def pendulum(t, v, y):
     for magnet in MAGNETS:
         away = np.array(magnet) - y
         r2 = away[0] ** 2 + away[1] ** 2 + HEIGHT**2
-        force = force + away / (r2 * np.sqrt(r2))
+        force = force + 1.0 / (r2 * np.sqrt(r2)) * away
     return force
 
 

@@ -32,7 +32,7 @@ def pendulum(t, v, y, *, gravity=GRAVITY, friction=FRICTION, height=HEIGHT):
     for east, north in MAGNETS.tolist():
         away = np.array([east - y[0], north - y[1]])
         r2 = away[0] ** 2 + away[1] ** 2 + height**2
-        pulls.append(away / (r2 * np.sqrt(r2)))
+        pulls.append(1.0 / (r2 * np.sqrt(r2)) * away)
     return ((pulls[0] + pulls[1]) + pulls[2]) - gravity * y - friction * v  # p₀ + p₁ is the same in a mirror
 
 
@@ -123,7 +123,7 @@ def main(folder, size=120, store=None):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="The basins of a magnetic pendulum.")
     parser.add_argument("folder", nargs="?", default=".", type=Path, help="where the picture is written")
     parser.add_argument("--size", default=120, type=int, help="starts along a side")
     parser.add_argument("--store", help="a path ending in .zarr or .nc for the results")

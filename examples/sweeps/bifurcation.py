@@ -79,7 +79,7 @@ def main(folder, size=451, store=None):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="The bifurcation diagram of a driven spring.")
     parser.add_argument("folder", nargs="?", default=".", type=Path, help="where the picture is written")
     parser.add_argument("--size", default=451, type=int, help="how many strengths of the drive")
     parser.add_argument("--store", help="a path ending in .zarr or .nc for the results")

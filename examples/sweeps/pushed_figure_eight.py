@@ -1,5 +1,5 @@
 """Pushed off the figure-eight, most bodies stay together
-=======================================================
+======================================================
 
 Three bodies go round a figure of eight if they start with just the right velocities. Here each start is a little off: the first
 two have the velocity (a + Δa, b + Δb), the third −2 times that, so that momentum and angular momentum stay zero. Leapfrog with
@@ -71,7 +71,7 @@ def main(folder, size=35):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Which velocities near the figure-eight keep three bodies together.")
     parser.add_argument("folder", nargs="?", default=".", type=Path, help="where the picture is written")
     parser.add_argument("--size", default=35, type=int, help="starts along a side")
     main(**vars(parser.parse_args()))

@@ -138,13 +138,15 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
         for each in _pieces(task, system, given, members, task.transient, None, stopped):
             start = _going_on(given, each)
         parts: list[Found] = []
-        if functions := task.kinds(Function):
+        functions = task.kinds(Function)
+        if functions:
             how: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
-            whole = integrate(system, task.method, **how, **start)
-            _as_many(whole, members)
-            parts += [each.of_run(whole) for each in functions]
-        last, reduced = _reduced(task, system, start, members, stopped)
-        parts += reduced
+            last = integrate(system, task.method, **how, **start)
+            _as_many(last, members)
+            parts += [each.of_run(last) for each in functions]
+        if task.reductions or not functions:
+            last, reduced = _reduced(task, system, start, members, stopped)
+            parts += reduced
         for each in task.kinds(Exponents):
             _stop(stopped)
             parts.append(each.of_start(system, task.method, given, task.transient, task.steps))
