@@ -31,6 +31,7 @@ TITLES = {
     "basins": "A magnetic pendulum: {members:,} starts",
     "figure_eight": "Near the figure-eight: {members:,} starts",
 }
+QUICK = ", a quick run: times of so few members tell little"
 #: No sweep takes longer, in seconds.
 MAX_SECONDS = 1800
 
@@ -111,7 +112,7 @@ def main(given: list[str] | None = None) -> None:
     known: dict[str, Any] = json.loads(asked.numbers.read_text(encoding="utf-8")) if asked.numbers.exists() else {}
     about = dict(machine.describe())
     packages = [machine.version(each) for each in ("stepwell", "numba", "joblib", "heyoka")]
-    known["machine"] = f"{about['CPU']}, {about['date']}, {', '.join(packages)}{', a quick run' if asked.quick else ''}."
+    known["machine"] = f"{about['CPU']}, {about['date']}, {', '.join(packages)}{QUICK if asked.quick else ''}."
     again = set(filter(None, asked.again.split(",")))
     for name, (full, quick) in SIZES.items():
         if asked.only and name not in asked.only.split(","):
@@ -127,6 +128,7 @@ def main(given: list[str] | None = None) -> None:
                 print(name, contestant, known[name]["contestants"][contestant], flush=True)
                 asked.numbers.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
                 write(known, asked.page)
+    write(known, asked.page)
 
 
 if __name__ == "__main__":
