@@ -53,7 +53,10 @@ def measured(contestant: str, name: str, size: int, small: int, times: int = 1) 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "found.npy"
         asked = [sys.executable, "-m", "benches.ensembles.single", contestant, name, str(size), str(small), str(path)]
-        done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, timeout=MAX_SECONDS)
+        try:
+            done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, timeout=MAX_SECONDS)
+        except subprocess.TimeoutExpired:
+            return {"missing": f"more than {MAX_SECONDS} s"}
         if done.returncode != 0:
             return {"missing": done.stderr.strip().splitlines()[-1][:120]}
         told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
@@ -90,7 +93,7 @@ def table(name: str, told: dict[str, Any]) -> str:
         rows[-1].append(f"{each['right']:.1%}")
     text = [head, ["---"] + ["---:"] * 5, *rows]
     title = TITLES[name].format(members=members(name, size)).replace(",", " ")
-    return "\n".join([f"### {title}", "", *(f"| {' | '.join(row)} |" for row in text), ""])
+    return "\n".join([f"## {title}", "", *(f"| {' | '.join(row)} |" for row in text), ""])
 
 
 def write(known: dict[str, Any], page: Path) -> None:
