@@ -411,7 +411,7 @@ def _adapt(
     if times.ndim != 1 or len(times) == 0:
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
     carry = None if went is None else _paces_of(how, *went)
-    since = t0 if carry is None else float(carry.target.max(initial=t0))
+    since = t0 if carry is None else float(carry[engine.TARGET].max(initial=t0))
     if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
@@ -430,12 +430,12 @@ def _adapt(
     else:
         if dt is not None:
             raise ArgumentError("dt: the run that goes on has its next step already")
-        batches |= {"carry": carry.t.shape}
+        batches |= {"carry": carry.shape[1:]}
     if control is not None:
         batches |= {"control": control.batch}
     batch = _checks.batch_shape(batches)
-    if carry is not None and carry.t.shape != batch:
-        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.t.shape}")
+    if carry is not None and carry.shape[1:] != batch:
+        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.shape[1:]}")
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     numbers = prod(system.v_shape) + prod(system.y_shape)
@@ -451,14 +451,14 @@ def _adapt(
         if control is not None:
             system = system.controlled(control, v, y, TINY)
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
-        pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
-        pace = pace._replace(work=np.zeros(batch))
-        plan = plan._replace(order=_order(how, pace))
-        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
-    accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
+        paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
+        plan = plan._replace(order=_order(how, paces[engine.RELATIVE]))
+        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
+    pace = engine.pace_of(out.paces, batch)
+    accepted, rejected, extra_steps = (a.astype(np.int64) for a in (pace.accepted, pace.rejected, pace.extra_steps))
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
-    again = out.pace.held > 0.0 if how.has_series and not fused else extra_steps
-    evaluations = engine.evaluations(how, system, order=plan.order, paced=True) * (accepted + rejected + again)
+    again = pace.held > 0.0 if how.has_series and not fused else extra_steps
+    evaluations = out.evaluations * (accepted + rejected + again)
     run = Run(
         t=times,
         v=out.v,
@@ -473,17 +473,15 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, evaluations),
-        stand=AdaptiveState(
-            out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
-        ),
+        paces=Paces(pace.t, pace.h, accepted, rejected, evaluations),
+        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, times[-1]), float(times[-1]), how.name),
         fused=fused,
-        work=None if system.control is None else out.pace.work / engine.pushes(system.control, how.attempt_evaluations),
+        work=None if system.control is None else pace.work / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
     _warn_of_stops(run)
-    _warn_of_lost(run, out.pace)
+    _warn_of_lost(run, pace)
     return run, None if carry is not None else (v, y)
 
 
@@ -501,15 +499,29 @@ def _has_series(system: System, control: Any) -> None:
         )
 
 
-def _order(method: Method, pace: Pace) -> int:
+def _without_work(paces: Array) -> Array:
+    """The same where no control has done anything yet in this run."""
+    paces = paces.copy()
+    paces[engine.WORK] = 0.0
+    return paces
+
+
+def _aimed(paces: Array, target: float) -> Array:
+    """The same with another output time."""
+    paces = paces.copy()
+    paces[engine.TARGET] = target
+    return paces
+
+
+def _order(method: Method, relative: Array) -> int:
     """The order of a series for the tolerance; 0 of a method that has one order."""
-    if not method.has_series or not pace.relative.size:
+    if not method.has_series or not relative.size:
         return 0
     from .reference import series_pace  # only such runs need it
 
-    least, most = float(pace.relative.min()), float(pace.relative.max())
+    least, most = (relative.item(),) * 2 if relative.size == 1 else (float(relative.min()), float(relative.max()))
     order = series_pace.order_of(least)
-    if series_pace.order_of(most) != order:
+    if most != least and series_pace.order_of(most) != order:
         raise UnsupportedError(
             f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
             f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
@@ -517,8 +529,8 @@ def _order(method: Method, pace: Pace) -> int:
     return order
 
 
-def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
-    """Where the members stand of a run with a tolerance that goes on."""
+def _paces_of(method: Method, carry: Any, carried_by: Any) -> Array:
+    """The numbers that say where the members stand of a run with a tolerance that goes on."""
     if carried_by is None:
         raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
     by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
@@ -530,7 +542,7 @@ def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
             f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
             f"axis, got shape {numbers.shape}"
         )
-    return engine.pace_of(numbers)
+    return numbers
 
 
 def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
@@ -571,7 +583,7 @@ def _warn_of_stops(run: Run) -> None:
     )
 
 
-def _warn_of_lost(run: Run, pace: Any) -> None:
+def _warn_of_lost(run: Run, pace: Pace) -> None:
     """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
     if not pace.absolute.any():
         return
