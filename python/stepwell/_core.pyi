@@ -157,7 +157,7 @@ class Tape:
 
     def sample(self, table: int, t: _Value) -> Symbol: ...
     def trace(self, model: ModelSpec, what: str) -> list[Symbol]:
-        """What the core makes of a model: "step", "attempt", "begin", "start 0", "finish 0", or "record" with a quantity behind it."""
+        """What the core makes of a model: "step", "attempt", "begin", "start 0", "finish 0", or "record" and a quantity."""
 
     def listing(self, of: Symbol) -> str:
         """The operations that a value is made of."""

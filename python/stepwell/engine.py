@@ -534,8 +534,8 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
 
 #: How many numbers say where a member stands: those of a ``Pace``.
 PACE_NUMBERS = 20
-#: Places among them.
-TARGET, RELATIVE, WORK = 2, 5, 19
+#: Places among them; the counts are of accepted, rejected and extra steps.
+TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, COUNTS, WORK = 0, 1, 2, 4, 5, 6, slice(15, 18), 19
 
 
 class Pacing(NamedTuple):
@@ -586,17 +586,16 @@ class Adapted(NamedTuple):
 
 
 def paces(plan: Plan, first: Array | None, relative: Array, absolute: Array | None) -> Array:
-    """Where members stand before they begin, shape (numbers of a ``Pace``, *batch), or without a batch where it is the same for all.
+    """Where members stand before they begin, shape (numbers of a ``Pace``, *batch), or (numbers,) if it is the same for all.
 
     Without ``absolute`` the relative error is one of the longest that a block has been.
     """
     from .reference import adaptive  # only such runs need it
 
-    given = [np.zeros(()) if each is None else each for each in (first, relative, absolute)]
-    alike = all(each.size == 1 for each in given)
-    first, relative, absolute, lasts = *(each.item() if alike else each for each in given), float(absolute is None)
-    waiting = adaptive.waiting(plan.t0, first, (relative, absolute, lasts), plan.system.samples)
-    if alike:
+    given: list[Any] = [0.0 if each is None else each.item() if each.size == 1 else each for each in (first, relative, absolute)]
+    step, *tolerance = given
+    waiting = adaptive.waiting(plan.t0, step, (*tolerance, float(absolute is None)), plan.system.samples)
+    if all(type(each) is float for each in given):
         return np.array(waiting)
     numbers = np.empty((PACE_NUMBERS, *plan.batch))
     for row, number in zip(numbers, waiting, strict=True):
@@ -616,8 +615,7 @@ def pace_of(numbers: Array, batch: Shape) -> Pace:
     """Where the members of a batch stand, from the numbers of each, or those of all."""
     from .reference import adaptive
 
-    alike = numbers.shape[1:] != batch
-    return adaptive.Pace(*(np.broadcast_to(row, batch) for row in numbers) if alike else numbers)
+    return adaptive.Pace(*numbers if numbers.shape[1:] == batch else (np.broadcast_to(row, batch) for row in numbers))
 
 
 def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
@@ -661,8 +659,8 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     """Go on from where members stand, of whom ``paces`` has the numbers of each or those of all."""
     if plan.backend == "numpy":
         return _adapt_by_numpy(plan, pacing, paces, v, y)
-    saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
-    n_v, members = prod(plan.system.v_shape), plan.members
+    times, n_v, members = len(pacing.at), prod(plan.system.v_shape), plan.members
+    saved_v, saved_y = np.empty((times, *v.shape)), np.empty((times, *y.shape))
     last = np.empty((n_v + prod(plan.system.y_shape), members))
     last_paces, status = np.empty((PACE_NUMBERS, members)), np.empty(plan.batch, dtype=np.int64)
     before = paces.reshape(PACE_NUMBERS, paces.size // PACE_NUMBERS)

@@ -415,7 +415,8 @@ def _adapt(
     if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
-    system.check_time(max(abs(t0), abs(float(times[-1]))))
+    last = float(times[-1])
+    system.check_time(max(abs(t0), abs(last)))
     backend = _checks.known("backend", backend, BACKENDS)
     budget = MOST_STEPS if max_steps is None else _checks.count("max_steps", max_steps, 1)
     v = _checks.block("v", v, system.v_shape, system.axes)
@@ -424,13 +425,14 @@ def _adapt(
     if carry is None:
         relative, absolute = _tolerances(tolerance)
         first = None if dt is None else _checks.numbers("dt", dt, positive=True, unit="units of time")
-        shapes = (relative.shape, () if absolute is None else absolute.shape)
-        batches |= {"tolerance": _checks.batch_shape({"relative": shapes[0], "absolute": shapes[1]})}
-        batches |= {} if first is None else {"dt": first.shape}
+        tolerances = {"relative": relative.shape} | ({} if absolute is None else {"absolute": absolute.shape})
+        batches["tolerance"] = _checks.batch_shape(tolerances)
+        if first is not None:
+            batches["dt"] = first.shape
     else:
         if dt is not None:
             raise ArgumentError("dt: the run that goes on has its next step already")
-        batches |= {"carry": carry.shape[1:]}
+        batches["carry"] = carry.shape[1:]
     if control is not None:
         batches |= {"control": control.batch}
     batch = _checks.batch_shape(batches)
@@ -450,21 +452,21 @@ def _adapt(
     with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
+        order = _order(how, relative if carry is None else carry[engine.RELATIVE])
+        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
         paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
-        plan = plan._replace(order=_order(how, paces[engine.RELATIVE]))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
-    pace = engine.pace_of(out.paces, batch)
-    accepted, rejected, extra_steps = (a.astype(np.int64) for a in (pace.accepted, pace.rejected, pace.extra_steps))
+    accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
-    again = pace.held > 0.0 if how.has_series and not fused else extra_steps
+    again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
     evaluations = out.evaluations * (accepted + rejected + again)
+    stopped = np.count_nonzero(out.status) > 0
     run = Run(
         t=times,
         v=out.v,
         y=out.y,
         status=out.status.astype(np.int8),
-        first_bad_step=np.where(out.status == 0, -1, accepted + 1),
+        first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(batch, -1),
         carry=None,
         system=system,
         method=how,
@@ -473,15 +475,17 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(pace.t, pace.h, accepted, rejected, evaluations),
-        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, times[-1]), float(times[-1]), how.name),
+        paces=Paces(out.paces[engine.TIME], out.paces[engine.STEP], accepted, rejected, evaluations),
+        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, last), last, how.name),
         fused=fused,
-        work=None if system.control is None else pace.work / engine.pushes(system.control, how.attempt_evaluations),
+        work=None if system.control is None else out.paces[engine.WORK] / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
-    _warn_of_stops(run)
-    _warn_of_lost(run, pace)
+    if stopped:
+        _warn_of_stops(run)
+    if np.count_nonzero(out.paces[engine.ABSOLUTE]):
+        _warn_of_lost(run, engine.pace_of(out.paces, batch))
     return run, None if carry is not None else (v, y)
 
 
@@ -570,8 +574,7 @@ _WHY = {
 
 
 def _warn_of_stops(run: Run) -> None:
-    if not run.status.any() or run.paces is None:
-        return
+    assert run.paces is not None
     stopped = run.status != 0
     time = float(run.paces.t[stopped].min())
     first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
@@ -585,8 +588,6 @@ def _warn_of_stops(run: Run) -> None:
 
 def _warn_of_lost(run: Run, pace: Pace) -> None:
     """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
-    if not pace.absolute.any():
-        return
     lost = np.zeros(run.status.shape, dtype=bool)
     for square in (pace.longest_v, pace.longest_y):
         longest = np.sqrt(square)
