@@ -71,8 +71,11 @@ pub struct AdaptiveLanes {
     step: PreparedStage,
     /// Rows of v, of y, of the paces and, of a series, of its coefficients.
     state: Aligned,
+    /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the start.
     by_terms: Option<OneLane>,
     begin: Option<OneLane>,
+    level: Level,
+    budget: f64,
 }
 
 /// A stage that is run for one lane alone.
@@ -114,10 +117,8 @@ impl AdaptiveLanes {
         let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
         let numbers = traced.shape.v + traced.shape.y;
         let all = tapes.step.split.body.next.len();
-        let one_lane = |stage: &Option<Stage>| stage.as_ref().map(|stage| OneLane::new(stage, spec, level, budget));
-        let (by_terms, begin) = (one_lane(&tapes.by_terms), one_lane(&tapes.begin));
         let state = Aligned::new(all * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, by_terms, begin, tapes })
+        Ok(AdaptiveLanes { state, step, numbers, by_terms: None, begin: None, level, budget, tapes })
     }
 }
 
@@ -155,13 +156,14 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn begins(&self) -> bool {
-        self.begin.is_some()
+        self.tapes.begin.is_some()
     }
 
     fn begin(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let (Some(stage), Some(begin)) = (&self.tapes.begin, &mut self.begin) else { return };
+        let Some(stage) = &self.tapes.begin else { return };
         let lanes = self.step.lanes();
-        let begun = begin.run(stage, spec, member, &self.state, (lane, lanes));
+        let one = self.begin.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let begun = one.run(stage, spec, member, &self.state, (lane, lanes));
         for (row, number) in self.state.chunks_exact_mut(lanes).zip(begun) {
             row[lane] = *number;
         }
@@ -172,7 +174,7 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn has_terms(&self) -> bool {
-        self.by_terms.is_some()
+        self.tapes.by_terms.is_some()
     }
 
     fn find_running(&self, budget: f64, runs: &mut [bool]) {
@@ -181,9 +183,10 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let (Some(stage), Some(by_terms)) = (&self.tapes.by_terms, &mut self.by_terms) else { return };
+        let Some(stage) = &self.tapes.by_terms else { return };
         let lanes = self.step.lanes();
-        let made = by_terms.run(stage, spec, member, &self.state, (lane, lanes));
+        let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let made = one.run(stage, spec, member, &self.state, (lane, lanes));
         for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS) {
             row[lane] = *number;
         }

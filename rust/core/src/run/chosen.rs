@@ -159,11 +159,13 @@ impl<'a> Worker<'a> {
         let mut waiting = 0..part.count;
         let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
         for (lane, assigned) in assignments.iter_mut().enumerate() {
-            // A lane without a member still needs parameters that are numbers; its pace never runs.
-            self.assign_member(&part, lane, part.count - 1);
-            let pace = self.group.pace(lane);
-            self.group.set_pace(lane, pace.idle());
             *assigned = waiting.next().map(|member| self.begin_member(&part, lane, member));
+            if assigned.is_none() {
+                // A lane without a member still needs parameters that are numbers; its pace never runs.
+                self.assign_member(&part, lane, part.count - 1);
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, pace.idle());
+            }
         }
         // Of a series: which lanes have a step to try, and how many calls were made.
         let (mut runs, mut calls) = (vec![false; assignments.len()], 0);
