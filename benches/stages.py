@@ -1,4 +1,7 @@
-"""Where the time of a call goes: ``python -m benches.stages``. Oscillators by False Euler, 1000 steps on one thread."""
+"""Where the time of a call goes: ``python -m benches.stages``. On one thread.
+
+Oscillators by False Euler, 1000 steps; and one Arenstorf orbit, once round, with a tolerance.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,16 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from stepwell import _core, engine
+from stepwell.scenes.builtin.arenstorf import MU
+
+from .compare.chosen.orbits import arenstorf
 
 HEAD = ["stage, µs", "one oscillator", "1000", "100 000"]
 TITLE = "A call by stages: oscillators, False Euler, 1000 steps"
 MEMBERS = (1, 1000, 100_000)
 STEPS = 1000
+#: Methods and the tolerance of adaptive steps.
+ABLE, TOLERANCE = ("fehlberg", "dop853", "taylor"), 1e-9
 #: Each time is the least of so many, each over calls that together last this long, in seconds.
 REPEATS, SAMPLE = 7, 0.01
 
@@ -75,6 +83,48 @@ def stages(members: int) -> dict[str, float]:
     }
 
 
+def adaptive_stages(name: str) -> dict[str, float]:
+    """The times of all stages of a call with a tolerance."""
+    one = arenstorf(1)
+    v, y, system, method = one.v[:, 0], one.y[:, 0], sw.RestrictedThreeBody(MU), sw.method(name)
+    inside: list[float] = []
+    adapt = _core.adapt
+
+    def timed(*given: Any) -> bool:
+        begin = time.perf_counter()
+        made = adapt(*given)
+        inside.append(1e6 * (time.perf_counter() - begin))
+        return made
+
+    def call(end: float) -> sw.Run:
+        return sw.integrate(system, method, v=v, y=y, tolerance=TOLERANCE, at=[end], threads=1)
+
+    within, around = {0.0: 1e12, one.end: 1e12}, 1e12
+    calls = REPEATS * max(1, round(1e6 * SAMPLE / least(lambda: call(one.end))))
+    try:
+        engine._core.adapt = timed
+        for _ in range(calls):  # in turns, as above
+            for end in within:
+                begin = time.perf_counter()
+                call(end)
+                around = min(around, 1e6 * (time.perf_counter() - begin) - inside[-1])
+                within[end] = min(within[end], inside[-1])
+    finally:
+        engine._core.adapt = adapt
+    return {
+        "checks of arguments, plan, result object": around,
+        "gathering parameters and states, first step, storing results": within[0.0],
+        "steps": within[one.end] - within[0.0],
+    }
+
+
+def adaptive_table() -> tuple[str, list[str], list[list[str]]]:
+    """Those of a call with a tolerance, a column for each method."""
+    found = [adaptive_stages(name) for name in ABLE]
+    title = f"A call by stages: one Arenstorf orbit, tolerance {TOLERANCE:g}"
+    return title, ["stage, µs", *ABLE], [[name, *(f"{each[name]:.3g}" for each in found)] for name in found[0]]
+
+
 def table() -> tuple[str, list[str], list[list[str]]]:
     """All of it, a row for each stage."""
     found = [stages(members) for members in MEMBERS]
@@ -85,3 +135,4 @@ if __name__ == "__main__":
     from .compare import report
 
     report.show(*table())
+    report.show(*adaptive_table())

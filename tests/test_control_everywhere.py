@@ -137,7 +137,7 @@ def test_a_constraint_of_its_own_is_kept_by_the_same_projection() -> None:
     merson: Any = sw.method("merson").steps
     v, y = np.array([0.0, 1.0]), np.array([1.0, 0.0])
     samples = math.inf, -math.inf
-    pace = adaptive.start(0.0, np.array(0.5), (np.array(1e-3), np.array(0.0), 1.0), samples, v, y, (1, 1))
+    pace = adaptive.begin(Wheel(), adaptive.waiting(0.0, 0.5, (1e-3, 0.0, 1.0), samples), v, y, (1, 1))
     pace = pace._replace(target=np.array(10.0))
     system = adaptive.Attempted(Wheel())
     tried = 0

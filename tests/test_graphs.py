@@ -14,6 +14,7 @@ import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell import _core, engine
+from stepwell.reference import adaptive
 from stepwell.reference.traced import Tracer
 from test_tracing import ABLE, CONTROLS, METHODS, made
 
@@ -105,6 +106,33 @@ def test_an_attempt(name: str) -> None:
     for method in ABLE[:1] if int(np.prod(system.v_shape)) > MANY else ABLE:
         tape = _core.Tape()
         assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
+
+
+@pytest.mark.parametrize("name", ADAPTIVE)
+def test_the_start_of_a_run_with_a_tolerance(name: str) -> None:
+    """A control does not change the first step, and a series has it as that of the step before, too."""
+    system, _, _ = made(name)
+    for method in (ABLE[0], sw.method("taylor")):
+        tape = _core.Tape()
+        assert_one_graph(tape, tape.trace(model(system, method), "begin"), Tracer(system, tape).begin(method))
+
+
+@pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
+def test_the_start_under_a_control_of_an_invariant(control: Any) -> None:
+    system = own_systems.pendulum().sized().under(control, ())
+    tape = _core.Tape()
+    assert_one_graph(tape, tape.trace(model(system, ABLE[0]), "begin"), Tracer(system, tape).begin(ABLE[0]))
+
+
+def test_another_start_is_noticed() -> None:
+    """A first step that goes by another share of the time is another graph."""
+    system, _, _ = made("pendulum")
+    tape = _core.Tape()
+    core = tape.trace(model(system, ABLE[0]), "begin")
+    with pytest.MonkeyPatch.context() as wrong:
+        wrong.setattr(adaptive, "FIRST", 0.02)
+        with pytest.raises(pytest.fail.Exception, match=r"the core has .* where the reference has"):
+            assert_one_graph(tape, core, Tracer(system, tape).begin(ABLE[0]))
 
 
 @pytest.mark.parametrize("name", SYSTEMS)

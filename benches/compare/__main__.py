@@ -65,9 +65,9 @@ def main() -> None:
         report.show(*made)
         parts.append(report.markdown(*made))
     if "stages".startswith(only):
-        made = stages.table()
-        report.show(*made)
-        parts.append(report.markdown(*made))
+        for made in (stages.table(), stages.adaptive_table()):
+            report.show(*made)
+            parts.append(report.markdown(*made))
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]

@@ -65,6 +65,8 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
     if type(value) is not np.ndarray and (masked := _masked(value)):
         raise ArgumentError(f"{argument}: expected numbers{_in(unit)}, got a masked array in which {masked} are masked")
+    if _core.sound(array, finite, positive):
+        return array  # such as a list of floats
     if array.dtype.kind == "O":
         array = _exact(argument, array)
     if array.dtype.kind not in "iuf":

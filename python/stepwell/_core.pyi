@@ -157,7 +157,7 @@ class Tape:
 
     def sample(self, table: int, t: _Value) -> Symbol: ...
     def trace(self, model: ModelSpec, what: str) -> list[Symbol]:
-        """What the core makes of a model: "step", "attempt", "start 0", "finish 0", or "record" with a quantity behind it."""
+        """What the core makes of a model: "step", "attempt", "begin", "start 0", "finish 0", or "record" and a quantity."""
 
     def listing(self, of: Symbol) -> str:
         """The operations that a value is made of."""
@@ -204,8 +204,11 @@ def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
     Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
     """
 
-def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> None:
-    """Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything."""
+def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> bool:
+    """Make a run with a tolerance. Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything.
+
+    False if nothing was done, since the start is to be found and an attempt is too long for one tape.
+    """
 
 def times(plan: Plan, t: NDArray[np.float64]) -> None:
     """Fill the times of the saved states. Of the plan it reads what ``run`` does."""

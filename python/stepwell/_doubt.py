@@ -186,7 +186,7 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
         return None
     end = run.v[-1], run.y[-1]
     n, members = len(end[1]), run.status.size
-    made = run.method.evaluations * run.steps if run.paces is None else int(run.paces.evaluations.min(initial=2**62))
+    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
     if run.status.ndim == 0 and n <= FEW_BODIES:
         return _of_few(bodies, start, end) if made >= FEW_EVALUATIONS else None
     if made < EVALUATIONS or made * members * n * n < 2 * PAIRS or prod(end[1].shape) > MOST_NUMBERS or not members:
@@ -195,6 +195,11 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
     with np.errstate(all="ignore"):
         moved = np.maximum(bodies.kinetic(start[0]), bodies.kinetic(end[0]))
         return Ends(bodies.energy(*start), bodies.energy(*end), moved)
+
+
+def _least(counts: Any) -> int:
+    """The least of some counts."""
+    return int(counts) if counts.ndim == 0 else int(counts.min(initial=2**62))
 
 
 def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:

@@ -143,11 +143,22 @@ class Fixed(metaclass=Maker):
         read_only(vars(self))
 
 
+#: How the state of an object is taken that does not say it itself; there is none before Python 3.11.
+_STATE = getattr(object, "__getstate__", None)
+
+
 def changed(one: Object, **changes: Any) -> Object:
     """A copy of an object that cannot be changed, with other attributes."""
-    other = copy.copy(one)
+    kind: Any = type(one)
+    other: Any
+    if issubclass(kind, Fixed) and getattr(kind, "__getstate__", None) is _STATE:
+        other = object.__new__(kind)  # as ``copy.copy`` makes it, which takes ten times as long
+        vars(other).update(vars(one))
+    else:
+        other = copy.copy(one)
     complete(other, **changes)
-    return other
+    made: Object = other
+    return made
 
 
 def complete(one: Any, **found: Any) -> None:

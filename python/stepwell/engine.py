@@ -25,7 +25,6 @@ from .systems import Sampled, System
 from .systems.base import flat, rows
 
 if TYPE_CHECKING:
-    from .reference.adaptive import Outcome as Adapted
     from .reference.adaptive import Pace
 
 Looped = tuple[Array, Array, Blocks, Whole]
@@ -540,13 +539,16 @@ def _power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
 
 #: How many numbers say where a member stands: those of a ``Pace``.
 PACE_NUMBERS = 20
+#: Places among them; the counts are of accepted, rejected and extra steps.
+TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, COUNTS, WORK = 0, 1, 2, 4, 5, 6, slice(15, 18), 19
 
 
 class Pacing(NamedTuple):
-    """When the state is asked for, ascending, and the most attempts of a member."""
+    """When the state is asked for, ascending, the most attempts of a member, and whether members have yet to begin."""
 
     at: Array
     budget: int
+    begins: bool = False
 
 
 class AdaptiveArrays(NamedTuple):
@@ -555,7 +557,7 @@ class AdaptiveArrays(NamedTuple):
     Attributes:
         v: rows of v, of one number for each member or one for all.
         y: rows of y, likewise.
-        paces: where members stand at the start, shape (numbers of a ``Pace``, members).
+        paces: where members stand at the start, shape (numbers of a ``Pace``, members), or (…, 1) where that is the same for all.
         saved_v: velocities at the asked times, shape (times, *block, *batch); NaN from where a member stopped.
         saved_y: coordinates, likewise.
         last_state: the state where members stand at the end, shape (numbers of v and y, members).
@@ -573,24 +575,52 @@ class AdaptiveArrays(NamedTuple):
     status: Whole
 
 
-def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, absolute: Array | None) -> Pace:
-    """Where members stand at the start. Without ``absolute`` the relative error is one of the longest that a block has been."""
+class Adapted(NamedTuple):
+    """Saved states, and of each member at the end the state, the numbers of its ``Pace`` and the status.
+
+    ``evaluations`` is how many function evaluations an attempt takes.
+    """
+
+    v: Array
+    y: Array
+    last_v: Array
+    last_y: Array
+    paces: Array
+    status: Whole
+    evaluations: int
+
+
+def paces(plan: Plan, first: Array | None, relative: Array, absolute: Array | None) -> Array:
+    """Where members stand before they begin, shape (numbers of a ``Pace``, *batch), or (numbers,) if it is the same for all.
+
+    Without ``absolute`` the relative error is one of the longest that a block has been.
+    """
     from .reference import adaptive  # only such runs need it
 
-    if first is None:
-        first = adaptive.first_step(plan.system.alone(1.0, plan.batch), plan.t0, v, y, plan.block_axes)
-    wide = np.zeros(plan.batch) if absolute is None else absolute
-    first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
-    tolerance = relative, wide, 1.0 if absolute is None else 0.0
-    pace = adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
-    return pace._replace(before=pace.h) if plan.method.has_series else pace
+    given: list[Any] = [0.0 if each is None else each.item() if each.size == 1 else each for each in (first, relative, absolute)]
+    step, *tolerance = given
+    waiting = adaptive.waiting(plan.t0, step, (*tolerance, float(absolute is None)), plan.system.samples)
+    if all(type(each) is float for each in given):
+        return np.array(waiting)
+    numbers = np.empty((PACE_NUMBERS, *plan.batch))
+    for row, number in zip(numbers, waiting, strict=True):
+        row[...] = number
+    return numbers
 
 
-def pace_of(numbers: Array) -> Pace:
-    """Where members stand, from its numbers."""
+def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
+    """Where members stand at the start, by the reference; of them it is known where they stand before."""
     from .reference import adaptive
 
-    return adaptive.Pace(*numbers)
+    system, pace = plan.system.alone(1.0, plan.batch), pace_of(paces, plan.batch)
+    return adaptive.begin(system, pace, v, y, plan.block_axes, series=plan.method.has_series)
+
+
+def pace_of(numbers: Array, batch: Shape) -> Pace:
+    """Where the members of a batch stand, from the numbers of each, or those of all."""
+    from .reference import adaptive
+
+    return adaptive.Pace(*numbers if numbers.shape[1:] == batch else (np.broadcast_to(row, batch) for row in numbers))
 
 
 def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
@@ -625,31 +655,42 @@ def _evaluated_attempt(plan: Plan, budget: int) -> Any:
 
     def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
         out = made([*_rows(plan, v, y), *np.broadcast_arrays(*pace)], None)
-        return (pace_of(out[-len(pace) :]), *_blocks(v, y, out))
+        return (pace_of(out[-len(pace) :], plan.batch), *_blocks(v, y, out))
 
     return attempt
 
 
-def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted:
-    """Go on from where members stand."""
+def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
+    """Go on from where members stand, of whom ``paces`` has the numbers of each or those of all."""
+    if plan.backend == "numpy":
+        return _adapt_by_numpy(plan, pacing, paces, v, y)
+    times, n_v, members = len(pacing.at), prod(plan.system.v_shape), plan.members
+    saved_v, saved_y = np.empty((times, *v.shape)), np.empty((times, *y.shape))
+    last = np.empty((n_v + prod(plan.system.y_shape), members))
+    last_paces, status = np.empty((PACE_NUMBERS, members)), np.empty(plan.batch, dtype=np.int64)
+    before = paces.reshape(PACE_NUMBERS, paces.size // PACE_NUMBERS)
+    rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
+    arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1))
+    spec = model(plan)
+    if not _core.adapt(spec, plan, pacing, arrays):  # an attempt is not one tape: the reference finds the start
+        before = np.array(begun(plan, paces, v, y)).reshape(PACE_NUMBERS, members)
+        _core.adapt(spec, plan, pacing._replace(begins=False), arrays._replace(paces=before))
+    series = plan.method.has_series
+    each = _core.series_evaluations(spec, attempts=True) if series else plan.method.attempt_evaluations
+    last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
+    return Adapted(saved_v, saved_y, last_v, last_y, last_paces.reshape(PACE_NUMBERS, *plan.batch), status, each)
+
+
+def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
+    """The same by the reference."""
     from .reference import adaptive
 
-    if plan.backend == "numpy":
-        if plan.by_tape:
-            return adaptive.run(_evaluated_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
+    pace = begun(plan, paces, v, y) if pacing.begins else pace_of(paces, plan.batch)
+    if plan.by_tape:
+        attempt = _evaluated_attempt(plan, pacing.budget)
+    else:
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
         attempt = attempts(plan.method, system, plan.block_axes, plan.order)
-        return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
-    saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
-    n_v, members = prod(plan.system.v_shape), plan.members
-    last = np.empty((n_v + prod(plan.system.y_shape), members))
-    paces = np.empty((len(pace), *plan.batch))
-    for row, number in enumerate(pace):
-        paces[row] = number
-    paces = paces.reshape(len(pace), members)
-    last_paces, status = np.empty_like(paces), np.empty(members, dtype=np.int64)
-    arrays = AdaptiveArrays(rows(v, plan.batch), rows(y, plan.batch), paces, saved_v, saved_y, last, last_paces, status)
-    _core.adapt(model(plan), plan, pacing, arrays)
-    last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
-    ended = pace_of(last_paces.reshape(len(pace), *plan.batch))
-    return adaptive.Outcome(saved_v, saved_y, last_v, last_y, ended, status.reshape(plan.batch))
+    out = adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
+    each = evaluations(plan.method, plan.system, order=plan.order, paced=True)
+    return Adapted(out.v, out.y, out.last_v, out.last_y, np.array(np.broadcast_arrays(*out.pace)), out.status, each)

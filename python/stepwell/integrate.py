@@ -412,11 +412,12 @@ def _adapt(
     if times.ndim != 1 or len(times) == 0:
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
     carry = None if went is None else _paces_of(how, *went)
-    since = t0 if carry is None else float(carry.target.max(initial=t0))
+    since = t0 if carry is None else float(carry[engine.TARGET].max(initial=t0))
     if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
-    system.check_time(max(abs(t0), abs(float(times[-1]))))
+    last = float(times[-1])
+    system.check_time(max(abs(t0), abs(last)))
     backend = _checks.known("backend", backend, BACKENDS)
     budget = MOST_STEPS if max_steps is None else _checks.count("max_steps", max_steps, 1)
     v = _checks.block("v", v, system.v_shape, system.axes)
@@ -425,18 +426,19 @@ def _adapt(
     if carry is None:
         relative, absolute = _tolerances(tolerance)
         first = None if dt is None else _checks.numbers("dt", dt, positive=True, unit="units of time")
-        shapes = (relative.shape, () if absolute is None else absolute.shape)
-        batches |= {"tolerance": _checks.batch_shape({"relative": shapes[0], "absolute": shapes[1]})}
-        batches |= {} if first is None else {"dt": first.shape}
+        tolerances = {"relative": relative.shape} | ({} if absolute is None else {"absolute": absolute.shape})
+        batches["tolerance"] = _checks.batch_shape(tolerances)
+        if first is not None:
+            batches["dt"] = first.shape
     else:
         if dt is not None:
             raise ArgumentError("dt: the run that goes on has its next step already")
-        batches |= {"carry": carry.t.shape}
+        batches["carry"] = carry.shape[1:]
     if control is not None:
         batches |= {"control": control.batch}
     batch = _checks.batch_shape(batches)
-    if carry is not None and carry.t.shape != batch:
-        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.t.shape}")
+    if carry is not None and carry.shape[1:] != batch:
+        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.shape[1:]}")
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     numbers = prod(system.v_shape) + prod(system.y_shape)
@@ -451,21 +453,21 @@ def _adapt(
     with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
-        pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
-        pace = pace._replace(work=np.zeros(batch))
-        plan = plan._replace(order=order_of_series(how, pace.relative))
-        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
-    accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
+        order = order_of_series(how, relative if carry is None else carry[engine.RELATIVE])
+        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
+        paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
+        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
+    accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
-    again = out.pace.held > 0.0 if how.has_series and not fused else extra_steps
-    evaluations = engine.evaluations(how, system, order=plan.order, paced=True) * (accepted + rejected + again)
+    again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
+    evaluations = out.evaluations * (accepted + rejected + again)
+    stopped = np.count_nonzero(out.status) > 0
     run = Run(
         t=times,
         v=out.v,
         y=out.y,
         status=out.status.astype(np.int8),
-        first_bad_step=np.where(out.status == 0, -1, accepted + 1),
+        first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(batch, -1),
         carry=None,
         system=system,
         method=how,
@@ -474,17 +476,17 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, evaluations),
-        stand=AdaptiveState(
-            out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
-        ),
+        paces=Paces(out.paces[engine.TIME], out.paces[engine.STEP], accepted, rejected, evaluations),
+        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, last), last, how.name),
         fused=fused,
-        work=None if system.control is None else out.pace.work / engine.pushes(system.control, how.attempt_evaluations),
+        work=None if system.control is None else out.paces[engine.WORK] / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
-    _warn_of_stops(run)
-    _warn_of_lost(out.pace)
+    if stopped:
+        _warn_of_stops(run)
+    if np.count_nonzero(out.paces[engine.ABSOLUTE]):
+        _warn_of_lost(engine.pace_of(out.paces, batch))
     return run, None if carry is not None else (v, y)
 
 
@@ -502,6 +504,20 @@ def _has_series(system: System, control: Any) -> None:
         )
 
 
+def _without_work(paces: Array) -> Array:
+    """The same where no control has done anything yet in this run."""
+    paces = paces.copy()
+    paces[engine.WORK] = 0.0
+    return paces
+
+
+def _aimed(paces: Array, target: float) -> Array:
+    """The same with another output time."""
+    paces = paces.copy()
+    paces[engine.TARGET] = target
+    return paces
+
+
 def order_of_series(method: Method, relative: Array) -> int:
     """The order of a series for relative tolerances; 0 of a method that has one order.
 
@@ -512,9 +528,9 @@ def order_of_series(method: Method, relative: Array) -> int:
         return 0
     from .reference import series_pace  # only such runs need it
 
-    least, most = float(relative.min()), float(relative.max())
+    least, most = (relative.item(),) * 2 if relative.size == 1 else (float(relative.min()), float(relative.max()))
     order = series_pace.order_of(least)
-    if series_pace.order_of(most) != order:
+    if most != least and series_pace.order_of(most) != order:
         raise UnsupportedError(
             f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
             f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
@@ -522,8 +538,8 @@ def order_of_series(method: Method, relative: Array) -> int:
     return order
 
 
-def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
-    """Where the members stand of a run with a tolerance that goes on."""
+def _paces_of(method: Method, carry: Any, carried_by: Any) -> Array:
+    """The numbers that say where the members stand of a run with a tolerance that goes on."""
     if carried_by is None:
         raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
     by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
@@ -535,7 +551,7 @@ def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
             f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
             f"axis, got shape {numbers.shape}"
         )
-    return engine.pace_of(numbers)
+    return numbers
 
 
 def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
@@ -563,8 +579,7 @@ WHY_STOPPED = {
 
 
 def _warn_of_stops(run: Run) -> None:
-    if not run.status.any() or run.paces is None:
-        return
+    assert run.paces is not None
     stopped = run.status != 0
     time = float(run.paces.t[stopped].min())
     first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())

@@ -55,7 +55,10 @@ def ours(orbits: Orbits, method: str) -> Solve:
 
 
 def our_equations(orbits: Orbits, fused: bool = False) -> Solve:
-    """The equations that heyoka gets: one body that moves, where ``NBody`` moves both. Each call traces them anew."""
+    """The equations that heyoka gets: one body that moves, where ``NBody`` moves both.
+
+    The system is made once, as heyoka's integrator is: a function that is given in place of it is traced in every call.
+    """
 
     @sw.system
     def kepler(t: Any, v: Any, y: Any) -> Any:
@@ -77,7 +80,7 @@ def our_equations(orbits: Orbits, fused: bool = False) -> Solve:
             ]
         )
 
-    system = {"kepler": kepler, "arenstorf": arenstorf}[orbits.kind]
+    system = {"kepler": kepler, "arenstorf": arenstorf}[orbits.kind]()
     v, y = (block[:, 0] if orbits.members == 1 else block for block in (orbits.v, orbits.y))
 
     def solve(tolerance: float) -> Array:

@@ -40,7 +40,7 @@ class Trajectory:
         self._v = np.empty(0)
         self.times, self.states = [span[0]], [y]
         relative, absolute = (np.asarray(each) for each in tolerance)
-        self.pace: Any = engine.pace(self._plan, self._v, y, None, relative, absolute)
+        self.pace: Any = engine.begun(self._plan, engine.paces(self._plan, None, relative, absolute), self._v, y)
         self.status = adaptive.BUDGET
         self.extra_steps = 0
 

@@ -172,43 +172,37 @@ class Outcome(NamedTuple):
     status: Whole
 
 
-def start(
-    t0: float,
-    first: Array,
-    tolerance: tuple[Array, Array, float],
-    samples: tuple[float, float],
-    v: Array,
-    y: Array,
-    block_axes: tuple[int, int],
-) -> Pace:
-    """The paces of members at the start, with a step to try first.
+def waiting(t0: float, first: Any, tolerance: tuple[Any, Any, float], samples: tuple[float, float]) -> Pace:
+    """The pace of a member that has not begun: ``begin`` finds what depends on its state.
 
-    ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
+    ``first`` is the step to try first, 0 if that is to be chosen; ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a
+    ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
-    t, one, zero = (np.full(first.shape, number) for number in (t0, 1.0, 0.0))
-    relative, absolute, lasts = tolerance
-    interval, until = samples
-    first = np.minimum(first, interval) if t0 < until else first
-    with np.errstate(all="ignore"):
-        longest_v, longest_y = (length2(block, axes) for block, axes in zip((v, y), block_axes, strict=True))
-    counts = relative, absolute, lasts * one, longest_v, longest_y, t, interval * one, until * one, one, MAX_FACTOR * one
-    return Pace(t, first, t, zero, zero, *counts, zero, zero, zero, zero, zero)
+    counts = *tolerance, 0.0, 0.0, t0, *samples, 1.0, MAX_FACTOR
+    return Pace(t0, first, t0, 0.0, 0.0, *counts, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def first_step(s: Scaled, t0: float, v: Array, y: Array, block_axes: tuple[int, int]) -> Array:
-    """The step to try first, for each member: a share of the shortest time in which a block changes by its length.
+def begin(s: Any, pace: Pace, v: Array, y: Array, block_axes: tuple[int, int], *, series: bool = False) -> Pace:
+    """Where members stand at the start, from their time and tolerance; a step to try first that is 0 is chosen here.
 
-    That is |v|/|v̇|, |y|/|ẏ| and, from rest, √(|y|/|v̇|): times that do not depend on the units of v and y.
+    It is a share of the shortest time in which a block changes by its length: |v|/|v̇|, |y|/|ẏ| and, from rest, √(|y|/|v̇|), times
+    that do not depend on the units of v and y. ``s`` is scaled to a step of 1; ``series`` says whether the method is one.
     """
     with np.errstate(all="ignore"):
-        rates: Any = s.dv(t0, v, y), s.dy(t0, v, y)
-        (lv, ly), (rv, ry) = (
-            [np.sqrt(length2(block, axes)) for block, axes in zip(blocks, block_axes, strict=True)] for blocks in ((v, y), rates)
-        )
-        least = np.full(lv.shape, np.inf)
-        for time in (lv / rv, ly / ry, np.sqrt(ly / rv)):
-            least = np.where((time > 0.0) & (time < least), time, least)
-        return np.maximum(np.where(least < np.inf, FIRST * least, BLIND), MOVES * abs(t0))
+        rates = s.dv(pace.t, v, y), s.dy(pace.t, v, y)
+        squares = [length2(block, axes) for blocks in ((v, y), rates) for block, axes in zip(blocks, block_axes, strict=True)]
+        of_v, of_y, rate_v, rate_y = (np.sqrt(square) for square in squares)
+        times = [length / rate for block, length, rate in ((v, of_v, rate_v), (y, of_y, rate_y)) if np.size(block)]
+        if np.size(v) and np.size(y):
+            times.append(np.sqrt(of_y / rate_v))
+        shortest: Any = np.inf
+        for time in times:
+            shortest = where(less(0.0, time) & less(time, shortest), time, shortest)
+        share = where(less(shortest, np.inf), FIRST * shortest, BLIND)
+        chosen = longer(share, MOVES * longer(pace.t, -pace.t))
+        h = where(less(0.0, pace.h), pace.h, chosen)
+        h = where(less(pace.t, pace.until) & less(pace.interval, h), pace.interval, h)
+    return pace._replace(h=h, longest_v=squares[0], longest_y=squares[1], before=h if series else pace.before)
 
 
 def run(

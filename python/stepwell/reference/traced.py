@@ -128,6 +128,15 @@ class Tracer:
             following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following)
 
+    def begin(self, method: Any) -> list[Any]:
+        """The state, and the pace at the start of a run with a tolerance."""
+        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        v, y, more = self.state()
+        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        axes = len(self.system.v_shape), len(self.system.y_shape)
+        system = self.system.reference(1.0, **given)
+        return self.flat(v, y, *adaptive.begin(system, pace, v, y, axes, series=method.has_series))
+
     def record(self, names: Sequence[str]) -> list[Any]:
         """Quantities of a state."""
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()

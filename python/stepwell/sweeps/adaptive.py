@@ -141,7 +141,7 @@ def lost(run: Run) -> int:
     """How many members have an absolute tolerance so large that the motion is lost in it."""
     if run.stand is None:
         return 0
-    return int(np.count_nonzero(lost_in_tolerance(pace_of(run.stand.pace))))
+    return int(np.count_nonzero(lost_in_tolerance(pace_of(run.stand.pace, run.status.shape))))
 
 
 def why(status: int) -> str:
@@ -151,6 +151,6 @@ def why(status: int) -> str:
 
 #: What is told of members that are lost in the absolute tolerance.
 LOST = (
-    f"tolerance: for {{lost}} of {{members}} member(s) the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of "
-    f"the longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
+    f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the longest "
+    f"that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
 )

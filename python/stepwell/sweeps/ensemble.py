@@ -317,7 +317,8 @@ class _Tally:
         if self.bad and self.task.at is not None:
             warnings.warn(
                 f"{self.bad} of {counted(self.members, 'member')} stopped before t = {self.task.at[-1]:g}, "
-                f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: {adaptive.why(self.status)}; status tells which and why",
+                f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: "
+                f"{adaptive.why(self.status)}; status tells which and why",
                 ToleranceWarning,
                 stacklevel=4,
             )
@@ -329,7 +330,9 @@ class _Tally:
                 stacklevel=4,
             )
         if self.lost:
-            warnings.warn(adaptive.LOST.format(lost=self.lost, members=self.members), ToleranceWarning, stacklevel=4)
+            warnings.warn(
+                adaptive.LOST.format(lost=self.lost, members=counted(self.members, "member")), ToleranceWarning, stacklevel=4
+            )
         if self.doubts:
             chunk = min(self.doubts)
             warnings.warn(

@@ -368,8 +368,10 @@ def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
 
     ``own`` is how many axes there are before those of the batch; if None, those that are more than the batch has.
     """
-    if not own and values.shape == batch and (not batch or values.strides[0]) and len(batch) < 2 and values.flags.c_contiguous:
-        return values.reshape(1, values.size)  # what is given most often: one number for each member along one axis, or one alone
+    if not batch:
+        return np.ascontiguousarray(values).reshape(-1, 1)
+    if not own and values.shape == batch and values.strides[0] and len(batch) < 2 and values.flags.c_contiguous:
+        return values.reshape(1, values.size)  # what is given most often of a batch: one number for each member along one axis
     own = max(0, values.ndim - len(batch)) if own is None else own
     counted, over = values.shape[:own], values.shape[own:]
     if all(size == 1 or stride == 0 for size, stride in zip(over, values.strides[own:], strict=True)):

@@ -25,6 +25,13 @@ const LOW: u32 = 5;
 /// an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only rounding.
 const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 
+/// The first step is the fraction FIRST of the time in which the state changes at the start: rather too short than too long, since it
+/// then grows by MAX_FACTOR a step. Where there is no such time it is BLIND, in units of time. It is at least MOVES times the time of the
+/// start, 2¹² roundings.
+const FIRST: f64 = 0.01;
+const BLIND: f64 = 1e-6;
+const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// That part. A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of such a length: so it must
 /// be long beside the roundings of time, and short beside the motion that follows.
 const PUSHED: f64 = 1.0 / 64.0;
@@ -174,6 +181,29 @@ impl<N: Number> Pace<N> {
             error,
             work,
         ]
+    }
+
+    /// Where a member stands at the start. A step to try first that is 0 is chosen here: a share of the shortest time in which a block
+    /// changes by its length. `s` is scaled to a step of 1; `series` says whether the method is one.
+    #[must_use]
+    pub fn begun(self, s: &dyn System<N>, series: bool, v: &Block<N>, y: &Block<N>) -> Self {
+        let zero = N::of(0.0);
+        let rates = [s.dv(self.t, v, y), s.dy(self.t, v, y)];
+        let longest = [length2(v), length2(y)];
+        let (of_v, of_y) = (longest[0].sqrt(), longest[1].sqrt());
+        let [rate_v, rate_y] = [&rates[0], &rates[1]].map(|rate| length2(rate).sqrt());
+        let (has_v, has_y) = (!v.is_empty(), !y.is_empty());
+        let times =
+            [has_v.then(|| of_v / rate_v), has_y.then(|| of_y / rate_y), (has_v && has_y).then(|| (of_y / rate_v).sqrt())];
+        let shortest = times
+            .into_iter()
+            .flatten()
+            .fold(N::of(f64::INFINITY), |least, time| N::choose(zero.below(time) & time.below(least), time, least));
+        let share = N::choose(shortest.below(N::of(f64::INFINITY)), N::of(FIRST) * shortest, N::of(BLIND));
+        let chosen = longer(share, N::of(MOVES) * longer(self.t, -self.t));
+        let h = N::choose(zero.below(self.h), self.h, chosen);
+        let h = N::choose(self.t.below(self.until) & self.interval.below(h), self.interval, h);
+        Pace { h, longest, before: if series { h } else { self.before }, ..self }
     }
 
     /// What comes next.

@@ -69,6 +69,8 @@ pub struct Tapes {
     /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not where
     /// operations are fused, for the attempt may fuse what made the coefficients.
     pub by_terms: Option<Stage>,
+    /// Of attempts: the pace behind the state, as it is at the start: see [`Pace::begun`]. Its operations are never fused.
+    pub begin: Option<Stage>,
     /// Turns velocities into what the method carries.
     pub start: Option<Stage>,
     /// Turns what the method carries into velocities.
@@ -263,6 +265,20 @@ fn pace(shape: Shape) -> Pace<Symbol> {
     Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32))))
 }
 
+/// Traces where a member stands at the start, without control, onto a tape that may hold something already.
+fn trace_begin(tape: Tape, given: &Given, method: &Record) -> Result<(Tape, Vec<Id>), Error> {
+    let kind = kind(given)?;
+    let shape = (kind.shape)(given)?;
+    let series = method.program().series_order() > 0;
+    Ok(record(tape, || {
+        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+        let begun = pace(shape).begun((kind.symbols)(&parameters(given, Symbol::of(1.0))).as_ref(), series, &v, &y);
+        let mut next = ids([&v, &y]);
+        next.extend(begun.numbers().map(|symbol| symbol.0));
+        next
+    }))
+}
+
 /// Steps by a series of that order, and its coefficients.
 fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
@@ -349,7 +365,7 @@ pub fn trace_record(tape: Tape, given: &Given, names: &[String]) -> Result<(Tape
     }))
 }
 
-/// Traces a part of a scene by its name, for comparisons: "step", "attempt", "start" and "finish" with the number of a way to start
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", "begin", "start" and "finish" with the number of a way to start
 /// behind them, or "record" with a quantity behind it.
 pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, Vec<Id>), Error> {
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
@@ -362,6 +378,7 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     match what {
         "step" => trace_step(tape, given, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
         "attempt" if matches!(how, How::Attempts { .. }) => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
+        "begin" => trace_begin(tape, given, method(name)?),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
@@ -532,6 +549,10 @@ impl Scene {
                 }
             }
         }
+        let begin = match &self.how {
+            How::Attempts { name, .. } => Some(cut(&self.given, &trace_begin(Tape::default(), &self.given, method(name)?)?)),
+            _ => None,
+        };
         let mut quantities = None;
         if !self.record.is_empty() {
             quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
@@ -552,7 +573,7 @@ impl Scene {
         });
         let [start, finish, shown] = [start, finish, shown].map(|made| made.map(|made| cut(&self.given, &made)));
         let step = cut(&self.given, &step);
-        Ok(Tapes { step, by_terms, start, finish, shown, record: quantities, written, series_evaluations })
+        Ok(Tapes { step, by_terms, begin, start, finish, shown, record: quantities, written, series_evaluations })
     }
 }
 

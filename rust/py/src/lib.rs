@@ -171,6 +171,7 @@ fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
 struct PacingOf<'py> {
     at: PyReadonlyArray1<'py, f64>,
     budget: i64,
+    begins: bool,
 }
 
 /// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `engine.py`.
@@ -186,9 +187,10 @@ struct AdaptiveArraysOf<'py> {
     status: PyReadwriteArray1<'py, i64>,
 }
 
-/// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing.
+/// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether it did:
+/// see `chosen::run`.
 #[pyfunction]
-fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<()> {
+fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<bool> {
     let rows = model.rows(py)?;
     let tables = model.tables(py)?;
     let plan_of_core = chosen::Plan {
@@ -196,6 +198,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
         at: pacing.at.as_slice()?,
         paces: by_row(&arrays.paces)?,
+        begins: pacing.begins,
         budget: pacing.budget,
         v: by_row(&arrays.v)?,
         y: by_row(&arrays.y)?,
@@ -212,11 +215,11 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
 }
 
 /// Runs without the GIL, reports progress and answers Ctrl-C.
-fn interruptible(
+fn interruptible<T: Send>(
     py: Python<'_>,
     progress: Option<Py<PyAny>>,
-    run: impl FnOnce(&mut dyn FnMut(f64) -> bool) -> Result<(), Error> + Send,
-) -> PyResult<()> {
+    run: impl FnOnce(&mut dyn FnMut(f64) -> bool) -> Result<T, Error> + Send,
+) -> PyResult<T> {
     let mut raised = None;
     let mut monitor = |share: f64| {
         Python::attach(|py| {
@@ -235,7 +238,7 @@ fn interruptible(
         (_, Some(error)) => Err(error),
         (Err(Error::Interrupted), None) => Err(PyKeyboardInterrupt::new_err(())),
         (Err(error), None) => Err(core_error(error)),
-        (Ok(()), None) => Ok(()),
+        (Ok(made), None) => Ok(made),
     }
 }
 

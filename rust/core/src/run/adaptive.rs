@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     aligned::Aligned,
-    stage::{Clock, PreparedStage},
+    stage::{Clock, PreparedStage, Stage},
     workers::Stop,
 };
 use crate::{
@@ -35,6 +35,14 @@ pub trait AdaptiveBatch: Send {
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
+    /// Whether it knows where a member stands at the start, so that [`AdaptiveBatch::begin`] can be asked.
+    fn begins(&self) -> bool {
+        false
+    }
+
+    /// Brings the step-size control of a lane to what it is at the start of that member.
+    fn begin(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+
     /// So many attempts of every lane that runs.
     fn attempt(&mut self, attempts: usize);
 
@@ -63,16 +71,40 @@ pub struct AdaptiveLanes {
     step: PreparedStage,
     /// Rows of v, of y, of the paces and, of a series, of its coefficients.
     state: Aligned,
-    by_terms: Option<ByTerms>,
+    /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the start.
+    by_terms: Option<OneLane>,
+    begin: Option<OneLane>,
+    level: Level,
+    budget: f64,
 }
 
-/// What makes an attempt of one lane by coefficients that are known.
-struct ByTerms {
+/// A stage that is run for one lane alone.
+struct OneLane {
     step: PreparedStage,
     /// The member whose parameters it has.
     member: Option<usize>,
     /// The numbers of the lane.
     numbers: Aligned,
+}
+
+impl OneLane {
+    fn new(stage: &Stage, spec: &Spec, level: Level, budget: f64) -> OneLane {
+        let numbers = Aligned::new(stage.split.body.next.len());
+        OneLane { step: PreparedStage::new(stage, spec, level, 1, &NO_CLOCK, budget), member: None, numbers }
+    }
+
+    /// Runs it with a member's parameters, and the numbers of a lane from rows of so many lanes.
+    fn run(&mut self, stage: &Stage, spec: &Spec, member: usize, rows: &[f64], (lane, lanes): (usize, usize)) -> &[f64] {
+        if self.member != Some(member) {
+            self.step.prepare_lane(stage, spec, 0, member);
+            self.member = Some(member);
+        }
+        for (number, row) in self.numbers.iter_mut().zip(rows.chunks_exact(lanes)) {
+            *number = row[lane];
+        }
+        self.step.advance(stage, &NO_CLOCK, 0, 1, &mut self.numbers);
+        &self.numbers
+    }
 }
 
 /// Every lane has its own time, so no step has one.
@@ -85,13 +117,8 @@ impl AdaptiveLanes {
         let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
         let numbers = traced.shape.v + traced.shape.y;
         let all = tapes.step.split.body.next.len();
-        let by_terms = tapes.by_terms.as_ref().map(|stage| ByTerms {
-            step: PreparedStage::new(stage, spec, level, 1, &NO_CLOCK, budget),
-            member: None,
-            numbers: Aligned::new(all),
-        });
         let state = Aligned::new(all * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, by_terms, tapes })
+        Ok(AdaptiveLanes { state, step, numbers, by_terms: None, begin: None, level, budget, tapes })
     }
 }
 
@@ -128,12 +155,26 @@ impl AdaptiveBatch for AdaptiveLanes {
         }
     }
 
+    fn begins(&self) -> bool {
+        self.tapes.begin.is_some()
+    }
+
+    fn begin(&mut self, spec: &Spec, lane: usize, member: usize) {
+        let Some(stage) = &self.tapes.begin else { return };
+        let lanes = self.step.lanes();
+        let one = self.begin.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let begun = one.run(stage, spec, member, &self.state, (lane, lanes));
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(begun) {
+            row[lane] = *number;
+        }
+    }
+
     fn attempt(&mut self, attempts: usize) {
         self.step.advance(&self.tapes.step, &NO_CLOCK, 0, attempts, &mut self.state);
     }
 
     fn has_terms(&self) -> bool {
-        self.by_terms.is_some()
+        self.tapes.by_terms.is_some()
     }
 
     fn find_running(&self, budget: f64, runs: &mut [bool]) {
@@ -142,18 +183,11 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let (Some(stage), Some(by_terms)) = (&self.tapes.by_terms, &mut self.by_terms) else { return };
-        let ByTerms { step, member: known, numbers } = by_terms;
-        if *known != Some(member) {
-            step.prepare_lane(stage, spec, 0, member);
-            *known = Some(member);
-        }
+        let Some(stage) = &self.tapes.by_terms else { return };
         let lanes = self.step.lanes();
-        for (number, row) in numbers.iter_mut().zip(self.state.chunks_exact(lanes)) {
-            *number = row[lane];
-        }
-        step.advance(stage, &NO_CLOCK, 0, 1, numbers);
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(numbers.iter()).take(self.numbers + Pace::<f64>::NUMBERS) {
+        let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
+        let made = one.run(stage, spec, member, &self.state, (lane, lanes));
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS) {
             row[lane] = *number;
         }
     }

@@ -22,6 +22,8 @@ pub struct Plan<'a> {
     pub at: &'a [f64],
     /// The members' paces at the start, by rows, in the order of [`Pace::numbers`].
     pub paces: Vec<Row<'a>>,
+    /// Whether the steps to try first and the lengths of the blocks are still to be found: see [`Pace::begun`].
+    pub begins: bool,
     /// The most attempts of a member.
     pub budget: i64,
     /// Velocities at the start, by rows.
@@ -79,8 +81,9 @@ struct Part<'a> {
     status: Columns<'a, i64>,
 }
 
-/// Makes the run. The monitor is as that of [`crate::batch::run`].
-pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
+/// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one tape.
+/// The monitor is as that of [`crate::batch::run`].
+pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<bool, Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
     let (p, q) = (traced.shape.v, traced.shape.y);
@@ -102,6 +105,9 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let stop = Stop::default();
     let worker = || Worker::new(plan, &traced, &stop);
     let mine = worker()?;
+    if plan.begins && !mine.group.begins() {
+        return Ok(false);
+    }
     let lanes = mine.group.lanes();
     let threads = plan.machine.threads_for(b.div_ceil(lanes), lanes == 1 || b >= MIN_MEMBERS_FOR_THREADS);
     plan.model.room(traced.shape, threads)?;
@@ -121,7 +127,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
         first += count;
     }
     let workers = Workers { threads, background: traced.is_long(lanes), total: b as f64, stop: Stop::clone(&stop) };
-    workers::share(parts, &workers, monitor, mine, worker, Worker::part)
+    workers::share(parts, &workers, monitor, mine, worker, Worker::part)?;
+    Ok(true)
 }
 
 /// Which member of the part a lane steps, and which of the saved times is next.
@@ -152,11 +159,13 @@ impl<'a> Worker<'a> {
         let mut waiting = 0..part.count;
         let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
         for (lane, assigned) in assignments.iter_mut().enumerate() {
-            // A lane without a member still needs parameters that are numbers; its pace never runs.
-            self.assign_member(&part, lane, part.count - 1);
-            let pace = self.group.pace(lane);
-            self.group.set_pace(lane, pace.idle());
-            *assigned = waiting.next().map(|member| self.assign_member(&part, lane, member));
+            *assigned = waiting.next().map(|member| self.begin_member(&part, lane, member));
+            if assigned.is_none() {
+                // A lane without a member still needs parameters that are numbers; its pace never runs.
+                self.assign_member(&part, lane, part.count - 1);
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, pace.idle());
+            }
         }
         // Of a series: which lanes have a step to try, and how many calls were made.
         let (mut runs, mut calls) = (vec![false; assignments.len()], 0);
@@ -206,6 +215,15 @@ impl<'a> Worker<'a> {
         let Pace { t, h, target, held, .. } = self.group.pace(0);
         let left = if held > 0.0 { 0.0 } else { (target - t) / (2.0 * h) };
         (left as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
+    }
+
+    /// Puts a member into a lane, which steps it from now on.
+    fn begin_member(&mut self, part: &Part, lane: usize, member: usize) -> Assignment {
+        let assigned = self.assign_member(part, lane, member);
+        if self.plan.begins {
+            self.group.begin(&self.plan.model.spec, lane, part.first + member);
+        }
+        assigned
     }
 
     /// Puts a member into a lane, at its start.
@@ -273,7 +291,7 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, pace.idle()); // nothing runs in an empty lane
                 return Ok(None);
             };
-            assigned = self.assign_member(part, lane, member);
+            assigned = self.begin_member(part, lane, member);
         }
     }
 
