@@ -151,7 +151,10 @@ def several(argument: str, value: Any, what: str) -> list[Any]:
     """Return a list of what is given several of; a text is not the list of its letters."""
     if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
         raise DTypeError(f"{argument}: expected a list of {what}, got {short(value)} ({type(value).__name__})")
-    return list(value)
+    try:
+        return list(value)
+    except NotImplementedError:  # a memoryview of several axes is iterable, and does not iterate
+        raise DTypeError(f"{argument}: expected a list of {what}, got a {type(value).__name__} of several axes") from None
 
 
 def callback(argument: str, value: Any) -> Any:

@@ -15,8 +15,8 @@ from uuid import uuid4
 def replaced(place: Path) -> Iterator[TextIO]:
     """A text file that takes its place when all is written; if that fails, as on a full disk, the old one is as it was.
 
-    The lines end as they are written. A pipe, a terminal or /dev/null is written to directly, and so is a file in a folder that takes no
-    other.
+    The lines end as they are written. A pipe, a terminal or /dev/null is written to directly, and so is a file in a folder that
+    takes no other.
     """
     target = place.resolve() if place.is_symlink() else place
     if place.exists() and not (place.is_file() and os.access(target.parent, os.W_OK)):

@@ -36,6 +36,14 @@ def same(what: str, one: Any, other: Any) -> None:
         raise WrongBitsError(f"{what}: {np.asarray(one).ravel()[:4]} and {np.asarray(other).ravel()[:4]}")
 
 
+def whole(value: Any) -> int:
+    """A whole number of anything, for what is no argument of the package."""
+    try:
+        return int(value)
+    except (TypeError, ValueError, OverflowError):
+        return len(str(type(value)))
+
+
 def world_stepped(steps: Any = 3, again: Any = 2, force: Any = None, **given: Any) -> sw.World:
     """A world that makes some steps, which are those of a run."""
     for name in ("v", "y"):
@@ -46,7 +54,7 @@ def world_stepped(steps: Any = 3, again: Any = 2, force: Any = None, **given: An
     world.step(steps)
     if again is not None:
         world.step(again)
-    made = int(steps) + int(again or 0)
+    made = whole(steps) + whole(0 if again is None else again)
     if 0 < made < 100 and set(begun) == {"v", "y"} and np.isfinite(world.v).all() and np.isfinite(world.y).all():
         options = {name: each for name, each in given.items() if name not in ("v", "y")}
         run = sw.integrate(**options, **begun, force=force, steps=made)
@@ -60,21 +68,28 @@ def in_pieces(system: Any, method: Any, first: Any = 3, second: Any = 4, **optio
     half = sw.integrate(system, method, steps=first, **options)
     going_on = {name: options[name] for name in ("form", "backend", "threads") if name in options}
     rest = sw.integrate(half.system.uncontrolled, half.method, steps=second, **half.resume, **going_on)
-    whole = sw.integrate(system, method, steps=int(first) + int(second), **options)
-    if rest.start_step + rest.steps == whole.start_step + whole.steps:
-        same("v in pieces and at once", rest.v[-1], whole.v[-1])
-        same("y in pieces and at once", rest.y[-1], whole.y[-1])
+    entire = sw.integrate(system, method, steps=whole(first) + whole(second), **options)
+    if rest.start_step + rest.steps == entire.start_step + entire.steps:
+        same("v in pieces and at once", rest.v[-1], entire.v[-1])
+        same("y in pieces and at once", rest.y[-1], entire.y[-1])
     return rest
 
 
 def right_run(
-    system: Any = 0, method: Any = 0, members: Any = 3, seed: Any = 0, dt: Any = 0.1, steps: Any = 5, every: Any = None, **more: Any
+    system: Any = 0,
+    method: Any = 0,
+    members: Any = 3,
+    seed: Any = 0,
+    dt: Any = 0.1,
+    steps: Any = 5,
+    every: Any = None,
+    **more: Any,
 ) -> sw.Run:
     """A right run of a system and a method that are named by numbers, which has the bits of the reference."""
-    name = list(SYSTEMS)[int(system) % len(SYSTEMS)]
-    rng = np.random.default_rng(int(seed) % 2**32)
-    members = int(members) % 20 + 1
-    made, record = SYSTEMS[name](rng, members), sw.method(METHODS[int(method) % len(METHODS)])
+    name = list(SYSTEMS)[whole(system) % len(SYSTEMS)]
+    rng = np.random.default_rng(whole(seed) % 2**32)
+    members = whole(members) % 20 + 1
+    made, record = SYSTEMS[name](rng, members), sw.method(METHODS[whole(method) % len(METHODS)])
     if not fits(made, record):
         record = sw.method("rk4")
     state = {block: rng.normal(size=(*shape, members)) for block, shape in (("v", made.v_shape), ("y", made.y_shape))}
@@ -88,9 +103,9 @@ def right_run(
 
 def right_adaptive_run(system: Any = 0, method: Any = 0, seed: Any = 0, tolerance: Any = 1e-3, until: Any = 0.5) -> sw.Run:
     """The same with adaptive steps."""
-    name = ADAPTIVE[int(system) % len(ADAPTIVE)]
-    rng = np.random.default_rng(int(seed) % 2**32)
-    made, record = SYSTEMS[name](rng, 2), sw.method(("merson", "fehlberg", "fehlberg_5", "dop853")[int(method) % 4])
+    name = ADAPTIVE[whole(system) % len(ADAPTIVE)]
+    rng = np.random.default_rng(whole(seed) % 2**32)
+    made, record = SYSTEMS[name](rng, 2), sw.method(("merson", "fehlberg", "fehlberg_5", "dop853")[whole(method) % 4])
     state = {block: rng.normal(size=(*shape, 2)) for block, shape in (("v", made.v_shape), ("y", made.y_shape))}
     options = {"tolerance": tolerance, "at": [0.1, until], "max_steps": 60}
     run = sw.integrate(made, record, **state, **options)
@@ -109,9 +124,9 @@ NUMBERS = itertools.count()
 def load_damaged(at: Any = 0, by: Any = 1, length: Any = -1) -> Any:
     """A file of a run in which a byte was changed, or the end is missing: refused, or the run that it was."""
     data = bytearray(WHOLE)
-    data[int(at) % len(data)] ^= int(by) % 256
+    data[whole(at) % len(data)] ^= whole(by) % 256
     path = FOLDER / f"damaged{next(NUMBERS)}.npz"
-    path.write_bytes(data[: int(length) % (len(data) + 1)] if int(length) >= 0 else data)
+    path.write_bytes(data[: whole(length) % (len(data) + 1)] if whole(length) >= 0 else data)
     try:
         return sw.load(path)
     finally:
@@ -135,7 +150,7 @@ def command(*_: Any, **words: Any) -> str:
 def own_step(kind: Any = 0, steps: Any = 3, y: Any = 1.0, dt: Any = 0.1, **parameters: Any) -> sw.Run:
     """Own equations with strange parameters."""
     several = (own.duffing, own.pendulum, own.bouncing, own.pushed)
-    made = several[int(kind) % len(several)](**parameters)
+    made = several[whole(kind) % len(several)](**parameters)
     run = sw.integrate(made, "rk4", v=0.0, y=y, dt=dt, steps=steps)
     reference = sw.integrate(made, "rk4", v=0.0, y=y, dt=dt, steps=steps, backend="numpy")
     same("v of the core and the reference", run.v, reference.v)
@@ -148,9 +163,18 @@ BODIES: dict[str, Any] = {"system": sw.NBody([1.0, 2.0], softening=0.3), "method
 BODIES |= {"v": np.zeros((2, 2)), "y": np.array([[0.0, 1.0], [1.0, 0.0]])}
 
 MORE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "World stepped": (world_stepped, FREE | {"steps": 3, "again": 2, "t0": 0.0, "start_step": 0, "control": None, "force": None, "fused": False}),
-    "World of bodies stepped": (world_stepped, BODIES | {"steps": 3, "again": 2, "start": "first_order", "carry": None, "carried_by": None}),
-    "in pieces": (in_pieces, FREE | {"first": 3, "second": 4, "every": 2, "t0": 0.0, "form": "direct", "fused": False, "force": 0.1}),
+    "World stepped": (
+        world_stepped,
+        FREE | {"steps": 3, "again": 2, "t0": 0.0, "start_step": 0, "control": None, "force": None, "fused": False},
+    ),
+    "World of bodies stepped": (
+        world_stepped,
+        BODIES | {"steps": 3, "again": 2, "start": "first_order", "carry": None, "carried_by": None},
+    ),
+    "in pieces": (
+        in_pieces,
+        FREE | {"first": 3, "second": 4, "every": 2, "t0": 0.0, "form": "direct", "fused": False, "force": 0.1},
+    ),
     "in pieces by Verlet": (in_pieces, BODIES | {"first": 3, "second": 4, "every": 1, "start": "second_order", "threads": 2}),
     "right run": (right_run, {"system": 0, "method": 0, "members": 3, "seed": 0, "dt": 0.1, "steps": 5, "every": None}),
     "right run at once": (right_run, {"system": 3, "method": 4, "members": 3, "seed": 0, "fused": True, "every": 1, "steps": 70}),
@@ -164,7 +188,10 @@ MORE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "own pendulum": (own_step, {"kind": 1, "steps": 3, "y": 1.0, "dt": 0.1, "omega": 1.0}),
     "own choice": (own_step, {"kind": 2, "steps": 3, "y": 1.0, "dt": 0.1, "stiffness": 100.0, "gravity": 1.0}),
     "own push": (own_step, {"kind": 3, "steps": 3, "y": 1.0, "dt": 0.1, "k": 1.0, "x": 0.0}),
-    "events of two": (sw.integrate, FREE | {"steps": 30, "events": [passage, sw.Event(passage, direction=-1, name="down")], "every": 7}),
+    "events of two": (
+        sw.integrate,
+        FREE | {"steps": 30, "events": [passage, sw.Event(passage, direction=-1, name="down")], "every": 7},
+    ),
     "criteria of one": (sw.criteria, OF_METHODS | {"phi": 0.1}),
 }
 
@@ -173,9 +200,57 @@ EVERY = {name: each for name, each in (CALLS | MORE).items() if not name.startsw
 
 #: Arguments by which one asks for work: what takes long with them does what it was asked for.
 WORK = frozenset(
-    {"steps", "first", "second", "again", "n", "every", "transient", "observe", "at", "tolerance", "dt", "max_steps", "until", "size"}
+    {
+        "steps",
+        "first",
+        "second",
+        "again",
+        "n",
+        "every",
+        "transient",
+        "observe",
+        "at",
+        "tolerance",
+        "dt",
+        "max_steps",
+        "until",
+        "size",
+    }
     | {"t_span", "t_eval", "max_step", "first_step", "rtol", "atol", "y0", "phi", "periods", "horizon", "evaluations", "gains"}
     | {"planks", "modes", "methods", "scenes", "scene", "tolerances", "settings", "exponents", "axes", "masses", "members"}
-    | {"system", "method", "v", "y", "fun", "events", "a", "b", "c", "d", "e", "f", "g", "relative", "t0", "near", "chunk", "threads"}
-    | {"frame", "amplitude", "e", "share", "budget", "cost", "transient", "args", "most", "spin", "start_step", "dt_before", "backend"}
+    | {
+        "system",
+        "method",
+        "v",
+        "y",
+        "fun",
+        "events",
+        "a",
+        "b",
+        "c",
+        "d",
+        "e",
+        "f",
+        "g",
+        "relative",
+        "t0",
+        "near",
+        "chunk",
+        "threads",
+    }
+    | {
+        "frame",
+        "amplitude",
+        "e",
+        "share",
+        "budget",
+        "cost",
+        "transient",
+        "args",
+        "most",
+        "spin",
+        "start_step",
+        "dt_before",
+        "backend",
+    }
 )

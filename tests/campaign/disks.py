@@ -1,7 +1,7 @@
 """Disks that are full, that cannot be written, or that are taken away while something is saved.
 
-Each way to write a file is tried with every limit of its size from nothing to enough. What is there before stays as it was, nothing is left
-beside it, and the error says what is wrong.
+Each way to write a file is tried with several limits of its size, from nothing to enough. What is there before stays as it was,
+nothing is left beside it, and the error says what is wrong.
 """
 
 from __future__ import annotations

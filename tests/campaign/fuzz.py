@@ -1,8 +1,9 @@
-"""Fuzzed calls of the Python interface, for as long as is wanted: ``python -m campaign.fuzz --seconds 600``, in the folder of tests.
+"""Fuzzed calls of the Python interface: ``python -m campaign.fuzz --seconds 600``, in the folder of tests.
 
-Hypothesis draws a call of ``calls.EVERY`` and some strange values; each value is then given to every argument, and pairs of them to pairs
-of arguments: hundreds of calls by one example. The calls are made in a process of their own, so that a crash is seen and is reported with
-the call that made it. What is found goes to a file, from where it may go to ``corpus.json``, which test_campaign.py tries in every run.
+Hypothesis draws a call of ``calls.EVERY`` and some strange values; each value is then given to every argument, and pairs of them
+to pairs of arguments: hundreds of calls by one example. The calls are made in a process of their own, so that a crash is seen and
+is reported with the call that made it. What is found goes to a file, from where it may go to ``corpus.json``, which
+test_campaign.py tries in every run.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ from . import calls, oracle
 from .recipes import Recipe, build, recipes, shown
 
 #: So many values of an example, and pairs of strange arguments.
-VALUES, PAIRS = 12, 150
+VALUES, PAIRS = 12, 1500
 
 #: The most calls of an example, and the seconds of the CPU that it may take.
-CALLS_OF_EXAMPLE, SECONDS_OF_EXAMPLE = 500, 0.05
+CALLS_OF_EXAMPLE, SECONDS_OF_EXAMPLE = 2000, 0.05
 
 #: Of calls that ask for work, one in so many may take a second.
 PATIENCE = 100
@@ -97,7 +98,14 @@ class Tally:
     def told(self) -> dict[str, Any]:
         """For a file."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return {"kinds": self.kinds, "names": self.names, "found": self.found, "peak_kilobytes": peak, "kilobytes": resident()}
+        return {
+            "kinds": self.kinds,
+            "names": self.names,
+            "found": self.found,
+            "peak_kilobytes": peak,
+            "kilobytes": resident(),
+            "cpu": time.process_time(),
+        }
 
 
 def resident() -> int:
@@ -155,8 +163,11 @@ def _write(path: Path, tally: Tally) -> None:
     beside.replace(path)
 
 
-#: A process of calls ends after so many seconds, so that its memory and its caches begin anew; without a word for so long, it hangs.
-SHIFT, SILENCE = 240.0, 60.0
+#: A process of calls ends after so many seconds, so that its memory and its caches begin anew.
+SHIFT = 240.0
+
+#: An example that takes so many seconds of the CPU hangs, and so does a process that has begun no other for so many seconds.
+HANGS, SILENCE = 20.0, 900.0
 
 
 def campaign(seconds: float, number: int, report: Path) -> dict[str, Any]:
@@ -174,6 +185,7 @@ def campaign(seconds: float, number: int, report: Path) -> dict[str, Any]:
                 for key, each in part["found"].items():
                     known = total["found"].setdefault(key, each | {"times": 0})
                     known["times"] += each["times"]
+                total["cpu_seconds"] = total.get("cpu_seconds", 0.0) + part["cpu"]
                 total["peak_kilobytes"] = max(total["peak_kilobytes"], part["peak_kilobytes"])
             if ended:
                 example = json.loads((folder / "now.json").read_text()) if (folder / "now.json").exists() else None
@@ -181,7 +193,10 @@ def campaign(seconds: float, number: int, report: Path) -> dict[str, Any]:
         number += 1
         total["calls"], total["seconds"] = sum(total["kinds"].values()), time.monotonic() - begin
         report.write_text(json.dumps(total, indent=1))
-        print(f"{total['calls']:,} calls in {total['seconds']:.0f} s, {len(total['found'])} found: {dict(total['kinds'])}", flush=True)
+        print(
+            f"{total['calls']:,} calls in {total['seconds']:.0f} s, {len(total['found'])} found: {dict(total['kinds'])}",
+            flush=True,
+        )
     return total
 
 
@@ -190,19 +205,29 @@ def _shift(seconds: float, number: int, folder: Path) -> str:
     here = Path(__file__).parent.parent
     words = [sys.executable, "-X", "faulthandler", "-m", "campaign.fuzz", "--shift", str(folder), "--seed", str(number)]
     process = subprocess.Popen([*words, "--seconds", str(seconds)], cwd=here, stderr=subprocess.PIPE, text=True)
-    until = time.monotonic() + seconds + SILENCE
-    while time.monotonic() < until:
+    example, used = -1.0, 0.0
+    while True:
         try:
             _, wrong = process.communicate(timeout=5.0)
         except subprocess.TimeoutExpired:
             now = folder / "now.json"
-            if now.exists() and time.time() - now.stat().st_mtime > SILENCE:
+            begun = now.stat().st_mtime if now.exists() else 0.0
+            if begun != example:
+                example, used = begun, _seconds_used(process.pid)
+            # On a busy machine a second of the CPU may take minutes.
+            if _seconds_used(process.pid) - used > HANGS or time.time() - example > SILENCE:
                 break
             continue
         return "" if process.returncode == 0 else f"ended with {process.returncode}: {wrong[-2000:]}"
     process.kill()
     process.communicate()
     return "hung"
+
+
+def _seconds_used(process: int) -> float:
+    """Of the CPU, by another process."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _culprit(example: Any) -> Any:

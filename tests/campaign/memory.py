@@ -1,7 +1,7 @@
 """Memory over many runs: ``python -m campaign.memory --runs 100000``, in the folder of tests.
 
-Each kind of run is made so many times in a process of its own. After a tenth of them everything that is kept once (imports, tapes,
-kernels, the allocator's own room) is there; what the process has at the end beyond that is a leak.
+Each kind of run is made so many times in a process of its own. After a tenth of them everything that is kept once (imports,
+tapes, kernels, the allocator's own room) is there; what the process has at the end beyond that is a leak.
 """
 
 from __future__ import annotations

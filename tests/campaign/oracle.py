@@ -1,7 +1,7 @@
 """What a fuzzed call may do: end in one of stepwell's own errors that names an argument, or return what is whole.
 
-Everything else is a failure: whatever NumPy, Python or the core raise by themselves, a panic, a result that is not finite where it says
-that it is, bits that differ from those of the reference, a call that cannot be interrupted.
+Everything else is a failure: whatever NumPy, Python or the core raise by themselves, a panic, a result that is not finite where
+it says that it is, bits that differ from those of the reference, a call that cannot be interrupted.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def judged(timer: Timer, call: Callable[..., Any], given: dict[str, Any], names:
 
 
 #: Words beside the arguments' names by which a message says what it is about.
-OTHERS = ("method", "scene", "peers", "not installed", "path", "carry")
+OTHERS = ("method", "scene", "peers", "not installed", "path", "carry", "n: ", "steps: ", "at: ", "omega")
 
 
 def _refusal(text: str, names: list[str]) -> Outcome:

@@ -64,7 +64,7 @@ def forked(act: Callable[[], Any]) -> int:
     if child == 0:
         code = 1
         try:
-            code = 0 if act() else 3
+            code = 3 if act() is False else 0
         finally:
             os._exit(code)
     until = time.monotonic() + HANGS
@@ -107,6 +107,30 @@ def busy_forks(times: int) -> int:
         over.set()
         for worker in workers:
             worker.join()
+    if any(codes):
+        raise AssertionError(f"children of forks ended with {codes}; −1 is one that hung")
+    return times
+
+
+def forks_amid_compiling(times: int) -> int:
+    """Forks while another thread traces and compiles the system that the child steps next: it does not wait for that thread."""
+    codes = []
+    for k in range(times):
+
+        @sw.system
+        def rates(t: Any, v: Any, y: Any, number: Any = float(k)) -> Any:
+            for i in range(60):
+                y = y * np.sin(number + y / (1.0 + i))
+            return -y
+
+        def run(of: Any = rates) -> Any:
+            return sw.integrate(of, "rk4", v=0.0, y=[0.1, 0.2], dt=1e-9, steps=500)
+
+        other = threading.Thread(target=run)
+        other.start()
+        time.sleep(0.0007 * (k % 30))
+        codes.append(forked(run))
+        other.join()
     if any(codes):
         raise AssertionError(f"children of forks ended with {codes}; −1 is one that hung")
     return times
@@ -157,6 +181,7 @@ def main() -> None:
     print(f"spawned: {pool('spawn', 8)} tasks, every bit as here", flush=True)
     print(f"forked after threads: {pool('fork', args.times)} tasks, every bit as here", flush=True)
     print(f"forked while threads trace and step: {busy_forks(args.times)} children", flush=True)
+    print(f"forked while the same system is compiled: {forks_amid_compiling(args.times)} children", flush=True)
     for ending in (".npz", ".zarr"):
         print(f"killed while saving {ending}: {killed_writers(args.times, ending)} times", flush=True)
 

@@ -177,7 +177,9 @@ def arrays() -> st.SearchStrategy[Recipe]:
 
 def changes() -> st.SearchStrategy[Recipe]:
     """What is done to a right value: most wrong values are nearly right ones."""
-    plain = [name for name in CHANGES if name not in ("of type", "laid out", "with a number", "times", "batch axis", "first axis")]
+    plain = [
+        name for name in CHANGES if name not in ("of type", "laid out", "with a number", "times", "batch axis", "first axis")
+    ]
     return st.one_of(
         st.sampled_from(plain).map(lambda name: ["changed", name]),
         st.sampled_from(DTYPES).map(lambda dtype: ["changed", "of type", dtype]),
@@ -212,4 +214,3 @@ def shown(value: Any) -> str:
     except Exception as error:
         text = f"<{type(value).__name__} without a text: {error}>"
     return text if len(text) < 200 else text[:197] + "…"
-

@@ -1,7 +1,7 @@
 """Threads that share what users share: ``python -m campaign.threads --seconds 60``, in the folder of tests.
 
-With the GIL, and with a Python that has none. Every number is compared with that of one thread alone; what may be refused is refused by
-stepwell's own error, and what is refused was not done.
+With the GIL, and with a Python that has none. Every number is compared with that of one thread alone; what may be refused is
+refused by stepwell's own error, and what is refused was not done.
 """
 
 from __future__ import annotations
@@ -203,7 +203,9 @@ def main() -> None:
     args = parser.parse_args()
     warnings.simplefilter("ignore")
     gil = getattr(sys, "_is_gil_enabled", lambda: True)()
-    print(f"Python {sys.version.split()[0]}, built without GIL: {bool(sysconfig.get_config_var('Py_GIL_DISABLED'))}, GIL now: {gil}")
+    print(
+        f"Python {sys.version.split()[0]}, built without GIL: {bool(sysconfig.get_config_var('Py_GIL_DISABLED'))}, GIL now: {gil}"
+    )
     sys.setswitchinterval(1e-5)  # with the GIL: let others run as often as can be
     until, counts, turn = time.monotonic() + args.seconds, dict.fromkeys(CHECKS, 0), 0
     while time.monotonic() < until or turn == 0:

@@ -401,6 +401,12 @@ fn in_parts(
     model.model(how, &rows, &tables)?.in_parts(Machine { level, threads: 1 }, members, attempts).map_err(core_error)
 }
 
+/// Begins with new caches: see `stepwell_core::trace::forget`.
+#[pyfunction]
+fn forget() {
+    stepwell_core::trace::forget();
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -417,6 +423,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
+    m.add_function(wrap_pyfunction!(forget, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;
