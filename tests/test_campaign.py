@@ -82,7 +82,13 @@ def test_the_oracle_notices_what_it_is_to_notice() -> None:
         while True:
             pass
 
+    @settings(max_examples=1, deadline=None, database=None)
+    @given(st.just(endless))
+    def in_hypothesis(call: Any) -> None:
+        assert oracle.judged(watch, call, {"x": 1}, ["x"], 0.05).kind == "stopped"
+
     with oracle.Timer() as watch:
+        in_hypothesis()
         for call in (raw, nameless, not_finite, other_bits):
             assert oracle.judged(watch, call, {"x": 1}, ["argument"], 1.0).kind == "failed", call.__name__
         assert oracle.judged(watch, endless, {"x": 1}, ["x"], 0.05).kind == "stopped"
@@ -102,7 +108,9 @@ def test_a_call_that_ends_its_process_is_named(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
     monkeypatch.setattr(fuzz.subprocess, "run", lambda words, **of: run([words[0], str(crash), *words[3:]], **of))
     example = ("Sinusoid", [["float", (1.0).hex()], ["float", (7.0).hex()]], 1)
-    assert fuzz._culprit(example) == ["Sinusoid", {"omega": ["float", (7.0).hex()]}]
+    name, changed = fuzz._culprit(example)
+    assert name == "Sinusoid"
+    assert changed["omega"] == ["float", (7.0).hex()]
 
 
 # ---- memory
@@ -112,17 +120,17 @@ def test_a_call_that_ends_its_process_is_named(tmp_path: Path, monkeypatch: pyte
 @pytest.mark.parametrize("kind", ["one member", "adaptive", "worlds", "new systems", "refused"])
 def test_memory_is_steady(kind: str) -> None:
     count, before, after = memory.aside(kind, 3000)
-    assert not memory.wrong(before, after), f"after {count} runs"
+    assert not memory.wrong(kind, before, after), f"after {count} runs"
 
 
 @LINUX
 def test_a_leak_is_noticed() -> None:
-    """A kilobyte a run, and a file that stays open."""
+    """Eight kilobytes a run, and a file that stays open."""
     kept: list[Any] = []
-    _, before, after = memory.runs("", 3000, lambda _: kept.append(b"x" * 1024))
-    assert "kB" in memory.wrong(before, after)
+    _, before, after = memory.runs("", 3000, lambda _: kept.append(bytearray(8192)))
+    assert "kB" in memory.wrong("", before, after)
     _, before, after = memory.runs("", 20, lambda _: kept.append(open("/dev/null")))  # noqa: SIM115
-    assert "files" in memory.wrong(before, after)
+    assert "files" in memory.wrong("", before, after)
     for each in kept:
         if hasattr(each, "close"):
             each.close()
@@ -197,8 +205,8 @@ def test_a_sweep_goes_on_when_there_is_room_again(way: str, tmp_path: Path) -> N
     xarray = pytest.importorskip("xarray")
     name, write = disks.SWEEPS[way]
     write(tmp_path / f"whole-{name}", 1.0)
-    for limit in (0, 300, 2000):
-        disks.aside(way, tmp_path, limit)
+    for limit in (0, 300):  # more is enough for the Zarr store; HDF5 itself may crash where a file cannot grow
+        assert disks.aside(way, tmp_path, limit), f"{limit} bytes"
     assert disks.aside(way, tmp_path, 10**9) == ""
     of = {"engine": "zarr", "consolidated": False} if name.endswith("zarr") else {"engine": "h5netcdf"}
     with xarray.open_dataset(tmp_path / f"whole-{name}", **of) as whole, xarray.open_dataset(tmp_path / name, **of) as made:

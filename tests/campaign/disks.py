@@ -27,7 +27,7 @@ def a_run(y: float) -> sw.Run:
 def a_sweep(path: Path, y: float) -> None:
     """A sweep of four chunks into a store."""
     axes = {"omega": ("omega", [1.0, 2.0, 3.0, 4.0])}
-    told = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=y, dt=0.1, steps=40, every=1, store=path, chunk={"omega": 1})
+    told = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=y, dt=0.1, steps=40, every=1, store=path, chunk=1)
     told.close()
 
 

@@ -205,13 +205,13 @@ def _shift(seconds: float, number: int, folder: Path) -> str:
     here = Path(__file__).parent.parent
     words = [sys.executable, "-X", "faulthandler", "-m", "campaign.fuzz", "--shift", str(folder), "--seed", str(number)]
     process = subprocess.Popen([*words, "--seconds", str(seconds)], cwd=here, stderr=subprocess.PIPE, text=True)
-    example, used = -1.0, 0.0
+    example, used = time.time(), 0.0
     while True:
         try:
             _, wrong = process.communicate(timeout=5.0)
         except subprocess.TimeoutExpired:
             now = folder / "now.json"
-            begun = now.stat().st_mtime if now.exists() else 0.0
+            begun = now.stat().st_mtime if now.exists() else example
             if begun != example:
                 example, used = begun, _seconds_used(process.pid)
             # On a busy machine a second of the CPU may take minutes.

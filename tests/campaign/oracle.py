@@ -59,7 +59,7 @@ class Timer:
         signal.signal(signal.SIGPROF, self.before)
 
     def _ring(self, _: int, frame: Any) -> None:
-        while frame is not None:
+        while frame is not None and frame.f_code is not judged.__code__:  # what is around a call does not count
             if "hypothesis" in frame.f_code.co_filename or frame.f_code.co_name == "__del__":  # no place to raise from
                 return
             frame = frame.f_back
@@ -108,7 +108,7 @@ def judged(timer: Timer, call: Callable[..., Any], given: dict[str, Any], names:
 
 
 #: Words beside the arguments' names by which a message says what it is about.
-OTHERS = ("method", "scene", "peers", "not installed", "path", "carry", "n: ", "steps: ", "at: ", "omega")
+OTHERS = ("method", "scene", "peers", "not installed", "path", "carry", "n: ", "steps: ", "at: ", "omega", "relative")
 
 
 def _refusal(text: str, names: list[str]) -> Outcome:

@@ -115,20 +115,21 @@ def busy_forks(times: int) -> int:
 def forks_amid_compiling(times: int) -> int:
     """Forks while another thread traces and compiles the system that the child steps next: it does not wait for that thread."""
     codes = []
+    digest(0.25)  # what is imported at first use is not what is tried: Python's own locks of imports do not survive a fork
+    names = [method.name for method in sw.methods() if not method.has_series]
+    draw = random.Random(times)
     for k in range(times):
+        # Tapes of thousands of operations that were never asked for: n bodies, in the plane and in space, by each method.
+        bodies = sw.NBody(np.ones(3 + k % 5), softening=0.3, dim=2 + k // 5 % 2, force=("newton", "logarithmic")[k // 10 % 2])
+        method = names[k // 20 % len(names)]
+        y = np.random.default_rng(k).normal(size=(3 + k % 5, 2 + k // 5 % 2))
 
-        @sw.system
-        def rates(t: Any, v: Any, y: Any, number: Any = float(k)) -> Any:
-            for i in range(60):
-                y = y * np.sin(number + y / (1.0 + i))
-            return -y
-
-        def run(of: Any = rates) -> Any:
-            return sw.integrate(of, "rk4", v=0.0, y=[0.1, 0.2], dt=1e-9, steps=500)
+        def run(bodies: Any = bodies, method: Any = method, y: Any = y) -> Any:
+            return sw.integrate(bodies, method, v=0.0, y=y, dt=1e-6, steps=400)
 
         other = threading.Thread(target=run)
         other.start()
-        time.sleep(0.0007 * (k % 30))
+        time.sleep(0.003 * draw.random())
         codes.append(forked(run))
         other.join()
     if any(codes):

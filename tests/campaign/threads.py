@@ -183,7 +183,7 @@ def adaptive_and_events(_: int) -> int:
         lambda: sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=60, events=crossing).events["crossing"].t,
         lambda: np.frombuffer(sw.export(sw.Pendulum(), "rk4", "c").source.encode(), np.uint8),
         lambda: np.frombuffer(str(sw.explain(sw.Pendulum(), "rk4")).encode(), np.uint8),
-        lambda: np.array(sw.analyse(sw.Pendulum(), "rk4", 0.1, at=(0.0, 1.0)).radius),
+        lambda: np.array(sw.analyse(sw.Pendulum(), "rk4", dt=0.1, at=(0.0, 1.0)).radius),
         lambda: sw.jacobian(sw.Pendulum(), v=0.0, y=1.0).rates,
         lambda: sw.integrate(sw.Chain(50), "verlet", v=0.0, y=np.arange(50.0), dt=0.1, steps=30, form="matrix").y,
     ]
@@ -193,7 +193,37 @@ def adaptive_and_events(_: int) -> int:
     return THREADS
 
 
-CHECKS = (one_system, new_systems, one_world, long_world, one_run, large_results, adaptive_and_events)
+def shared_arrays(_: int) -> int:
+    """Two worlds over the same arrays, and runs that begin with them: one at a time has them, and the others are told."""
+    v, y = np.zeros(5000), np.linspace(0.0, 1.0, 5000)
+    system = sw.Pendulum()
+    worlds = [sw.World(system, name, v=v, y=y, dt=0.001) for name in ("rk4", "false_euler")]
+    acts: tuple[Callable[[], Any], ...] = (
+        lambda: worlds[0].step(300),
+        lambda: worlds[1].step(300),
+        lambda: sw.integrate(system, "rk4", v=v, y=y, dt=0.001, steps=200),
+        lambda: sw.integrate(system, "merson", v=v, y=y, tolerance=1e-3, at=[0.01]),
+        lambda: sw.World(system, "rk4", v=v, y=y, dt=0.001),
+    )
+
+    def act(i: int) -> int:
+        refused = 0
+        for _ in range(30):
+            try:
+                acts[i % len(acts)]()
+            except sw.errors.BusyError:
+                refused += 1
+        return refused
+
+    refused = sum(together(act))
+    if not (np.isfinite(v).all() and np.isfinite(y).all() and abs(v).max() < 2.0):
+        raise AssertionError("states that no thread made")
+    if refused == 30 * THREADS:
+        raise AssertionError("everything was refused")
+    return 30 * THREADS
+
+
+CHECKS = (shared_arrays, one_system, new_systems, one_world, long_world, one_run, large_results, adaptive_and_events)
 
 
 def main() -> None:
