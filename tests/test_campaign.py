@@ -13,6 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from campaign import calls, disks, fuzz, memory, oracle, processes, threads
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from stepwell import _files
+from stepwell.sweeps import stores
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="forks, limits and memory as Linux has them")
 timer = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer here")
@@ -212,6 +214,19 @@ def test_a_sweep_goes_on_when_there_is_room_again(way: str, tmp_path: Path) -> N
     with xarray.open_dataset(tmp_path / f"whole-{name}", **of) as whole, xarray.open_dataset(tmp_path / name, **of) as made:
         assert made.attrs["bits"] == whole.attrs["bits"]
         xarray.testing.assert_identical(made[["v", "y"]].load(), whole[["v", "y"]].load())
+
+
+def test_a_file_that_would_not_fit_on_its_disk_is_not_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 may crash where a file cannot grow. What was computed is kept, and goes into the file when there is room."""
+    pytest.importorskip("h5netcdf")
+    path = tmp_path / "sweep.nc"
+    with monkeypatch.context() as patch:
+        patch.setattr(stores.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
+        with pytest.raises(sw.errors.TooLargeError, match=r"but its disk has 0\.000954 MiB left"):
+            disks.a_sweep(path, 1.0)
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.nc.unfinished"]
+    disks.a_sweep(path, 1.0)
+    assert [each.name for each in tmp_path.iterdir()] == ["sweep.nc"]
 
 
 @LINUX

@@ -54,7 +54,7 @@ def world_stepped(steps: Any = 3, again: Any = 2, force: Any = None, **given: An
     world.step(steps)
     if again is not None:
         world.step(again)
-    made = whole(steps) + whole(0 if again is None else again)
+    made = (1 if steps is None else whole(steps)) + (0 if again is None else whole(again))
     if 0 < made < 100 and set(begun) == {"v", "y"} and np.isfinite(world.v).all() and np.isfinite(world.y).all():
         options = {name: each for name, each in given.items() if name not in ("v", "y")}
         run = sw.integrate(**options, **begun, force=force, steps=made)

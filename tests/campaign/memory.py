@@ -24,8 +24,8 @@ import stepwell as sw
 #: it in 100 000 runs, and the smallest piece that the allocator gives takes 32.
 MOST_MORE = 2048
 
-#: Where every run fills the caches of tapes and kernels: they are emptied at 200 000 operations, so memory goes up and down by what
-#: so many take, about 60 bytes each.
+#: Where every run fills the caches of tapes and kernels: they are emptied at 200 000 operations, so memory goes up and down by
+#: what so many take, about 60 bytes each.
 FULL_CACHE = 12 * 1024
 
 

@@ -60,7 +60,8 @@ class Timer:
 
     def _ring(self, _: int, frame: Any) -> None:
         while frame is not None and frame.f_code is not judged.__code__:  # what is around a call does not count
-            if "hypothesis" in frame.f_code.co_filename or frame.f_code.co_name == "__del__":  # no place to raise from
+            # No places to raise from: a module that is half imported stays so.
+            if frame.f_code.co_name == "__del__" or any(each in frame.f_code.co_filename for each in ("hypothesis", "importlib")):
                 return
             frame = frame.f_back
         if self.armed:
