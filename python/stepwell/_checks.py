@@ -61,7 +61,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         value = shared(argument, value)
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, RecursionError, UserWarning) as error:  # a warning is of masked numbers in a list
         raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
     if type(value) is not np.ndarray and (masked := _masked(value)):
         raise ArgumentError(f"{argument}: expected numbers{_in(unit)}, got a masked array in which {masked} are masked")

@@ -198,7 +198,8 @@ def _room(path: Path, needed: int) -> None:
     if needed > free:
         raise TooLargeError(
             f"store: {_checks.short(str(path), _checks.PATH)} needs {needed / 2**20:.3g} MiB, but its disk has "
-            f"{free / 2**20:.3g} MiB left; what is done so far is kept beside it: make room and call again, or take a path that ends in .zarr"
+            f"{free / 2**20:.3g} MiB left; what is done so far is kept beside it: make room and call again, or take a path that "
+            f"ends in .zarr"
         )
 
 
