@@ -58,7 +58,7 @@ INCLUDED = {
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "subsection_order": ["../examples/motion", "../examples/methods", "../examples/equations"],
+    "subsection_order": ["../examples/motion", "../examples/methods", "../examples/sweeps", "../examples/equations"],
     "within_subsection_order": "FileNameSortKey",
     "filename_pattern": r"\.py$",
     # The scripts right in examples/ print; those in its folders draw.

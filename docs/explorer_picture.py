@@ -26,7 +26,7 @@ def main() -> None:
         shown.goto(page.as_uri() + LINK)
         shown.wait_for_timeout(PLAYED)
         whole = Image.open(BytesIO(shown.screenshot())).convert("RGB")
-        whole.quantize(COLOURS, dither=Image.Dither.NONE).save(PICTURE, optimize=True)
+        whole.quantize(COLOURS, dither=Image.Dither.NONE).convert("RGB").save(PICTURE, optimize=True)
         browser.close()
 
 

@@ -114,7 +114,7 @@ def five_methods() -> None:
         title = finding(chart)
         figure.text(0.012, 0.935, f"Of five methods, {title}", size=16, weight="bold")
         figure.text(0.012, 0.88, "Three bodies on a clover leaf (Appendix C), 30 units of time.", size=12.5, color=style.GREY)
-        figure.savefig(IMAGES / "five-methods.png", facecolor="white")
+        (IMAGES / "five-methods.png").write_bytes(style.png(figure))
     print("five-methods.png", (IMAGES / "five-methods.png").stat().st_size)
 
 

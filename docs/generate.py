@@ -134,7 +134,7 @@ def paper() -> str:
 
 def speeds() -> str:
     """How many times as fast as a compiled peer, from the report of the benches."""
-    head = "work", "peer", "the same arithmetic", "the best of each", "error"
+    head = "workload", "peer", "the same arithmetic", "the best of each", "error"
     return table(head, speed.rows())
 
 

@@ -28,8 +28,8 @@ IMAGES = DOCS / "images"
 ERRORS = (0.1, 1e-2, 1e-4, 1e-6, 1e-9)
 PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL)
 
-#: A colour of fewer pixels than this share of a picture is a shade at an edge.
-RARE = 2e-4
+#: A colour of fewer pixels than this share of a picture is a shade at an edge, and is rounded to multiples of this.
+RARE, SHADE = 2e-4, 17
 
 #: Colours of an example's picture, of few lines.
 COLOURS = 64
@@ -50,13 +50,13 @@ def write(name: str, figure: Figure, dpi: float | None = None) -> None:
 def save(drawn: Image.Image, path: Path) -> None:
     """Save all colours that are seen as such, in RGB: a palette would merge methods.
 
-    Only the many shades at the edges of lines and letters are rounded, each channel to one of six steps: a quarter less to store.
+    Only the many shades at the edges of lines and letters are rounded, each channel to one of sixteen steps, so that hues stay.
     """
     pixels = np.asarray(drawn.convert("RGB"))
     code = pixels.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
     _, place, times = np.unique(code, return_inverse=True, return_counts=True)
     rare = (times < RARE * code.size)[place].reshape(code.shape)
-    rounded = (np.rint(pixels / 51.0) * 51.0).astype(np.uint8)
+    rounded = (np.rint(pixels / SHADE) * SHADE).astype(np.uint8)
     Image.fromarray(np.where(rare[..., np.newaxis], rounded, pixels)).save(path, optimize=True)
     print(f"docs/images/{path.name}")
 
@@ -317,8 +317,6 @@ if __name__ == "__main__":
     wing_nut()
     top = sw.scenes.heavy_top()
     write("heavy-top.png", sw.charts.run_picture(top, top.run("rk4", every=1)).plot())
-    for scene in ("oscillator", "clover"):
-        write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
     for name, panel in panels.items():
         write(name, panel.plot(), PANEL_DPI)

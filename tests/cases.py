@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -325,6 +325,15 @@ def thinned(every: Iterable[Case], several: Mapping[str, int], salt: str) -> lis
     every = list(every)
     chosen = set(representative(every, several, salt))
     return [pytest.param(case, id=str(case), marks=() if case in chosen else pytest.mark.long) for case in every]
+
+
+#: How many methods a test tries with each system, which draws them; in the long run all.
+SOME = pytest.mark.parametrize("some", [pytest.param(4, id="some"), pytest.param(None, id="all", marks=pytest.mark.long)])
+
+
+def drawn(methods: Sequence[sw.Method], some: int | None, *salt: Any) -> list[sw.Method]:
+    """So many of these methods, always the same of the same words."""
+    return sorted(methods, key=lambda method: number(method.name, *salt))[:some]
 
 
 def assert_same(a: sw.Run, b: sw.Run) -> None:

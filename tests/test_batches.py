@@ -97,7 +97,7 @@ def test_who_diverged_and_when(backend: str) -> None:
     """False Euler past its limit: each member leaves the range at its own step, and its neighbours do not notice."""
     phi = np.array([0.5, 2.5, 1.9, 3.0, 1.0])
     options = {"v": 0.0, "y": 1.0, "dt": 1.0, "steps": 3000, "backend": backend}
-    with pytest.warns(sw.DivergenceWarning, match=r"2 of 5 member\(s\) diverged; first member 3 at step \d+ \(t = \d+\)"):
+    with pytest.warns(sw.DivergenceWarning, match=r"2 of 5 members diverged; the first was member 3 at step \d+ \(t = \d+\)"):
         run = sw.integrate(sw.Oscillator(phi), "false_euler", **options)
     np.testing.assert_array_equal(run.status, [0, 1, 0, 1, 0])
     for i, p in enumerate(phi):
@@ -133,7 +133,7 @@ def test_the_first_bad_step_is_exact(phi: list[float], steps: int, every: int | 
 
 
 def test_the_warning_of_a_single_member() -> None:
-    with pytest.warns(sw.DivergenceWarning, match=r"1 of 1 member\(s\) diverged; first the only member at step") as caught:
+    with pytest.warns(sw.DivergenceWarning, match=r"^the run diverged at step") as caught:
         sw.integrate(sw.Oscillator(9.0), "false_euler", v=0.0, y=1.0, dt=1.0, steps=3000)
     assert caught[0].filename == __file__
 
@@ -141,7 +141,7 @@ def test_the_warning_of_a_single_member() -> None:
 def test_the_warning_names_a_member_of_a_grid() -> None:
     omega = np.ones((4, 6))
     omega[2, 5] = 9.0
-    with pytest.warns(sw.DivergenceWarning, match=r"1 of 24 member\(s\) diverged; first member \(2, 5\) at step"):
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 24 members diverged: member \(2, 5\) at step"):
         sw.integrate(sw.Oscillator(omega), "false_euler", v=0.0, y=1.0, dt=1.0, steps=3000)
 
 
@@ -149,7 +149,7 @@ def test_a_collision_is_reported() -> None:
     """Two bodies in one place: the run says so, and the other members do not notice."""
     y = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]])[..., None] + np.zeros(3)
     y[1, 1] = [0.5, 0.0, 0.7]
-    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 member\(s\) diverged; first member 1 at step 1"):
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 members diverged: member 1 at step 1"):
         run = sw.integrate(sw.NBody(), "false_euler", v=0.0, y=y, dt=0.01, steps=10)
     np.testing.assert_array_equal(run.first_bad_step, [-1, 1, -1])
     assert np.isfinite(run.y[..., [0, 2]]).all()
@@ -252,7 +252,7 @@ def test_collisions_say_who_met_whom_and_when() -> None:
     triangle = np.array([[-c, -0.5], [c, -0.5], [0.0, 1.0]])
     equal = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
     y = np.stack([triangle, equal, 3.0 * triangle], axis=-1)
-    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 member\(s\) diverged; first member 1 .* bodies 0 and 2 were 0 apart"):
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 3 members diverged: member 1 .* bodies 0 and 2 were 0 apart"):
         run = sw.integrate(sw.NBody(force="newton", G=[1.0, 2.0, 1e-3]), "false_euler", v=0.0, y=y, dt=0.01, steps=10)
     assert run.first_bad_step.tolist() == [-1, 1, -1]
     (met,) = run.collisions

@@ -34,12 +34,12 @@ def test_every_command_explains_itself(capsys, command):
     assert "--json" in out
 
 
-@pytest.mark.parametrize("words", [["chrat"], ["run", "clover"], ["run", "clover", "--method", "rk4", "--dt", "x"]])
+@pytest.mark.parametrize("words", [["--verison"], ["run", "clover"], ["run", "clover", "--method", "rk4", "--dt", "x"]])
 def test_words_that_make_no_command_end_with_2(capsys, words):
     with pytest.raises(SystemExit) as end:
         cli.main(words)
     assert end.value.code == 2
-    assert capsys.readouterr().err.startswith("usage: stepwell")
+    assert capsys.readouterr().err.endswith(" --help says what it takes.\n")
 
 
 def test_without_a_word_the_commands_are_listed_in_one_line_each(capsys):
@@ -178,7 +178,7 @@ def test_a_diverged_run_is_a_warning_and_a_result(capsys):
     code, out, err = told(capsys, *words)
     report = json.loads(out)
     assert code == 0
-    assert err.startswith("stepwell: warning: 1 of 1 member(s) diverged")
+    assert err.startswith("stepwell: warning: the run diverged at step")
     assert err.count("\n") == 1
     assert report["diverged_at_step"] == 155
     assert report["largest_state_error"] is report["last_y"] is None
@@ -430,7 +430,7 @@ def test_the_documents_pair_is_reached(capsys, tmp_path):
     words = ("--method", "standard_euler", "--control", "0.3:printed", "--steps", "1000", "--json")
     code, out, err = told(capsys, "run", "energy_control:pair=printed", *words)
     assert code == 0
-    assert "bodies 0 and 1 of the only member met within step 370" in err
+    assert "bodies 0 and 1 met within step 370" in err
     printed = json.loads(out)
     scene = sw.scenes.energy_control("printed", form="printed")
     with pytest.warns(sw.AccuracyWarning, match="met within step 370"):
@@ -572,3 +572,42 @@ def test_a_reader_who_leaves_early_is_no_error():
 def test_stability_draws_powers_if_asked(tmp_path):
     assert cli.main(["stability", "rk4", "-o", str(tmp_path), "--charts", "powers", "--json"]) == 0
     assert sorted(file.name for file in tmp_path.iterdir()) == ["powers-rk4.png", "stability.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("run", "clover"), "stepwell run: still needed: --method\n"),
+        (("run", "clover", "--method", "rk4", "--dt", "abc"), "stepwell run: --dt: expected a number, got 'abc'\n"),
+        (("run", "clover", "--method", "rk4", "--steps", "1.5"), "stepwell run: --steps: expected a whole number, got '1.5'\n"),
+        (("run", "clover", "--method", "rk4", "--steps", "many"), "stepwell run: --steps: expected a whole number, got 'many'\n"),
+        (("run", "clover", "--method", "rk4", "--steps", "1e-3"), "stepwell run: --steps: expected a whole number, got '1e-3'\n"),
+    ],
+)
+def test_words_that_are_not_understood_say_what_was_expected(words, said, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(words)
+    assert end.value.code == 2
+    assert capsys.readouterr().err == f"{said}stepwell run --help says what it takes.\n"
+
+
+def test_a_whole_number_may_have_an_exponent(capsys):
+    short, long = (told(capsys, "run", "clover", "--method", "rk4", "--steps", steps, "--json") for steps in ("2e2", "200"))
+    assert short == long
+    assert json.loads(short[1])["steps"] == 200
+
+
+def test_a_command_that_is_not_there_is_told_with_the_nearest(capsys):
+    code, out, err = told(capsys, "rum")
+    assert (code, out) == (2, "")
+    assert err.startswith("stepwell: command: there is no 'rum'; did you mean 'run'? Known: scenes, methods, run, ")
+
+
+def test_a_long_message_is_wrapped_between_words(capsys, monkeypatch):
+    whole = told(capsys, "run", "clovr", "--method", "rk4")[2]
+    assert whole.count("\n") == 1
+    monkeypatch.setenv("COLUMNS", "60")
+    lines = told(capsys, "run", "clovr", "--method", "rk4")[2].splitlines()
+    assert len(lines) > 3
+    assert max(map(len, lines)) <= 60
+    assert " ".join(lines) == whole.strip()

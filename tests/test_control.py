@@ -72,7 +72,8 @@ def test_the_printed_form_overflows_in_some_of_them_and_says_which() -> None:
     first = bad[np.argmin(run.first_bad_step[bad])]
     step = run.first_bad_step[first]
     message = next(str(w.message) for w in told if issubclass(w.category, sw.DivergenceWarning))
-    assert f"{len(bad)} of 6 member(s) diverged; first member {first} at step {step} (t = {step * 0.01:g})" in message
+    way = "; the first was" if len(bad) > 1 else ":"
+    assert f"{len(bad)} of 6 members diverged{way} member {first} at step {step} (t = {step * 0.01:g})" in message
 
 
 def test_the_printed_form_overshoots_from_one_on() -> None:

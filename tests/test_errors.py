@@ -139,7 +139,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(dt=None),
         E.ArgumentError,
-        "dt: expected with fixed steps; or give tolerance= and at= for adaptive steps",
+        "dt: needed for fixed steps, got None; for adaptive steps give tolerance= and at=",
     ),
     (lambda: run(steps=0), E.ArgumentError, "steps: expected 1 or more, got 0"),
     (lambda: run(steps=-5), E.ArgumentError, "steps: expected 1 or more, got -5"),

@@ -299,3 +299,26 @@ class sync_page:  # noqa: N801
 
     def __exit__(self, *_: Any) -> None:
         self.context.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_two_methods_of_one_family_are_told_apart(browser: Any, file: str, scheme: str) -> None:
+    """Their curves stand in one picture, so a common colour would hide which is which."""
+
+    def shown_colours(a: str, b: str) -> list[str]:
+        with Shown(browser, file, f"#scene=oscillator&a={a}&b={b}&play=0", color_scheme=scheme) as shown:
+            names = "--a", "--b", "--text"
+            found = [
+                shown.page.evaluate("(name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim()", name)
+                for name in names
+            ]
+            assert not shown.complaints
+            return found
+
+    a, b, text = shown_colours("standard_euler", "false_euler")
+    assert a != b == text
+    one, other, text = shown_colours("false_euler", "rk4")
+    assert len({one, other, text}) == 3
+    assert one == a
+    same, again, _ = shown_colours("rk4", "rk4")
+    assert same == again == other  # the second is dashed

@@ -578,3 +578,28 @@ def test_everything_public_has_an_example_that_runs(name: str) -> None:
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE, verbose=False)
     runner.run(examples, out=told.append)
     assert runner.failures == 0, "".join(told)
+
+
+def test_a_function_alone_makes_the_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside reductions, which go piece by piece, its run is one more."""
+    from stepwell.sweeps import task
+
+    made: list[int] = []
+    original = task.integrate
+
+    def counted(*args: Any, **options: Any) -> sw.Run:
+        made.append(options["steps"])
+        return original(*args, **options)
+
+    monkeypatch.setattr(task, "integrate", counted)
+
+    def end(run: sw.Run) -> Any:
+        return run.y[-1]
+
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 50, "threads": 1}
+    alone = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=end, **given)
+    assert made.count(50) == 1
+    both = sw.sweep(Oscillator, {"omega": [1.0, 2.0]}, "rk4", outcomes=[end, "last"], **given)
+    assert made.count(50) == 3
+    np.testing.assert_array_equal(alone.end, both.y_last)
+    np.testing.assert_array_equal(alone.status, both.status)

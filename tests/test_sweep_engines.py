@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import pickle
@@ -84,6 +85,32 @@ def test_samples_on_a_cluster(client: Any) -> None:
             small(axes=axes, outcomes="period", engine=client, chunk=5).attrs["bits"]
             == small(axes=axes, outcomes="period").attrs["bits"]
         )
+
+
+def test_progress_on_a_cluster(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask's own, which its dashboard draws, has every chunk by name; the bar here goes on with them."""
+    from stepwell import _progress
+
+    shares: list[float] = []
+
+    @contextlib.contextmanager
+    def bar(title: str) -> Any:
+        yield shares.append
+
+    monkeypatch.setattr(_progress, "bar", bar)
+    with distributed.get_task_stream(client=client) as stream:
+        found = small(engine=client, chunk=5, outcomes="last", progress=True)
+    chunks = len(stream.data)
+    assert chunks == found.sizes["gamma"] * found.sizes["y0"] // 5
+    assert {each["key"].rsplit("-", 5)[0] for each in stream.data} == {"sweep_chunk"}
+    assert {each["status"] for each in stream.data} == {"OK"}
+    assert shares == sorted(shares)
+    assert (len(shares), shares[-1]) == (chunks, 1.0)
+
+    def counted(dask_scheduler: Any) -> Any:
+        return dict(dask_scheduler.task_prefixes["sweep_chunk"].state_counts)
+
+    assert client.run_on_scheduler(counted)["memory"] >= chunks
 
 
 # ---- a worker is lost
@@ -244,7 +271,7 @@ def test_kernels_are_compiled_once_a_worker() -> None:
     kernels = []
     for k in range(6):
         chunk = Chunk((k,), (slice(64 * k, 64 * k + 64),), (64,), 64 * k)
-        portable.run_packed(package, {"gamma": np.linspace(0.1, 0.6, 64) + k}, chunk)
+        portable.sweep_chunk(package, {"gamma": np.linspace(0.1, 0.6, 64) + k}, chunk)
         kernels.append(mapped())
     # A step is interpreted until compiling it pays, which for one of the two kinds of pieces may be in the second chunk.
     assert kernels[1] != before

@@ -389,6 +389,20 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "every": 2,
         },
     ),
+    "sweep with a tolerance": (
+        sw.sweep,
+        {
+            "system": sw.Oscillator,
+            "axes": {"omega": ("omega", [1.0, 2.0])},
+            "method": "dop853",
+            "v": 0.0,
+            "y": 1.0,
+            "tolerance": 1e-6,
+            "at": [0.5, 1.0],
+            "max_steps": 100,
+            "outcomes": "evaluations",
+        },
+    ),
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,

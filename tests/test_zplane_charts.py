@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.charts import zplane_picture
+from stepwell.charts import style, zplane_picture
 from stepwell.charts.zplane import ladder, largest
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 
@@ -269,10 +269,7 @@ def test_a_picture_is_whole(kind, methods, tmp_path):
     check_page(figure, tmp_path / "chart.png")
     titles = [axes.get_title().splitlines() for axes in figure.axes if axes.get_visible() and axes.get_title()]
     shared = zplane_picture.groups(chart)
-    names = [
-        [c.method.title for c in same] if len(same) > 1 else [f"{same[0].method.title} ({same[0].method.section})"]
-        for same in shared
-    ]
+    names = [[c.method.title for c in same] if len(same) > 1 else [style.named(same[0].method)] for same in shared]
     assert [" ".join(title[:-1]) for title in titles] == [", ".join(each) for each in names]
     first = [same[0] for same in shared]
     assert [title[-1] for title in titles] == [f"stable for Φ < {c.limit:.5g}" if c.limit else "never stable" for c in first]

@@ -79,7 +79,7 @@ def prepare(contestant: Contestant, work: Workload, quick: bool) -> tuple[Row, R
     if row.missing:
         return row, None
     row.amount = part.amount(part.steps + ready.more)
-    less = "" if part.members == work.members else f"{part.members:,} member(s)"
+    less = "" if part.members == work.members else f"{part.members:,} member{'s' * (part.members != 1)}"
     less += "" if part.steps == work.steps else f"{', ' * bool(less)}{part.steps:,} steps"
     row.note = "; ".join(filter(None, [ready.note, less and f"did {less} only"]))
     return row, ready

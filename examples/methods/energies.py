@@ -12,7 +12,7 @@ import stepwell as sw
 METHODS = {
     "standard_heun": ("#c75a22", "Standard Heun gains"),
     "rk4": ("#175ca6", "Runge-Kutta 4 loses"),
-    "false_heun": ("#74194f", "False Heun loses fast"),
+    "false_heun": ("#111111", "False Heun loses fast"),
     "false_euler": ("#efb02e", "False Euler: in a band"),
     "leapfrog": ("#25a985", "leapfrog: in a narrower one"),
 }

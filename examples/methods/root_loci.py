@@ -13,7 +13,7 @@ import stepwell as sw
 phi = np.linspace(0.0, 3.0, 301)[1:]
 figure, axes = plt.subplots(figsize=(6.8, 6.4), dpi=120, layout="constrained")
 for name, colour, place in (
-    ("standard_euler", "#c75a22", (1.02, 1.12)),
+    ("standard_euler", "#111111", (1.02, 1.12)),
     ("false_euler", "#efb02e", (-1.62, 0.12)),
     ("rk4", "#175ca6", (-0.4, 0.3)),
 ):
@@ -24,6 +24,6 @@ for name, colour, place in (
     outside = phi[np.abs(z).max(axis=1) > 1.0 + 1e-6].min()
     assert 0.0 <= outside - float(sw.stability_limit(sw.Oscillator(), name) or 0.0) < 0.02
 angle = np.linspace(0.0, 2.0 * np.pi, 300)
-axes.plot(np.cos(angle), np.sin(angle), color="#111111", linewidth=1.2, zorder=0)
+axes.plot(np.cos(angle), np.sin(angle), color="#b8b8b8", linewidth=1.2, zorder=0)
 axes.set(aspect="equal", xlim=(-1.7, 1.7), ylim=(-1.5, 1.5), xlabel="real part", ylabel="imaginary part")
 axes.spines[["top", "right"]].set_visible(False)

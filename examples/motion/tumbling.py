@@ -21,7 +21,7 @@ figure, all_three = plt.subplots(3, 1, figsize=(7.2, 5.4), dpi=120, layout="cons
 names = "smallest moment: steady", "middle moment: turns over", "largest moment: steady"
 for axes, values, name, colour in zip(all_three, spin, names, ("#25a985", "#c75a22", "#175ca6"), strict=True):
     axes.plot(run.t, values, color=colour, linewidth=2)
-    axes.text(13.5, 0.1, name, color=colour, size=12)
+    axes.text(13.5, 0.1, name, color=colour, size=10)
     axes.set(ylim=(-1.2, 1.2), ylabel="ω")
     axes.spines[["top", "right"]].set_visible(False)
 all_three[-1].set_xlabel("time, in the inverse of the spin")

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _encounters
+from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .errors import AccuracyWarning, ControlWarning
@@ -86,7 +87,7 @@ def _of_a_control(run: Run, start: State | None) -> str | None:
         return None
     step, strength = found
     return (
-        f"gain: h·C·K = {strength:.3g} at step {step} (t = {run.t0 + step * run.dt:g}) of {in_words(index)}, expected below 1: "
+        f"gain: h·C·K = {strength:.3g} at step {step} (t = {run.t0 + step * run.dt:g}){of_member(index)}, expected below 1: "
         f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
     )
 
@@ -113,7 +114,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
         if (met := run.encounter(index, left)) is not None:
             i, j = met.bodies
             return (
-                f"bodies {i} and {j} of {in_words(index)} met within step {met.step} "
+                f"bodies {i} and {j}{of_member(index)} met within step {met.step} "
                 f"(t = {run.t0 + met.step * run.dt:g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
             )
         left -= run.steps * float(np.prod(bodies.y_shape))
@@ -165,9 +166,11 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
+    some = int(np.count_nonzero(wrong))
     text = (
-        f"{np.count_nonzero(wrong)} of {wrong.size} member(s) have another energy at the end: {in_words(index)} has "
-        f"{last[index]:.3g} instead of {first[index]:.3g}, so {method} did not follow its orbit"
+        f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another energy at the end: "
+        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
+        f"so {method} did not follow its orbit"
     )
     return text, index
 
@@ -226,8 +229,3 @@ def _summed(bodies: NBody, v: Any, y: Any) -> tuple[float, float]:
     except (ValueError, ZeroDivisionError):  # two bodies in one place, or what is not finite
         return math.nan, math.nan
     return kinetic + strength * potential, kinetic
-
-
-def in_words(index: tuple[int, ...]) -> str:
-    """A member in words, by its place in the batch."""
-    return f"member {index if len(index) != 1 else index[0]}" if index else "the only member"

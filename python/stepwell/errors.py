@@ -69,7 +69,7 @@ class DivergenceWarning(UserWarning):
         ...     warnings.simplefilter("always", sw.DivergenceWarning)
         ...     run = sw.integrate(sw.Oscillator(30.0), "false_euler", v=0.0, y=1.0, dt=0.1, steps=1000)
         >>> str(caught[0].message)
-        '1 of 1 member(s) diverged; first the only member at step 369 (t = 36.9), by false_euler with dt = 0.1'
+        'the run diverged at step 369 (t = 36.9), by false_euler with dt = 0.1'
     """
 
 
@@ -108,6 +108,6 @@ class AccuracyWarning(UserWarning):
         >>> with warnings.catch_warnings(record=True) as caught:
         ...     warnings.simplefilter("always", sw.AccuracyWarning)
         ...     run = bodies.run("rk4", bodies.horizon / 30_000)
-        >>> str(caught[0].message)[:44]
-        '1 of 1 member(s) have another energy at the '
+        >>> str(caught[0].message)[:41]
+        'the run has another energy at the end: 5.'
     """

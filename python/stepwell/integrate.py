@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _checks, _core, _encounters, _memory, engine
+from ._brief import first_of, share
 from ._checks import Array
-from ._doubt import in_words, warn_of_nonsense
+from ._doubt import warn_of_nonsense
 from .control import AnyControl, EnergyControl, a_control
 from .errors import (
     ArgumentError,
@@ -189,7 +190,7 @@ def integrate(
     dt = dt_before if dt is None else dt
     if dt is None or steps is None:
         missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)
-        raise ArgumentError(f"{missing}: expected with fixed steps; or give tolerance= and at= for adaptive steps")
+        raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")
     form = _checks.known("form", form, FORMS)
     backend = _checks.known("backend", backend, BACKENDS)
     if fused and form != "direct":
@@ -337,7 +338,7 @@ def velocities(system: System, v: Any) -> Any:
         return 0.0
     if v is None:
         raise ArgumentError(
-            f"v: expected the velocities at the start, for {system!r} has some; only a system of first order has none"
+            f"v: expected the velocities at the start, got None; {system!r} has velocities, unlike a system of first order"
         )
     return v
 
@@ -453,7 +454,7 @@ def _adapt(
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
         pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
         pace = pace._replace(work=np.zeros(batch))
-        plan = plan._replace(order=_order(how, pace))
+        plan = plan._replace(order=order_of_series(how, pace.relative))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
@@ -483,7 +484,7 @@ def _adapt(
     for name in record:
         run.recorded[name] = run.quantity(name)
     _warn_of_stops(run)
-    _warn_of_lost(run, out.pace)
+    _warn_of_lost(out.pace)
     return run, None if carry is not None else (v, y)
 
 
@@ -501,13 +502,17 @@ def _has_series(system: System, control: Any) -> None:
         )
 
 
-def _order(method: Method, pace: Pace) -> int:
-    """The order of a series for the tolerance; 0 of a method that has one order."""
-    if not method.has_series or not pace.relative.size:
+def order_of_series(method: Method, relative: Array) -> int:
+    """The order of a series for relative tolerances; 0 of a method that has one order.
+
+    Raises:
+        UnsupportedError: if they ask for different orders.
+    """
+    if not method.has_series or not relative.size:
         return 0
     from .reference import series_pace  # only such runs need it
 
-    least, most = float(pace.relative.min()), float(pace.relative.max())
+    least, most = float(relative.min()), float(relative.max())
     order = series_pace.order_of(least)
     if series_pace.order_of(most) != order:
         raise UnsupportedError(
@@ -549,7 +554,7 @@ def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
 
 
 #: Why a member of a run with a tolerance stopped, in words.
-_WHY = {
+WHY_STOPPED = {
     Status.BUDGET: "out of max_steps",
     Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
     "by the errors that the tolerance allows",
@@ -563,27 +568,34 @@ def _warn_of_stops(run: Run) -> None:
     stopped = run.status != 0
     time = float(run.paces.t[stopped].min())
     first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
+    some = int(np.count_nonzero(stopped))
     warnings.warn(
-        f"{np.count_nonzero(stopped)} of {stopped.size} member(s) stopped before t = {run.t[-1]:g}; first {in_words(first)} "
-        f"at t = {time:g}: {_WHY[Status(int(run.status[first]))]}",
+        f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
+        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {WHY_STOPPED[Status(int(run.status[first]))]}",
         ToleranceWarning,
         stacklevel=4,
     )
 
 
-def _warn_of_lost(run: Run, pace: Any) -> None:
-    """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
+def lost_in_tolerance(pace: Pace) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Members whose absolute tolerance is most of what a step may err, and much of the motion itself, shape (*batch)."""
+    lost = np.zeros(pace.t.shape, dtype=bool)
     if not pace.absolute.any():
-        return
-    lost = np.zeros(run.status.shape, dtype=bool)
+        return lost
     for square in (pace.longest_v, pace.longest_y):
         longest = np.sqrt(square)
         lost |= (longest > 0.0) & (pace.absolute > pace.relative * longest) & (pace.absolute > MAX_ABSOLUTE_SHARE * longest)
+    return lost
+
+
+def _warn_of_lost(pace: Pace) -> None:
+    """Warn of members that are lost in their absolute tolerance."""
+    lost = lost_in_tolerance(pace)
     if lost.any():
         warnings.warn(
-            f"tolerance: for {np.count_nonzero(lost)} of {lost.size} member(s) the absolute part lets a step err by more than "
-            f"{MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or a "
-            f"smaller absolute part",
+            f"tolerance: for {share(int(lost.sum()), lost.shape, lost.size)} the absolute part lets a step err by more "
+            f"than {MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or "
+            f"a smaller absolute part",
             ToleranceWarning,
             stacklevel=4,
         )
@@ -696,8 +708,9 @@ def _warn(run: Run, before: Whole | None) -> None:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
+    some = int(np.count_nonzero(bad))
     warnings.warn(
-        f"{np.count_nonzero(bad)} of {bad.size} member(s) diverged; first {in_words(first)} at step {step} "
+        f"{share(some, bad.shape, bad.size)} diverged{first_of(some, first, bad.size)} at step {step} "
         f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",
         DivergenceWarning,
         stacklevel=3,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import _checks
-from ._brief import MAX_LINE, facts, shortened
+from ._brief import MAX_LINE, counted, facts, share, shortened
 from ._checks import Array
 from ._encounters import Encounter
 from ._value import Value, by_value
@@ -279,10 +279,11 @@ class Run(Value):
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
-        if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
+        if (stopped := int(np.count_nonzero(self.status == Status.EVENT))) > 0:
             raise UnsupportedError(
-                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run "
-                f"for each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+                f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
+                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run"
+                f"{' for each' if stopped > 1 else ''}: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
             )
         told = {"fused": True} if self.fused else {}
         if self.stand is not None:
@@ -406,7 +407,7 @@ class Run(Value):
 
     def _repr_html_(self) -> str:
         """The same as a table, for notebooks."""
-        return facts(f"{type(self.system).__name__} by {self.method.title}", [("system", repr(self.system)), *self._told()])
+        return facts(f"{self.system.kind_name} by {self.method.title}", [("system", repr(self.system)), *self._told()])
 
     def _told(self) -> list[tuple[str, str]]:
         """What it is, by name: steps, time, saved states, members, and how they ended."""
@@ -417,12 +418,12 @@ class Run(Value):
             int(np.count_nonzero(self.status == Status.EVENT)),
         )
         if self.paces is None:
-            steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
+            steps = f"{counted(self.steps, 'step')} of {self.dt:g}"
             first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
             how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
-            steps = f"{_counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
+            steps = f"{counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
             first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
         verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
@@ -432,11 +433,6 @@ class Run(Value):
             ("steps", steps + (", fused" if self.fused else "")),
             ("time", f"{first:g} to {last:g}"),
             ("saved states", str(len(self.t))),
-            ("members", _counted(members, "member")),
+            ("members", counted(members, "member")),
             ("verdict", verdict),
         ]
-
-
-def _counted(number: int, what: str) -> str:
-    """A number and what is counted."""
-    return f"{number} {what}{'s' * (number != 1)}"

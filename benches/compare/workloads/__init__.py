@@ -54,7 +54,7 @@ class Workload(ABC):
     @property
     def size(self) -> str:
         """What the title says of the size."""
-        return f"{self.members:,} member(s)"
+        return f"{self.members:,} member{'s' * (self.members != 1)}"
 
     @property
     def end(self) -> float:

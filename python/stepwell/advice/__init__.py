@@ -293,9 +293,13 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     if trial.error <= search.allowed(candidate):
         reason = f"good enough {tried}, which {too_expensive}"
     elif missed.kind == "unstable":
-        reason = f"{unstable} {tried}, and more {too_expensive}" if missed.expensive else f"{unstable} {tried}, the most tried"
+        reason = (
+            f"{unstable} {tried}, and more of them {too_expensive.replace('costs', 'cost')}"
+            if missed.expensive
+            else f"{unstable} {tried}, the most tried"
+        )
     elif missed.expensive:
-        reason = f"error {trial.error:.2g} {tried}, and enough {too_expensive}{needs}"
+        reason = f"error {trial.error:.2g} {tried}, and what is enough {too_expensive}{needs}"
     else:
         reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
     return Rejected(candidate.method.name, missed.kind, reason, candidate.by)

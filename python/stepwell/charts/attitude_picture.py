@@ -9,8 +9,9 @@ import numpy as np
 
 from .._checks import Array
 from ..systems.attitude import rotation_of_quaternion
+from .orbits_picture import EXACT
 from .runs import RunPicture
-from .runs_picture import EXACT, over_time
+from .runs_picture import over_time
 from .style import GREY
 
 if TYPE_CHECKING:

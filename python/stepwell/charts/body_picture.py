@@ -9,8 +9,9 @@ import numpy as np
 
 from .._checks import Array
 from .attitude_picture import HALF_SIDE, Parts, Seen, angular_velocity, chosen, rotation, solid, turns, viewed
+from .orbits_picture import EXACT, LONG_CURVE, RIGHT
 from .runs import RunPicture
-from .runs_picture import EXACT, LONG_CURVE, RIGHT, errors, greyed
+from .runs_picture import errors, greyed
 from .style import GREY
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def draw_panels(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     angular_velocity(omega, chart)
     energy = figure.add_axes((0.72, 0.645, RIGHT - 0.72, 0.2))
     state = figure.add_axes((0.72, 0.365, RIGHT - 0.72, 0.2))
-    errors(energy, state, chart)
+    errors(energy, state, chart, compared=True)
     state.set_xlabel("time")
     notes.append(told(chart, axis))
 

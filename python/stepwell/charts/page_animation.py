@@ -13,8 +13,9 @@ import numpy as np
 
 from .._checks import Array
 from . import attitude_picture, body_picture
+from .orbits_picture import BODIES, links, view
 from .runs import RunPicture
-from .runs_picture import BODIES, links, view
+from .runs_finding import broke_off, steps_of
 from .style import FAMILIES
 
 WEB = Path(__file__).parent / "web"
@@ -63,9 +64,9 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     number = max(2, min(len(good), STATES, room // each))
     shown = good[np.round(np.linspace(0, len(good) - 1, number)).astype(int)]
     run, t = chart.run, chart.run.t[shown]
-    about = f"{run.steps} steps of {run.dt:.6g}; {textwrap.shorten(repr(run.system), 90, placeholder=' …')}"
+    about = f"{steps_of(run)}; {textwrap.shorten(repr(run.system), 90, placeholder=' …')}"
     if run.status:
-        about += f" Diverged at step {int(run.first_bad_step)}: shown as far as it is finite."
+        about += f" {broke_off(run)}: shown as far as it is finite."
     between = number < len(good) and number < seconds * fps
     if between:
         about += f" {number} of {len(run.t)} saved states, and straight lines between them."
@@ -159,12 +160,16 @@ def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
     t = chart.run.t[shown]
     known = chart.scene.exact(t) if chart.scene.exact is not None and t[-1] <= chart.scene.until else None
     panels = []
-    for k, (name, values, colour) in enumerate((("y", chart.run.y[shown], BLUE), ("v", chart.run.v[shown], GREEN))):
+    blocks = (("y", chart.run.y[shown], BLUE), ("v", chart.run.v[shown], GREEN))
+    given = [block for block in blocks if block[1][0].size]  # a system of first order has no v
+    for k, (name, values, colour) in enumerate(given):
         lines = [] if known is None else [{"data": encoded(known[1 - k]), "exact": True}]
         size = float(np.abs(values if known is None else known[1 - k]).max()) or 1.0
         size = min(3.0 * size, max(size, float(np.abs(values).max())))
         lines.append({"data": encoded(np.clip(values, -4.0 * size, 4.0 * size)), "colour": colour})
-        panels.append(_series(name, lines, t, (-1.1 * size, 1.1 * size), (0.07, 0.06 + 0.48 * k, 0.46, 0.4)))
+        panels.append(
+            _series(name, lines, t, (-1.1 * size, 1.1 * size), (0.07, 0.06 + 0.48 * k, 0.46, 0.4 if len(given) > 1 else 0.88))
+        )
     return panels
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from .._encounters import MAX_RERUN
 from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from ..integrate import integrate
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs
+from ..systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs, System
+from ..systems.own import OwnSystem
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -34,7 +38,8 @@ class RunPicture(Drawn, Value):
         scene: the scene.
         run: the run.
         energy_error: of each saved state, relative to ``energy_scale``; infinite where it is not finite, NaN where the true one
-            is not known; None for a system without an energy. Without an exact solution it is the change since the first state.
+            is not known; None for a system without an energy. Without an exact solution it is the change since the first state,
+            and None where forces take or give energy in the true motion.
         energy_scale: what the energy error is relative to, in words.
         state_error: ``Scene.state_error``, or None if the scene has no exact solution.
     """
@@ -90,6 +95,40 @@ class RunPicture(Drawn, Value):
     def title(self) -> str:
         """The scene and the method."""
         return f"{self.scene.title} by {self.run.method.title}"
+
+    @cached_property
+    def before(self) -> RunPicture | None:
+        """The same run without its control, from the first saved state on; None without a control, or where it is long."""
+        run = self.run
+        if run.system.keeper is None or run.paces is not None or run.events or run.steps * run.v[0].size > MAX_RERUN:
+            return None
+        first, second = (round((float(t) - run.t0) / run.dt) for t in run.t[:2])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what befalls it is drawn
+            free = integrate(
+                run.system.uncontrolled,
+                run.method,
+                v=run.v[0],
+                y=run.y[0],
+                dt=run.dt,
+                steps=run.steps,
+                every=second - first,
+                t0=run.t0,
+                start_step=run.start_step,
+                start=run.start,
+                force=run.force,
+                fused=run.fused,
+            )
+        state_error = None if self.state_error is None else self.scene.state_error(free)
+        return replace(self, run=free, energy_error=_energy_error(self.scene, free)[0], state_error=state_error)
+
+    @property
+    def energy(self) -> Array | None:
+        """The energy of each saved state, or None for a system without one."""
+        try:
+            return self.run.energy
+        except UnsupportedError:
+            return None
 
     @property
     def finite(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -168,8 +207,8 @@ class RunPicture(Drawn, Value):
     def columns(self) -> dict[str, Array]:
         """The saved states as arrays with the time along the first axis: t, v, y, energy and errors, as far as there are any."""
         given: dict[str, Array] = {"t": self.run.t, "v": self.run.v, "y": self.run.y}
-        if self.energy_error is not None:
-            given["energy"] = self.run.energy
+        if (energy := self.energy) is not None:
+            given["energy"] = energy
         if self.state_error is not None:
             given["state_error"] = self.state_error
         if self.energy_error is not None:
@@ -228,7 +267,7 @@ def own_picture(run: Run) -> RunPicture:
     if len(run.t) < 2:
         raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
     system = run.system.uncontrolled
-    title = type(system).__name__
+    title = system.kind_name
     horizon = float(run.t[-1] - run.t[0])
     scene = Scene(system, v=run.v[0], y=run.y[0], dt=run.dt, horizon=horizon, name=title, title=title)
     return run_picture(scene, run)
@@ -237,12 +276,25 @@ def own_picture(run: Run) -> RunPicture:
 def _begins(scene: Scene, run: Run) -> bool:
     """Whether the first state is the scene's start, but for the rounding of a method that makes v from something else."""
     pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
-    scale = max(float(np.abs(block).max()) for _, block in pairs)
+    scale = max(float(np.abs(block).max(initial=0.0)) for _, block in pairs)  # a system of first order has no v
     return all(np.allclose(found, block, rtol=0.0, atol=1e-9 * scale) for found, block in pairs)
 
 
+def keeps_energy(run: Run) -> bool:
+    """Whether nothing takes or gives energy in the true motion: no damping, drag, friction, floors, inputs or torques."""
+    system: System = run.system.uncontrolled
+    if run.force is not None or getattr(system, "torques_act", False) or system.contacts:
+        return False
+    if isinstance(system, OwnSystem):
+        return True  # its energy is what was declared to be constant
+    terms = [getattr(system, name, None) for name in ("damping", "drag", "friction")]
+    if any(term is not None and np.any(term) for term in terms):
+        return False
+    return isinstance(system, RigidBody) or not any(getattr(system, name, None) is not None for name in system.input_names)
+
+
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
-    if scene.exact is None and getattr(scene.system, "torques_act", False):
+    if scene.exact is None and not keeps_energy(run):
         return None, ""  # it changes in the true motion, which is not known
     try:
         energy = run.energy

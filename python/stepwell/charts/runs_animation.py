@@ -11,8 +11,10 @@ import numpy as np
 from .. import _checks
 from ..errors import ArgumentError, UnsupportedError
 from . import attitude_picture, body_picture
+from .orbits_picture import BODIES, EXACT, body, exact, fixed, left_picture, square, view
 from .runs import RunPicture
-from .runs_picture import BODIES, EXACT, body, curves, errors, exact, fixed, greyed, left_picture, square, view
+from .runs_finding import steps_of
+from .runs_picture import curves, errors, greyed
 from .style import FONT, GREY, new_figure
 
 if TYPE_CHECKING:
@@ -82,7 +84,7 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
     figure = new_figure(16.0, 9.0)
     figure.text(0.012, 0.95, chart.title, size=22, weight="bold")
     run = chart.run
-    figure.text(0.012, 0.91, f"{run.steps} steps of {run.dt:.6g}", size=15, color=GREY)
+    figure.text(0.012, 0.91, steps_of(run), size=15, color=GREY)
     now = figure.text(0.978, 0.945, "", size=20, ha="right", family="monospace")
     if chart.kind == "attitude":
         show_left, shown = (

@@ -110,10 +110,14 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def png(figure: Figure) -> bytes:
-    """A figure as the bytes of a .png file."""
-    written = BytesIO()
-    figure.savefig(written, format="png", facecolor="white")
+def png(figure: Figure, dpi: float | None = None) -> bytes:
+    """A figure as the bytes of a .png file in RGB: printers make what they like of a picture with transparency."""
+    from PIL import Image
+
+    drawn, written = BytesIO(), BytesIO()
+    figure.savefig(drawn, format="png", facecolor="white", dpi=dpi or "figure", pil_kwargs={"compress_level": 1})
+    with Image.open(drawn) as picture:
+        picture.convert("RGB").save(written, format="png", dpi=picture.info.get("dpi", (figure.dpi, figure.dpi)))
     return written.getvalue()
 
 
@@ -127,10 +131,13 @@ def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:
     if path is None:
         return draw()
     known = sorted(new_figure(1.0, 1.0).canvas.get_supported_filetypes())
-    if Path(path := file("path", path)).suffix.lower().removeprefix(".") not in known:
+    if (path := file("path", path)).suffix.lower().removeprefix(".") not in known:
         raise ArgumentError(f"path: expected an ending of a picture, one of {', '.join(known)}, got {str(path)!r}")
     figure = draw()
-    figure.savefig(path, facecolor="white")
+    if path.suffix.lower() == ".png":
+        path.write_bytes(png(figure))
+    else:
+        figure.savefig(path, facecolor="white")
     return figure
 
 

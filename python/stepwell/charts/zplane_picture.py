@@ -10,7 +10,7 @@ import numpy as np
 
 from .._checks import Array
 from ..stability.eigen import Complex
-from .style import FAMILIES, FONT, GREY, family, new_figure
+from .style import FAMILIES, FONT, GREY, family, named, new_figure
 from .zplane import Locus, Stability
 
 if TYPE_CHECKING:
@@ -279,7 +279,7 @@ def _limit(locus: Locus) -> str:
 
 def _title(same: tuple[Locus, ...]) -> str:
     first = same[0].method
-    names = f"{first.title} ({first.section})" if len(same) == 1 else ", ".join(locus.method.title for locus in same)
+    names = named(first) if len(same) == 1 else ", ".join(locus.method.title for locus in same)
     return "\n".join([*textwrap.wrap(names, LETTERS), _limit(same[0])] if len(same) > 1 else [names, _limit(same[0])])
 
 

@@ -30,7 +30,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="a scene (see stepwell scenes), with arguments as in kepler:e=0.5, or a Python file that makes one",
     )
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="a folder for what is drawn and written (default: this one)",
+    )
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
     parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")

@@ -24,7 +24,14 @@ from . import show
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("scene", metavar="SCENE", help="a scene of bodies or rods, or a Python file that makes one")
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="a folder for what is drawn and written (default: this one)",
+    )
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: four)")
     parser.add_argument("--gains", metavar="A,B,…", help="which gains: h·C·K at the start of bodies, c of rods")
     parser.add_argument("--evaluations", metavar="N,M,…", help="function evaluations of a run; each number is another step")

@@ -1,6 +1,6 @@
-"""Answer the document's four criteria for methods.
+"""Judge methods by the four criteria of Hoffmann (2002).
 
-§1: stability, frequency, operations and the largest step.
+They are stability, frequency, operations and the largest step (§1).
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ The page has sliders for the step and the parameters, and needs no server; -o wr
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from .. import _checks
@@ -34,6 +35,8 @@ def command(args: argparse.Namespace) -> None:
         first = next((each for each in chosen if each.name == args.scene), None) or find_scene(args.scene)
         others = [] if args.only else [each for each in chosen if each.name != first.name]
         chosen = [first, *others]
+    if sys.stderr.isatty() and not args.json:
+        print("stepwell: making the page takes some seconds", file=sys.stderr)
     page = explore(chosen)
     written = show.Written()
     if args.output is not None:

@@ -1,4 +1,4 @@
-"""Draw the document's figures.
+"""Draw the figures of Hoffmann (2002).
 
 The samples of each method on the undamped oscillator (§5 to §11), and the harmonic cases of §4.
 """
@@ -19,7 +19,14 @@ from . import show
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="a folder for what is drawn and written (default: this one)",
+    )
     parser.add_argument("--phi", type=float, default=0.5, metavar="RAD", help="Φ = ω₀·dt (default: 0.5)")
     parser.add_argument("--periods", type=float, default=4.0, metavar="N", help="how many periods (default: 4)")
     show.json_option(parser)

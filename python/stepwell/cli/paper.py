@@ -17,7 +17,7 @@ from . import show
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("section", nargs="?", metavar="SECTION", help='one section, such as 7 or "App. C" (default: all)')
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="draw the figures, too, and where to")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder: draw the figures into it, too")
     show.json_option(parser)
 
 

@@ -36,6 +36,9 @@ ADAPTIVE, ADAPTIVE_TO_DRAW = 100, 2000
 #: Digits of a number on the screen, and the most numbers of a block there.
 DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
 
+#: What a number of the report is called on the screen, if not by its name.
+NAMES = {"kept": "saved states"}
+
 NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")
 
 
@@ -115,7 +118,7 @@ def command(args: argparse.Namespace) -> None:
     else:
         for name, value in report.items():
             if value is not None:
-                print(f"{name.replace('_', ' '):21} {_said(name, value)}")
+                print(f"{NAMES.get(name, name.replace('_', ' ')):21} {_said(name, value)}")
     written.close()
 
 

@@ -25,7 +25,7 @@ CHARTS = (*USUAL, "powers")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("methods", nargs="*", metavar="METHOD", help="a method; see stepwell methods (default: all)")
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="write pictures and numbers there")
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="a folder for pictures and numbers")
     parser.add_argument("--charts", metavar="A,B,…", help=f"which of {', '.join(CHARTS)} to draw (default: all but powers)")
     parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
     show.json_option(parser)

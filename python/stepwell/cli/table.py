@@ -11,6 +11,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterable, Sequence
+from typing import TextIO
 from unicodedata import combining, east_asian_width
 
 #: Between two columns.
@@ -23,9 +24,9 @@ MIN_PROSE = 28
 UNLIMITED = 1_000_000
 
 
-def width_of_terminal() -> int:
+def width_of_terminal(stream: TextIO | None = None) -> int:
     """How many characters a line may have: those of the terminal, of ``COLUMNS``, or any number in a file or a pipe."""
-    if not sys.stdout.isatty() and not os.environ.get("COLUMNS", "").isdigit():
+    if not (stream or sys.stdout).isatty() and not os.environ.get("COLUMNS", "").isdigit():
         return UNLIMITED
     return max(20, shutil.get_terminal_size().columns)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import share
 from .._checks import Array
 from .._value import Value
 from ..derivatives.traced import Traced, together
@@ -272,8 +273,10 @@ def _warn(exponents: Array) -> None:
     """Say how many members have none."""
     lost = np.isnan(exponents).any(axis=0)
     if lost.any():
+        some = int(lost.sum())
         warnings.warn(
-            f"{int(lost.sum())} of {lost.size} member(s) left the range of finite numbers; their exponents are NaN",
+            f"{share(some, lost.shape, lost.size)} left the range of finite numbers; "
+            f"{'its' if some == 1 else 'their'} exponents are NaN",
             DivergenceWarning,
             stacklevel=3,
         )

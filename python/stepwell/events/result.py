@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _checks
+from .._brief import counted
 from .._checks import Array
 from .._value import Value
 from ..errors import ArgumentError
@@ -55,7 +56,9 @@ class Occurrences(Value):
         shape = self.count.shape
         index = index if isinstance(index, tuple) else (index,)
         if len(index) != len(shape):
-            raise ArgumentError(f"index: expected {len(shape)} whole number(s), for a batch of shape {shape}, got {len(index)}")
+            raise ArgumentError(
+                f"index: expected {counted(len(shape), 'whole number')}, for a batch of shape {shape}, got {len(index)}"
+            )
         place = tuple(_checks.count("index", i, -n, n - 1) % n for i, n in zip(index, shape, strict=True))
         mine = self.member == (np.ravel_multi_index(place, shape) if shape else 0)
         return Occurrences(
@@ -63,4 +66,4 @@ class Occurrences(Value):
         )
 
     def __repr__(self) -> str:
-        return f"<{int(self.count.sum())} of event {self.name}, {len(self.t)} kept, {self.count.size} member(s)>"
+        return f"<{int(self.count.sum())} of event {self.name}, {len(self.t)} kept, {counted(self.count.size, 'member')}>"

@@ -157,7 +157,7 @@ MEANING: dict[str, Callable[..., Any]] = {
 
 
 class Evaluated:
-    """A fused tape, to be evaluated for many members at once.
+    """A tape, to be evaluated for many members at once.
 
     Args:
         tape: its operations.
@@ -169,13 +169,18 @@ class Evaluated:
     def __init__(
         self, tape: Sequence[Operation], roots: Sequence[int], numbers: Mapping[int, Any], tables: Sequence[Any]
     ) -> None:
-        (self.tape, self.roots), self.numbers, self.tables = fused(tape, roots), numbers, tables
+        self.tape, self.roots, self.numbers, self.tables = tape, roots, numbers, tables
 
     @classmethod
-    def traced(cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any]) -> "Evaluated":
-        """For symbols on a tape that lists its operations."""
+    def traced(
+        cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any], *, fuse: bool
+    ) -> "Evaluated":
+        """For symbols on a tape that lists its operations, with fused multiply-adds if that is wanted."""
         operations, roots = tape.operations(symbols)
-        return cls([Operation(name, tuple(of), given) for name, of, given in operations], roots, numbers, tables)
+        listed = [Operation(name, tuple(of), given) for name, of, given in operations]
+        if fuse:
+            listed, roots = fused(listed, roots)
+        return cls(listed, roots, numbers, tables)
 
     def __call__(self, state: Sequence[Array], t: Any, h: float) -> list[Any]:
         """The values of the roots for these rows of the state, at time t with the step h."""

@@ -1,9 +1,23 @@
 """Ensembles: ``sweep``, samples for its axes, and what can be kept of each member."""
 
+from .adaptive import Evaluations
 from .crossings import Crossing, Period
 from .ensemble import sweep
 from .exponents import Exponents
 from .outcomes import Extremes, Function, History, Last, Mean
 from .samples import random, sobol
 
-__all__ = ["Crossing", "Exponents", "Extremes", "Function", "History", "Last", "Mean", "Period", "random", "sobol", "sweep"]
+__all__ = [
+    "Crossing",
+    "Evaluations",
+    "Exponents",
+    "Extremes",
+    "Function",
+    "History",
+    "Last",
+    "Mean",
+    "Period",
+    "random",
+    "sobol",
+    "sweep",
+]

@@ -14,7 +14,7 @@ from .._checks import Array, Shape
 from ..errors import ArgumentError, DTypeError, ShapeError
 
 #: Arguments of ``integrate`` that can be axes. All other names are those of parameters of the system.
-OF_THE_RUN = ("v", "y", "dt", "force")
+OF_THE_RUN = ("v", "y", "dt", "force", "tolerance")
 
 
 class Axis(NamedTuple):
@@ -180,7 +180,7 @@ def _axis(name: Any, given: Any) -> Axis:
     else:
         dims, values = name, given
     dims = (dims,) if isinstance(dims, str) else tuple(dims)
-    numbers = _checks.numbers(argument, values, positive=name == "dt")
+    numbers = _checks.numbers(argument, values, positive=name in ("dt", "tolerance"))
     if len(set(dims)) < len(dims) or not all(isinstance(dim, str) and dim for dim in dims):
         raise ArgumentError(f"{argument}: expected different names of dimensions, got {_checks.short(dims)}")
     if numbers.ndim < len(dims):

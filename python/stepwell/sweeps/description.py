@@ -46,16 +46,15 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "given": {name: _digest(value) for name, value in task.given.items() if name != "threads"},
         "first steps": bits,
     }
+    if task.at is not None:
+        told["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
         "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {grid.members} members",
         "stepwell_version": str(_core.__version__),
         "numpy_version": np.__version__,
         "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,
         "method": task.method,
-        **({} if grid.of_dt else {"dt": task.given["dt"]}),
-        "steps": task.steps,
-        "transient": task.transient,
-        "observe": task.observe,
+        **_steps_told(task, grid),
         "t0": task.given["t0"],
         "fused": int(task.given["fused"]),
         **({} if task.every is None else {"every": task.every}),
@@ -65,13 +64,26 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     return Layout(grid, coords, attrs, units, renamed)
 
 
+def _steps_told(task: Task, grid: Grid) -> dict[str, Any]:
+    """How long the steps are, and how many."""
+    if task.at is None:
+        dt = {} if grid.of_dt else {"dt": task.given["dt"]}
+        return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}
+    told: dict[str, Any] = {name: task.given[name] for name in ("dt", "max_steps") if name in task.given}
+    if (tolerance := task.given.get("tolerance")) is not None:
+        told["tolerance"] = repr(tolerance) if isinstance(tolerance, tuple) else float(tolerance)
+    return told | {"end": float(task.at[-1])}
+
+
 def _times(
     task: Task, grid: Grid, renamed: dict[str, str], units: dict[str, str]
 ) -> tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]:
     """Times of the states of a history, by the formula of the core: t0 + k·dt."""
+    attrs = {"long_name": "time", **({"units": units["t"]} if "t" in units else {})}
+    if task.at is not None:
+        return ("t",), task.at, attrs
     every = task.every or task.steps
     k = task.transient + np.append(np.arange(0, task.steps, every), task.steps).astype(np.float64)
-    attrs = {"long_name": "time", **({"units": units["t"]} if "t" in units else {})}
     if not grid.of_dt:
         return ("t",), task.given["t0"] + k * task.given["dt"], attrs
     axis = next(axis for axis in grid.axes if axis.argument == "dt")

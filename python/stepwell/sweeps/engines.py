@@ -11,7 +11,7 @@ from typing import Any
 from .. import _checks
 from ..errors import ArgumentError, DTypeError
 from .axes import Chunk, Grid
-from .portable import packed, run_packed
+from .portable import packed, sweep_chunk
 from .task import Done, Task, run
 
 #: Chunks that are under way or waiting, for each worker: enough that none waits for the next one.
@@ -56,7 +56,7 @@ class Engine:
         """What is found of each chunk, as they end. If it is closed early, chunks that have begun are stopped or awaited."""
         if not self.here:
             package = packed(task)
-            yield from self._all(chunks, lambda chunk: self._executor.submit(run_packed, package, grid.values(chunk), chunk))
+            yield from self._all(chunks, lambda chunk: self._executor.submit(sweep_chunk, package, grid.values(chunk), chunk))
             return
         stop = threading.Event()
 

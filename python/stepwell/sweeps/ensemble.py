@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _checks
-from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError
+from .._brief import counted
+from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import System
+from . import adaptive
+from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
 from .axes import grid as a_grid
 from .crossings import Crossing, Period
@@ -40,12 +43,15 @@ WORDS: dict[str, type[Outcome]] = {
     "crossing": Crossing,
     "period": Period,
     "lyapunov": Exponents,
+    "evaluations": Evaluations,
     "history": History,
 }
 #: Default of ``memory``, in bytes.
 MEMORY = 64 * 2**20
 #: Most members of a chunk by default: enough that a call costs little beside their steps.
 MAX_MEMBERS = 1 << 14
+#: Likewise with a tolerance, where a chunk is made in pieces between the times of ``at`` only, so that Ctrl-C waits for it.
+MAX_ADAPTIVE_MEMBERS = 1 << 11
 #: Members are divided into so many chunks for each worker, or more, as long as each has so many members.
 CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
 
@@ -58,11 +64,14 @@ def sweep(
     v: Any = None,
     y: Any = None,
     dt: float | None = None,
-    steps: int,
-    transient: int = 0,
+    steps: int | None = None,
+    transient: int | None = None,
     outcomes: Any = None,
     every: int | None = None,
-    observe: int = 1,
+    observe: int | None = None,
+    tolerance: Any = None,
+    at: Any = None,
+    max_steps: int | None = None,
     control: AnyControl | None = None,
     force: Any = None,
     fused: bool = False,
@@ -80,26 +89,34 @@ def sweep(
 
     Members are computed in chunks, on all cores, in other processes or on a cluster. What is found of a member is the same to the
     last bit on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not
-    stored, unless ``every`` asks for them. Needs ``pip install "stepwell[sweep]"``.
+    stored, unless ``"history"`` asks for them. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and
+    ``at``. Needs ``pip install "stepwell[sweep]"``.
 
     Args:
         system: a system; or what makes one of parameters by name: a class such as ``Oscillator``, your own equations, a function,
             or ``functools.partial`` of any of them.
-        axes: what varies, by the name of the argument: a parameter of the system, or ``y``, ``v``, ``dt`` or ``force``. Each is
-            (dimension, values) or (dimension, values, attributes), as in xarray, or values alone, whose dimension has the name of
-            the argument. Those of one dimension vary together; different dimensions are multiplied. The dimension is the last
-            axis of the values; axes before it are those of the argument. ``stepwell.sweeps.random`` and ``sobol`` make samples.
+        axes: what varies, by the name of the argument: a parameter of the system, or ``y``, ``v``, ``dt``, ``force`` or
+            ``tolerance``. Each is (dimension, values) or (dimension, values, attributes), as in xarray, or values alone, whose
+            dimension has the name of the argument. Those of one dimension vary together; different dimensions are multiplied.
+            The dimension is the last axis of the values; axes before it are those of the argument. ``stepwell.sweeps.random``
+            and ``sobol`` make samples.
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, the same for all members.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero.
+        dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
         steps: number of steps that are observed, one or more.
-        transient: number of steps before those, of which nothing is kept.
+        transient: number of steps before those, of which nothing is kept; none if None.
         outcomes: what to keep of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
-            "history"; the classes of ``stepwell.sweeps`` of these names, with arguments; or a function of the ``Run`` of a chunk.
-            "last" if None, or with ``every``, "history". How a member ended, ``status`` and ``first_bad_step``, is always kept.
+            "evaluations", "history"; the classes of ``stepwell.sweeps`` of these names, with arguments; or a function of the
+            ``Run`` of a chunk. "last" if None, or with ``every``, "history". How a member ended, ``status`` and
+            ``first_bad_step``, is always kept.
         every: steps between the states of a history, or of the runs that functions are given.
-        observe: steps between the states that reductions see. What happens in between is not seen.
+        observe: steps between the states that reductions see; every one if None. What happens in between is not seen.
+        tolerance: in place of ``steps``, for adaptive steps of each member: a number, or a pair (relative, absolute), as for
+            ``integrate``. An axis of this name has the relative ones.
+        at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
+            reductions see the states at these times and no others. Not with ``transient``, ``every`` or ``observe``.
+        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
         control: as for ``integrate``, the same for all members.
         force: likewise.
         fused: likewise.
@@ -124,6 +141,8 @@ def sweep(
 
     Warns:
         DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
+        ToleranceWarning: how many members stopped before the last time, which first, and why; or that an absolute tolerance is
+            so large that the motion is lost in it.
         AccuracyWarning: if numbers are finite and mean nothing. Encounters of bodies are not searched for here.
 
     Example:
@@ -134,25 +153,36 @@ def sweep(
     """
     need("xarray")
     grid, how, named = a_grid(axes), find_method(method), named_units(units)
-    fixed = {"v": v, "y": y, "dt": dt, "force": force}
-    varied = {axis.argument for axis in grid.axes}
-    _fits_axes(system, varied, fixed)
+    paced = tolerance is not None or at is not None or any(axis.argument == "tolerance" for axis in grid.axes)
+    fixed = {"v": v, "y": y, "dt": dt, "force": force, "tolerance": tolerance}
+    _fits_axes(system, {axis.argument for axis in grid.axes}, fixed, ("y",) if paced else ("y", "dt"))
     if dt is not None:
         fixed["dt"] = _checks.number("dt", dt, positive=True, unit="units of time")
     given = {name: value for name, value in fixed.items() if value is not None}
     given |= {"t0": _checks.number("t0", t0, unit="units of time"), "fused": _checks.flag("fused", fused), "threads": 1}
     given |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
     every = None if every is None else _checks.count("every", every, 1)
+    kept_of_each = _outcomes(outcomes, every)
+    times = None
+    if paced:
+        others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
+        more, times = adaptive.arguments(grid, how, tolerance, at, max_steps, others, kept_of_each)
+        given |= more
+    else:
+        adaptive.refuse_fixed(kept_of_each, max_steps)
+        if steps is None:
+            raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(
         system=system,
         method=how.name,
         given=given,
-        transient=_checks.count("transient", transient, 0),
-        steps=_checks.count("steps", steps, 1),
-        observe=_checks.count("observe", observe, 1),
+        transient=0 if transient is None else _checks.count("transient", transient, 0),
+        steps=0 if steps is None else _checks.count("steps", steps, 1),
+        observe=1 if observe is None else _checks.count("observe", observe, 1),
         every=every,
-        outcomes=_outcomes(outcomes, every),
+        outcomes=kept_of_each,
         memory=_checks.number("memory", memory, positive=True, unit="bytes"),
+        at=times,
     )
     first, bits = _probe(task, grid)
     workers = Engine(engine, threads)
@@ -165,11 +195,11 @@ def sweep(
     return dataset
 
 
-def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any]) -> None:
+def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: tuple[str, ...]) -> None:
     """Raise if an argument is given twice or not at all, or a parameter is of nothing."""
     if both := [name for name, value in fixed.items() if value is not None and name in varied]:
         raise ArgumentError(f"{both[0]}: given twice, as an argument and in axes; leave one of them out")
-    if missing := [name for name in ("y", "dt") if fixed[name] is None and name not in varied]:
+    if missing := [name for name in needed if fixed[name] is None and name not in varied]:
         raise ArgumentError(f"{' and '.join(missing)}: expected as an argument or in axes")
     if isinstance(system, System):
         if of_system := sorted(varied - set(OF_THE_RUN)):
@@ -229,12 +259,13 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
     if chunk is not None:
         return min(_checks.count("chunk", chunk, 1), most)
     parts = CHUNKS_OF_A_WORKER * workers
-    return min(most, MAX_MEMBERS, max(MIN_MEMBERS, -(-grid.members // parts)))
+    largest = MAX_MEMBERS if task.at is None else MAX_ADAPTIVE_MEMBERS
+    return min(most, largest, max(MIN_MEMBERS, -(-grid.members // parts)))
 
 
 def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
     """Compute every chunk that is not finished, and keep what is found."""
-    done, tally = 0, _Tally(grid)
+    done, tally = 0, _Tally(grid, task)
     waiting = []
     for chunk in grid.chunks(kept.chunk_shape):
         if kept.finished(chunk):
@@ -264,8 +295,9 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
 class _Tally:
     """What there is to warn of."""
 
-    def __init__(self, grid: Grid) -> None:
-        self.grid, self.bad, self.members, self.first, self.step = grid, 0, 0, grid.members, -1
+    def __init__(self, grid: Grid, task: Task) -> None:
+        self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1
+        self.lost = self.status = 0
         self.doubts: dict[int, str] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
@@ -276,21 +308,32 @@ class _Tally:
             member = int(np.flatnonzero(status)[0])
             if chunk.first + member < self.first:
                 self.first, self.step = chunk.first + member, int(done.found["first_bad_step"].values[member])
+                self.status = int(status[member])
+        self.lost += done.lost
         if done.doubt is not None:
             self.doubts[chunk.first] = done.doubt
 
     def warn(self) -> None:
-        if self.bad:
+        if self.bad and self.task.at is not None:
             warnings.warn(
-                f"{self.bad} of {self.members} member(s) diverged; the first of them at {self.grid.place(self.first)}, at step "
-                f"{self.step}; status and first_bad_step tell which and when",
+                f"{self.bad} of {counted(self.members, 'member')} stopped before t = {self.task.at[-1]:g}, "
+                f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: {adaptive.why(self.status)}; status tells which and why",
+                ToleranceWarning,
+                stacklevel=4,
+            )
+        elif self.bad:
+            warnings.warn(
+                f"{self.bad} of {counted(self.members, 'member')} diverged, {'the first of them' if self.bad > 1 else 'that'} at "
+                f"{self.grid.place(self.first)}, at step {self.step}; status and first_bad_step tell which and when",
                 DivergenceWarning,
                 stacklevel=4,
             )
+        if self.lost:
+            warnings.warn(adaptive.LOST.format(lost=self.lost, members=self.members), ToleranceWarning, stacklevel=4)
         if self.doubts:
             chunk = min(self.doubts)
             warnings.warn(
-                f"in {len(self.doubts)} chunk(s), the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
+                f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
                 AccuracyWarning,
                 stacklevel=4,
             )

@@ -270,6 +270,8 @@ def called(name: Any, of: Of | None) -> str | None:
 class History(Outcome):
     """The states at intervals: ``v`` and ``y`` along the dimension ``t``; ``every`` of ``stepwell.sweep`` asks for it.
 
+    With a tolerance, those at the times of ``at``.
+
     Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
 
     Example:
@@ -312,8 +314,8 @@ class Function(Outcome):
     """What a function finds in the run of a chunk of members.
 
     It is called with a ``Run`` whose batch is the chunk, one axis of members, with the states after the transient that ``every``
-    asks for; without it, the last alone. A member may be in a chunk with any others, so what is found of one must not depend on
-    the others.
+    asks for; without it, the last alone; with a tolerance, those at the times of ``at``. A member may be in a chunk with any
+    others, so what is found of one must not depend on the others.
 
     Args:
         function: returns an array whose last axis is that of the members, or a dictionary of them by name; in place of an array,

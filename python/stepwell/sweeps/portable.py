@@ -74,6 +74,6 @@ def _task(package: bytes) -> Task:
     return task
 
 
-def run_packed(package: bytes, values: dict[str, Any], chunk: Chunk) -> tuple[Chunk, Done]:
-    """Compute a chunk of members in another process."""
+def sweep_chunk(package: bytes, values: dict[str, Any], chunk: Chunk) -> tuple[Chunk, Done]:
+    """Compute a chunk of members in another process. Dask shows chunks under this name."""
     return chunk, run(_task(package), values, chunk.members)

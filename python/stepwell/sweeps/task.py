@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
-from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, UnsupportedError
+from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integrate import integrate
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system
+from .adaptive import NUMBERS_OF_A_CONTROLLER, lost
 from .axes import OF_THE_RUN
 from .exponents import Exponents
 from .observed import Piece
@@ -47,6 +48,7 @@ class Task(NamedTuple):
         every: interval of the states of a history or of a function's run, in steps; None for the last alone.
         outcomes: what to keep.
         memory: how many bytes a chunk may take.
+        at: with a tolerance, the times whose states are observed, and all that are saved; None with fixed steps.
     """
 
     system: Any
@@ -58,6 +60,7 @@ class Task(NamedTuple):
     every: int | None
     outcomes: tuple[Outcome, ...]
     memory: float
+    at: Array | None = None
 
     def kinds(self, kind: type[Outcome]) -> list[Any]:
         """The outcomes of a kind."""
@@ -80,6 +83,9 @@ class Task(NamedTuple):
         state = prod(system.v_shape) + prod(system.y_shape)
         numbers = COPIES_OF_A_MEMBER * state + sum(each.numbers for each in self.outcomes)
         saved = 1 if self.every is None else self.steps // self.every + 2
+        if self.at is not None:
+            saved = self.at.size
+            numbers += NUMBERS_OF_A_CONTROLLER
         if self.kinds(History) or self.kinds(Function):
             numbers += 2 * saved * state
         for each in self.kinds(Exponents):
@@ -90,7 +96,9 @@ class Task(NamedTuple):
     def most_members(self, system: System) -> int:
         """How many members may be in a chunk, for its memory."""
         state = prod(system.v_shape) + prod(system.y_shape)
-        least = 0 if self.between is None else 3 * COPIES_OF_A_STATE * state  # two states of a piece, and the one before
+        least = (
+            0 if self.between is None and self.at is None else 3 * COPIES_OF_A_STATE * state
+        )  # two states of a piece, and the one before
         return int(self.memory / (8.0 * (self.numbers(system) + least)))
 
     def states_at_once(self, system: System, members: int) -> int:
@@ -106,10 +114,12 @@ class Done(NamedTuple):
     Attributes:
         found: results by name, values of shape (*own axes, members).
         doubt: a message if the numbers are finite and mean nothing, or None.
+        lost: how many members have an absolute tolerance so large that the motion is lost in it.
     """
 
     found: Found
     doubt: str | None
+    lost: int = 0
 
 
 def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
@@ -128,18 +138,22 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
         for each in _pieces(task, system, given, members, task.transient, None, stopped):
             start = _going_on(given, each)
         parts: list[Found] = []
-        if functions := task.kinds(Function):
-            whole = integrate(system, task.method, steps=task.steps, every=task.every, **start)
-            _as_many(whole, members)
-            parts += [each.of_run(whole) for each in functions]
-        last, reduced = _reduced(task, system, start, members, stopped)
-        parts += reduced
+        functions = task.kinds(Function)
+        if functions:
+            how: dict[str, Any] = {"steps": task.steps, "every": task.every} if task.at is None else {"at": task.at}
+            last = integrate(system, task.method, **how, **start)
+            _as_many(last, members)
+            parts += [each.of_run(last) for each in functions]
+        if task.reductions or not functions:
+            last, reduced = _reduced(task, system, start, members, stopped)
+            parts += reduced
         for each in task.kinds(Exponents):
             _stop(stopped)
             parts.append(each.of_start(system, task.method, given, task.transient, task.steps))
     status = Variable((), np.array(last.status), "how the member ended")
-    bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), "first step that was not finite, or −1")
-    return Done(together([*parts, {"status": status, "first_bad_step": bad}]), last.system.doubt(last.y))
+    about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
+    bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
+    return Done(together([*parts, {"status": status, "first_bad_step": bad}]), last.system.doubt(last.y), lost(last))
 
 
 def _reduced(
@@ -148,6 +162,12 @@ def _reduced(
     """The last piece of the run, and what the reductions found in it."""
     between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
     at, last = 0, None
+    if task.at is not None:
+        for last in _pieces_between_times(task, system, start, members, stopped):
+            for _, reduction in reductions:
+                reduction.see(Piece(last, 0))
+        assert last is not None
+        return last, [reduction.found() for _, reduction in reductions]
     for each in _pieces(task, system, start, members, task.steps, between, stopped):
         since = 0 if at == 0 else 1
         steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
@@ -208,9 +228,24 @@ def _pieces(
         yield made
 
 
+def _pieces_between_times(
+    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+) -> Iterator[Run]:
+    """A run with a tolerance in pieces, each of some of its times; its steps do not depend on them."""
+    assert task.at is not None
+    length = task.states_at_once(system, members)
+    going_on = start
+    for first in range(0, task.at.size, length):
+        _stop(stopped)
+        made = integrate(system, task.method, at=task.at[first : first + length], **going_on)
+        _as_many(made, members)
+        going_on = _going_on(start, made)
+        yield made
+
+
 def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
     """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
-    kept = {name: value for name, value in given.items() if name in ("threads", "backend")}
+    kept = {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
     return {**kept, **run.resume}
 
 
@@ -238,8 +273,14 @@ def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Arr
         system, given = made(task, values)
         for each in task.outcomes:
             each.check(system)
-        if task.kinds(History) and task.every is None:
+        if task.kinds(History) and task.every is None and task.at is None:
             raise UnsupportedError("every: expected how many steps are between the states of a history")
+        if task.at is not None:
+            few = min(PROBED_STEPS, given.get("max_steps", PROBED_STEPS))
+            begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
+            _as_many(begun, 1)
+            assert begun.stand is not None
+            return begun.system, (begun.stand.v, begun.stand.y)
         first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
         _as_many(first, 1)
     return first.system, (first.v[-1], first.y[-1])
@@ -267,6 +308,7 @@ def _quiet() -> Iterator[None]:
             _caught.__enter__()
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", AccuracyWarning)
+            warnings.simplefilter("ignore", ToleranceWarning)
     try:
         yield
     finally:

@@ -53,9 +53,11 @@ function showLimits() {
 
 // ---- the scene and its controls
 
+// Methods of one family have one colour: the second of them is that of letters.
 const colours = () => {
-  const { dark } = palette();
-  return page.keys.map((key) => colourOf(methods.get(key), dark));
+  const { dark, text } = palette();
+  const [a, b] = page.keys.map((key) => colourOf(methods.get(key), dark));
+  return [a, a === b && page.keys[0] !== page.keys[1] ? text : b];
 };
 
 // Load a scene by its name; its steps are unpacked when they are first needed.

@@ -1,0 +1,387 @@
+"""Sweeps with a tolerance: the bits of ``integrate(tolerance=)`` on every engine and in every division, and what is refused."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import warnings
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError
+from stepwell.sweeps import task
+from sweeping import AXES, duffing, ends, power, unlike
+
+METHODS = ("merson", "fehlberg", "fehlberg_5", "dop853", "taylor")
+GAMMA, Y0 = (values for _, values in AXES.values())
+AT = np.linspace(0.0, 6.0, 25)
+OUTCOMES = (
+    "last",
+    "extremes",
+    "mean",
+    "crossing",
+    "period",
+    "evaluations",
+    "history",
+    sw.sweeps.Extremes("energy"),
+    sw.sweeps.Mean(power),
+    ends,
+)
+
+
+def adaptive(**options: Any) -> Any:
+    """A sweep of 45 members with every outcome that goes with a tolerance."""
+    given: dict[str, Any] = {"v": 0.0, "tolerance": 1e-8, "at": AT, "outcomes": OUTCOMES} | options
+    axes, method = given.pop("axes", AXES), given.pop("method", "dop853")
+    return sw.sweep(partial(duffing, delta=0.2), axes, method, **given)
+
+
+def alike(method: str = "dop853", **options: Any) -> sw.Run:
+    """The same members by ``integrate``."""
+    given: dict[str, Any] = {"v": 0.0, "y": Y0, "tolerance": 1e-8, "at": AT} | options
+    return sw.integrate(duffing(delta=0.2, gamma=GAMMA[:, None]), method, **given)
+
+
+# ---- the bits of integrate
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_members_are_those_of_integrate(method: str) -> None:
+    found, run = adaptive(method=method, outcomes=["last", "history", "evaluations"], chunk=7, memory=20_000.0), alike(method)
+    assert run.paces is not None
+    np.testing.assert_array_equal(found.y, np.moveaxis(run.y, 0, -1))
+    np.testing.assert_array_equal(found.v, np.moveaxis(run.v, 0, -1))
+    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(found.v_last, run.v[-1])
+    np.testing.assert_array_equal(found.t, AT)
+    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
+    np.testing.assert_array_equal(found.accepted_steps, run.paces.accepted)
+    np.testing.assert_array_equal(found.rejected_steps, run.paces.rejected)
+    assert found.evaluations.dtype.kind == "i"
+    assert len(np.unique(found.evaluations)) > 1  # members have steps of their own
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tolerance": (1e-7, 1e-9)},
+        {"dt": 0.01},
+        {"fused": True},
+        {"t0": -1.0},
+        {"max_steps": 5000},
+        {"control": sw.Projection("energy")},
+    ],
+    ids=lambda options: next(iter(options)),
+)
+def test_arguments_are_those_of_integrate(options: dict[str, Any]) -> None:
+    found, run = adaptive(outcomes=["last", "evaluations"], chunk=10, memory=20_000.0, **options), alike(**options)
+    assert run.paces is not None
+    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
+
+
+@pytest.mark.parametrize("method", ["dop853", "taylor"])
+def test_a_tolerance_as_an_axis(method: str) -> None:
+    relative = np.array([1e-8, 1.2e-8, 1.5e-8]) if method == "taylor" else np.array([1e-4, 1e-8, 1e-12])
+    axes = {"y": ("y0", Y0), "tolerance": ("tolerance", relative)}
+    found = sw.sweep(
+        partial(duffing, delta=0.2), axes, method, v=0.0, at=6.0, outcomes=["last", "evaluations"], chunk=4, threads=2
+    )
+    run = sw.integrate(duffing(delta=0.2), method, v=0.0, y=Y0[:, None], tolerance=relative, at=[6.0])
+    assert run.paces is not None
+    np.testing.assert_array_equal(found.y_last, run.y[-1])
+    np.testing.assert_array_equal(found.evaluations, run.paces.evaluations)
+    np.testing.assert_array_equal(found.tolerance, relative)
+    assert "tolerance" not in found.attrs
+
+
+def test_blocks_with_axes_of_their_own() -> None:
+    scene = sw.scenes.figure_eight()
+    factor = np.array([0.98, 1.0, 1.02, 1.04])
+    axes = {"v": ("speed", scene.v[..., None] * factor)}
+    found = sw.sweep(scene.system, axes, "dop853", y=scene.y, tolerance=1e-10, at=[1.0, 2.0], outcomes="history", chunk=3)
+    run = sw.integrate(
+        scene.system, "dop853", v=scene.v[..., None] * factor, y=scene.y[..., None], tolerance=1e-10, at=[1.0, 2.0]
+    )
+    np.testing.assert_array_equal(found.y, np.moveaxis(run.y, -1, 0))
+
+
+# ---- what reductions see
+
+
+def test_reductions_see_the_states_at_the_times() -> None:
+    found, run = adaptive(chunk=7, memory=40_000.0), alike()
+    for name, values in {"v": run.v, "y": run.y, "energy": run.quantity("energy")}.items():
+        np.testing.assert_array_equal(found[f"{name}_min"], values.min(axis=0))
+        np.testing.assert_array_equal(found[f"{name}_max"], values.max(axis=0))
+    for name, values in {"y": run.y, "power": run.v * run.y}.items():
+        lengths = np.diff(AT)[:, None, None]
+        mean = (lengths / 2 * (values[1:] + values[:-1])).sum(axis=0) / (AT[-1] - AT[0])
+        # As many additions as times, of numbers of that size, on both sides.
+        np.testing.assert_allclose(found[f"{name}_mean"], mean, atol=2 * AT.size * 2**-53 * abs(values).max())
+    np.testing.assert_array_equal(found.twice, 2.0 * run.y[-1])
+
+
+def test_unequal_times() -> None:
+    """The mean of cos over [0, 2π/3]: each interval errs by its length cubed, times the largest |cos|, over 12."""
+    at = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 2.0 * np.pi / 3.0, 301)[1:]])
+    found = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes="mean")
+    end = 2.0 * np.pi / 3.0
+    bound = (np.diff(at) ** 3 / 12.0).sum() / end
+    off = abs(found.y_mean.values - np.sin(end) / end)
+    assert (off < bound + 1e-11).all()
+    # As if all intervals were as long as the first: far outside.
+    weights = np.full(at.size, 0.01)
+    assert abs((weights * np.cos(at)).sum() / end - np.sin(end) / end) > 100 * bound
+
+
+def test_crossings_and_periods_are_those_of_the_exact_motion() -> None:
+    """By a cubic through both states and their rates: (interval·ω)⁴/384 over the speed; the states err by far less."""
+    omega, h = np.array([1.0, 1.3, 1.7]), 0.1
+    at = h * np.arange(300)
+    found = sw.sweep(
+        sw.Oscillator, {"omega": omega}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes=["crossing", "period"], chunk=2
+    )
+    bound = 1.1 * (omega * h) ** 4 / 384 / omega + 1e-9
+    assert (abs(found.y_crossing.values - 1.5 * np.pi / omega) < bound).all()
+    n = found.y_passages.values - 1
+    assert (abs(found.y_period.values - 2 * np.pi / omega) < 2 * bound / n).all()
+
+
+# ---- the same bits everywhere
+
+
+@pytest.fixture(scope="module")
+def whole() -> Any:
+    return adaptive()
+
+
+@pytest.mark.parametrize(
+    "division",
+    [{"chunk": 1}, {"chunk": 2, "threads": 3}, {"chunk": 7}, {"memory": 20_000.0}, {"memory": 60_000.0, "chunk": 11}],
+    ids=str,
+)
+def test_every_division_gives_the_same_bits(whole: Any, division: dict[str, Any]) -> None:
+    found = adaptive(**division)
+    assert unlike(whole, found) == []
+    assert whole.attrs == found.attrs
+
+
+def in_pieces(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
+    """As if memory sufficed for so many states at once."""
+    monkeypatch.setattr(task.Task, "states_at_once", lambda *_: times)
+
+
+@pytest.mark.parametrize("times", [1, 2, 7, 24])
+def test_every_division_of_time_gives_the_same_bits(whole: Any, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_pieces(monkeypatch, times)
+    assert unlike(whole, adaptive(chunk=20)) == []
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_goes_on(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = adaptive(method=method)
+    in_pieces(monkeypatch, 3)
+    assert unlike(before, adaptive(method=method)) == []
+
+
+def test_little_memory_is_more_pieces() -> None:
+    """Of 45 members, whose states at 25 times take 18 kB, some at once."""
+    some = task.Task(duffing, "dop853", {}, 0, 0, 1, None, (sw.sweeps.Last(),), 150_000.0, AT)
+    system = duffing()
+    members = some.most_members(system)
+    assert 45 < members < 1000
+    assert 2 <= some.states_at_once(system, members) < AT.size < some.states_at_once(system, 5)
+
+
+def test_pieces_that_begin_anew_would_be_noticed(whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A piece that goes on from the last saved state, and not from where the members are, has other steps."""
+
+    def anew(given: dict[str, Any], run: sw.Run) -> dict[str, Any]:
+        return given | {"v": run.v[-1], "y": run.y[-1], "t0": float(run.t[-1])}
+
+    in_pieces(monkeypatch, 4)
+    monkeypatch.setattr(task, "_going_on", anew)
+    assert "y_last" in unlike(whole, adaptive())
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
+def test_every_engine_gives_the_same_bits(whole: Any) -> None:
+    import distributed
+
+    with ThreadPoolExecutor(3) as pool:
+        assert unlike(whole, adaptive(engine=pool, chunk=4)) == []
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert unlike(whole, adaptive(engine=pool, chunk=11)) == []
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        found = adaptive(engine=client, chunk=10)
+        assert unlike(whole, found) == []
+        assert found.attrs["bits"] == whole.attrs["bits"]
+
+
+@pytest.mark.parametrize("ending", ["zarr", "nc"])
+def test_a_store_goes_on_and_refuses_another_tolerance(whole: Any, ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{ending}"
+    for _ in range(2):
+        with adaptive(store=path, chunk=10) as found:
+            assert unlike(whole, found) == []
+            assert (found.attrs["tolerance"], found.attrs["end"]) == (1e-8, 6.0)
+    for other in ({"tolerance": 1e-9}, {"tolerance": (1e-8, 1e-12)}, {"at": AT[1:]}, {"max_steps": 77}):
+        with pytest.raises(ArgumentError, match="store: "):
+            adaptive(store=path, chunk=10, **other)
+    with adaptive(store=tmp_path / f"b.{ending}", tolerance=(1e-8, 1e-12)) as found:
+        assert found.attrs["tolerance"] == "(1e-08, 1e-12)"
+
+
+# ---- members that stop
+
+
+@sw.system(order=1)
+def explosion(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
+    """ẏ = rate·y²: from y = 1 it is 1/(1 − rate·t), and ends at t = 1/rate."""
+    return rate * y * y
+
+
+def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    rate = np.array([0.1, 0.8, 0.2, 2.0, 0.3])
+    at = np.linspace(0.0, 3.0, 31)
+    given: dict[str, Any] = {"y": 1.0, "tolerance": 1e-9, "at": at}
+    with pytest.warns(sw.ToleranceWarning):
+        run = sw.integrate(explosion(rate=rate), "dop853", **given)
+    message = r"2 of 5 member\(s\) stopped before t = 3; the first of them at rate = 0.8: (the step that|no step)"
+    results = []
+    for options, times in (({}, 31), ({"chunk": 2}, 31), ({"chunk": 3}, 4)):
+        in_pieces(monkeypatch, times)
+        with pytest.warns(sw.ToleranceWarning, match=message) as caught:
+            found = sw.sweep(
+                explosion, {"rate": rate}, "dop853", outcomes=["last", "history", "extremes", "evaluations"], **given, **options
+            )
+        assert len(caught) == 1
+        assert caught[0].filename == __file__
+        np.testing.assert_array_equal(found.y, run.y.T)
+        np.testing.assert_array_equal(found.status, run.status)
+        np.testing.assert_array_equal(found.first_bad_step, run.first_bad_step)
+        results.append(found)
+    assert (results[0].status.values > 0).tolist() == [False, True, False, True, False]
+    assert all(unlike(results[0], each) == [] for each in results[1:])
+    assert np.isnan(results[0].y_max[1])
+    # By the closed form; a step errs by 1e-9 of y, and an error of y grows as y².
+    np.testing.assert_allclose(results[0].y_last[[0, 2, 4]], 1.0 / (1.0 - 3.0 * rate[[0, 2, 4]]), rtol=1e-6)
+
+
+def test_a_budget_is_that_of_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many pieces there are."""
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 200}
+    omega = np.array([0.5, 1.0, 20.0])
+    with pytest.warns(sw.ToleranceWarning):
+        run = sw.integrate(sw.Oscillator(omega), "dop853", **given)
+    for times in (41, 3):
+        in_pieces(monkeypatch, times)
+        with pytest.warns(sw.ToleranceWarning, match=r"the first of them at omega = 20: out of max_steps; status tells"):
+            found = sw.sweep(sw.Oscillator, {"omega": omega}, "dop853", outcomes=["history", "last"], **given)
+        np.testing.assert_array_equal(found.status, run.status)
+        np.testing.assert_array_equal(found.y, run.y.T)
+    assert run.status[-1] == sw.Status.BUDGET
+
+
+def test_motion_that_is_lost_in_an_absolute_tolerance_is_told() -> None:
+    given: dict[str, Any] = {"v": 0.0, "tolerance": (1e-9, 1e-3), "at": [1.0]}
+    with pytest.warns(sw.ToleranceWarning, match=r"tolerance: for 1 of 2 member\(s\) the absolute part lets a step err"):
+        sw.sweep(sw.Oscillator(), {"y": [1.0, 1e-3]}, "dop853", **given)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.sweep(sw.Oscillator(), {"y": [1.0, 2.0]}, "dop853", **given)
+
+
+# ---- what is refused
+
+
+GOOD: dict[str, Any] = {
+    "system": sw.Oscillator,
+    "axes": {"omega": [1.0, 2.0]},
+    "method": "dop853",
+    "v": 0.0,
+    "y": 1.0,
+    "tolerance": 1e-9,
+    "at": [1.0, 2.0],
+}
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "steps": ({"steps": 10}, "steps: goes with fixed steps only, and tolerance= or at= was given"),
+    "a transient": ({"transient": 0}, "transient: goes with fixed steps only"),
+    "an interval": ({"every": 2, "outcomes": "history"}, "every: goes with fixed steps only"),
+    "an interval of reductions": ({"observe": 2}, "observe: goes with fixed steps only"),
+    "a start": ({"start": "first_order"}, "start: goes with fixed steps only"),
+    "a force": ({"force": 1.0}, "force: goes with fixed steps only"),
+    "forces": ({"axes": {"force": [1.0, 2.0]}}, "axes: force: goes with fixed steps only"),
+    "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
+    "no times": ({"at": None}, "at: expected too, since the other was given"),
+    "times alone": ({"tolerance": None}, "tolerance: expected too, since the other was given"),
+    "an axis without times": ({"tolerance": None, "at": None, "axes": {"tolerance": [1e-6, 1e-9]}}, "at: expected too"),
+    "a list": ({"tolerance": [1e-6, 1e-9]}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
+    "three": ({"tolerance": (1e-6, 1e-9, 1.0)}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
+    "an array": ({"tolerance": np.array([1e-6, 1e-9])}, "if it varies, it is an axis"),
+    "none tolerated": ({"tolerance": 0.0}, "tolerance: expected"),
+    "a tolerance that is none": ({"tolerance": "small"}, "tolerance: expected real numbers"),
+    "twice": ({"axes": {"tolerance": [1e-6, 1e-9]}}, "tolerance: given twice, as an argument and in axes"),
+    "a pair for each": (
+        {"tolerance": None, "axes": {"tolerance": ("run", [[1e-6, 1e-9], [1e-6, 1e-9]])}},
+        "axes: tolerance: expected one number for each member, got shape (2, 2)",
+    ),
+    "a tolerance below zero": ({"tolerance": None, "axes": {"tolerance": [1e-6, -1.0]}}, "axes: tolerance: expected"),
+    "times that fall": ({"at": [2.0, 1.0]}, "at: expected times that ascend"),
+    "times as a table": ({"at": [[1.0, 2.0]]}, "at: expected times along one axis"),
+    "no step budget": ({"max_steps": 0}, "max_steps: expected 1 or more"),
+    "one time for an extreme": (
+        {"at": 1.0, "outcomes": "extremes"},
+        "at: expected two or more times, since with a tolerance Ext",
+    ),
+    "one time for a mean": ({"at": [1.0], "outcomes": ["last", "mean"]}, "since with a tolerance Mean sees the states at these"),
+    "Lyapunov exponents": ({"outcomes": "lyapunov"}, "outcomes: Exponents: Lyapunov exponents are those of fixed steps"),
+    "a method without an estimate": ({"method": "rk4"}, "tolerance: rk4 does not estimate its error"),
+    "a series of two orders": (
+        {"method": "taylor", "tolerance": None, "axes": {"tolerance": [1e-6, 1e-12]}},
+        "tolerance: expected tolerances of one order for all members",
+    ),
+    "evaluations of fixed steps": (
+        {"tolerance": None, "at": None, "dt": 0.1, "steps": 10, "outcomes": "evaluations"},
+        "outcomes: Evaluations: with fixed steps every member has the same number",
+    ),
+    "a budget of fixed steps": ({"tolerance": None, "at": None, "dt": 0.1, "steps": 9, "max_steps": 9}, "max_steps: goes with"),
+    "nothing of either": ({"tolerance": None, "at": None, "dt": 0.1}, "steps: expected with fixed steps; or give tolerance="),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_refused(what: str) -> None:
+    wrong, message = REFUSED[what]
+    with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
+        sw.sweep(**(GOOD | wrong))
+
+
+def test_a_history_needs_no_interval() -> None:
+    assert sw.sweep(**GOOD, outcomes="history").y.dims == ("omega", "t")
+
+
+def test_memory_is_bounded() -> None:
+    """The states at all times would be 32 MB."""
+    import tracemalloc
+
+    members, memory = 500, 2 * 2**20
+    given: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "outcomes": ["extremes", "mean"], "threads": 1}
+    axes, at = {"omega": np.linspace(0.5, 2.0, members)}, np.linspace(0.0, 20.0, 4000)
+    sw.sweep(sw.Oscillator, axes, "dop853", at=at[:2], **given)  # imports
+    tracemalloc.start()
+    try:
+        sw.sweep(sw.Oscillator, axes, "dop853", at=at, memory=memory, **given)
+        # Results are 8 numbers a member, axes, times and coordinates a few more; some hundred kilobytes are Python's own.
+        assert tracemalloc.get_traced_memory()[1] < memory + 8 * 30 * (members + at.size) + 2**19
+    finally:
+        tracemalloc.stop()
