@@ -234,7 +234,7 @@ impl Case {
     }
 }
 
-/// Of each kept state the numbers that the kept states of a run with `every` have.
+/// Of the numbers of all saved states those that a run with `every` saves.
 fn thinned(all: &[u64], width: usize, steps: i64, every: Option<i64>) -> Vec<u64> {
     let kept = kept(steps, every);
     (0..kept).flat_map(|i| all[save(steps, every, i) as usize * width..][..width].to_vec()).collect()
