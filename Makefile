@@ -16,7 +16,7 @@ LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs"
 WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels wheel wheels release dev bench lint rust-test python-test format clean
+.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench lint rust-test python-test format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -76,6 +76,16 @@ python-test: .venv/test
 test-long: .venv/test ## run what `test` leaves out for its time: every family of tests in full
 	$(PYTEST) -m long --durations=20
 	STEPWELL_EMULATED=12000 cargo test --release -p stepwell-core --test aarch64 --quiet
+
+# Each part is tried for a while, and says how often it was and what was found: docs/developing/reliability.md.
+CAMPAIGN_SECONDS ?= 600
+campaign: .venv/test ## look for faults: fuzzed calls for CAMPAIGN_SECONDS, random systems, memory, threads, processes
+	mkdir -p $(OUT)
+	cd tests && ../$(BIN)/python -m campaign.fuzz --seconds $(CAMPAIGN_SECONDS) --seed $$(date +%s) --report $(abspath $(OUT))/campaign.json
+	STEPWELL_FUZZ=2000000 cargo test --release -p stepwell-core --test kernels --test random_systems -- --nocapture random packed trail
+	cd tests && ../$(BIN)/python -m campaign.memory --runs 100000
+	cd tests && ../$(BIN)/python -m campaign.threads --seconds 60
+	cd tests && ../$(BIN)/python -m campaign.processes --times 100
 
 format: .venv/test ## format Rust and Python
 	cargo fmt --all

@@ -61,7 +61,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         value = shared(argument, value)
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, RecursionError, UserWarning) as error:  # a warning is of masked numbers in a list
         raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
     if type(value) is not np.ndarray and (masked := _masked(value)):
         raise ArgumentError(f"{argument}: expected numbers{_in(unit)}, got a masked array in which {masked} are masked")
@@ -153,7 +153,10 @@ def several(argument: str, value: Any, what: str) -> list[Any]:
     """Return a list of what is given several of; a text is not the list of its letters."""
     if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
         raise DTypeError(f"{argument}: expected a list of {what}, got {short(value)} ({type(value).__name__})")
-    return list(value)
+    try:
+        return list(value)
+    except NotImplementedError:  # a memoryview of several axes is iterable, and does not iterate
+        raise DTypeError(f"{argument}: expected a list of {what}, got a {type(value).__name__} of several axes") from None
 
 
 def callback(argument: str, value: Any) -> Any:

@@ -22,6 +22,7 @@ __all__ = [
     "catalogue",
     "check",
     "compiled",
+    "forget",
     "in_parts",
     "isa",
     "isa_levels",
@@ -246,6 +247,9 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
 
 def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
     """To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series."""
+
+def forget() -> None:
+    """Begin with new caches of tapes and machine code: what another thread holds at a fork is never released in the child."""
 
 def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, list[int], float]], list[int]]:
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.

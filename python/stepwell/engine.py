@@ -6,6 +6,8 @@ above this file works with states, everything below with slots.
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import count
@@ -26,6 +28,15 @@ from .systems.base import flat, rows
 
 if TYPE_CHECKING:
     from .reference.adaptive import Pace
+
+if hasattr(os, "register_at_fork"):
+    #: Whether there was another thread when the process forked: what it was compiling or had locked stays so in the child.
+    _others: list[bool] = []
+    os.register_at_fork(
+        before=lambda: _others.append(threading.active_count() > 1),
+        after_in_parent=lambda: _others.clear(),
+        after_in_child=lambda: _core.forget() if _others.pop() else None,
+    )
 
 Looped = tuple[Array, Array, Blocks, Whole]
 

@@ -54,7 +54,7 @@ class UnsupportedError(StepwellError, ValueError):
 
 
 class BusyError(StepwellError, RuntimeError):
-    """A thread called ``World.step`` while another thread steps the same world."""
+    """Another thread is stepping the same world, or a world over the same arrays."""
 
 
 class FixedError(StepwellError, AttributeError):

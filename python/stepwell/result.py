@@ -211,7 +211,7 @@ class Run(Value):
             UnknownNameError: if the system has none of that name.
         """
         v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
-        _checks.known("name", name, ("energy", *self.system.quantities))
+        name = _checks.known("name", name, ("energy", *self.system.quantities))
         with np.errstate(all="ignore"):
             values = self.system.recordable(name, v, y, self.dt)
         return np.moveaxis(values, values.ndim - (v.ndim - len(self.system.v_shape)), 0)

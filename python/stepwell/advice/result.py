@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import _checks
+from .. import _checks, _files
 from .._brief import one_line, table
 from .._checks import Array
 from ..charts.data import finite
@@ -234,7 +234,7 @@ class Advice:
         """The text of ``data()`` in JSON; also written to a file if one is given."""
         text = json.dumps(self.data(), ensure_ascii=False, indent=1)
         if path is not None:
-            _checks.file("path", path).write_text(text + "\n", encoding="utf-8")
+            _files.write_text(_checks.file("path", path), text + "\n")
         return text
 
     @property

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._checks import file, known
+from .._files import replaced, write_text
 from .._value import Value
 from ..methods import Method
 from ..scenes import Scene
@@ -315,13 +316,13 @@ class WorkPrecision(Drawn, Value):
 
     def to_json(self, path: str | Path) -> None:
         """Write ``as_dict()``; what is not finite is null."""
-        file("path", path).write_text(json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        write_text(file("path", path), json.dumps(finite(self.as_dict()), ensure_ascii=False, indent=1) + "\n")
 
 
 def rows_to_csv(rows: list[dict[str, Any]], path: str | Path) -> None:
     """Write rows that share their columns."""
     columns = max(rows, key=len)
-    with file("path", path).open("w", newline="", encoding="utf-8") as out:
+    with replaced(file("path", path)) as out:
         writer = csv.DictWriter(out, list(columns), restval="", lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)

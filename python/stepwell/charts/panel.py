@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import _checks
+from .. import _checks, _files
 from .._checks import known
 from .._value import Value
 from ..errors import ArgumentError
@@ -66,7 +66,7 @@ class Panel(Drawn, Value):
     def to_json(self, path: str | Path) -> None:
         """Write what each chart writes, as a list; what is not finite is null."""
         whole = [chart.as_dict() for chart in self.charts]
-        _checks.file("path", path).write_text(json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        _files.write_text(_checks.file("path", path), json.dumps(finite(whole), ensure_ascii=False, indent=1) + "\n")
 
 
 def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] | None = None, **options: Any) -> Panel:

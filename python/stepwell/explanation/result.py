@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from .. import _checks
+from .. import _checks, _files
 from .._value import Value
 from ..methods import Method
 from ..systems import System
@@ -284,7 +284,7 @@ class Explanation(Value):
     def to_json(self, path: str | Path) -> None:
         """Write ``as_dict()``."""
         text = json.dumps(self.as_dict(), ensure_ascii=False, indent=1) + "\n"
-        _checks.file("path", path).write_text(text, encoding="utf-8")
+        _files.write_text(_checks.file("path", path), text)
 
     def _repr_html_(self) -> str:
         """The same as tables."""

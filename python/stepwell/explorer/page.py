@@ -14,7 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from .. import _checks, _core
+from .. import _checks, _core, _files
 from .._value import Value
 from ..errors import ArgumentError
 from ..methods import Method
@@ -138,7 +138,7 @@ class Explorer(Value):
             ArgumentError: if it has another ending or cannot be written.
         """
         place = _checks.file("path", path, (".html", ".htm"))
-        place.write_text(self.html, encoding="utf-8", newline="\n")
+        _files.write_text(place, self.html)
         return place
 
     def open(self) -> Path:

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from .. import _checks
+from .. import _checks, _files
 from .._checks import Shape
 from .._value import Value
 from ..methods import Method
@@ -60,7 +60,7 @@ class ExportedStep(Value):
             ArgumentError: if it has another ending or cannot be written.
         """
         place = _checks.file("path", path, self.endings)
-        place.write_text(self.source, encoding="utf-8", newline="\n")
+        _files.write_text(place, self.source)
         return place
 
     def as_dict(self) -> dict[str, Any]:

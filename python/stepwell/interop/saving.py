@@ -126,7 +126,8 @@ def _no_run(place: Path, why: object) -> ArgumentError:
 
 def _from_npz(place: Path) -> tuple[Arrays, str]:
     try:
-        with np.load(place, allow_pickle=False) as file:
+        # Opened here: of a file that is damaged NumPy leaves open what it opened itself.
+        with place.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
     except Exception as error:  # what NumPy and zipfile raise of a damaged file is of many kinds
         raise _no_run(place, getattr(error, "strerror", None) or error) from None

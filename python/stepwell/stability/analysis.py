@@ -110,9 +110,10 @@ class Analysis(Value):
         z, exact, tolerances, single_vector = (
             np.take_along_axis(a, by_size, axis=0) for a in (z, exact, tolerances, single_vector)
         )
-        self.polynomial = _polynomial(P, z)
-        self.p: Any = _plain(0.5 * (P[0, 0] + P[1, 1])) if n == 2 else None
-        self.q: Any = _plain(P[0, 0] * P[1, 1] - P[0, 1] * P[1, 0]) if n == 2 else None
+        with np.errstate(over="ignore", invalid="ignore"):  # steps so long that products of elements leave the range
+            self.polynomial = _polynomial(P, z)
+            self.p: Any = _plain(0.5 * (P[0, 0] + P[1, 1])) if n == 2 else None
+            self.q: Any = _plain(P[0, 0] * P[1, 1] - P[0, 1] * P[1, 0]) if n == 2 else None
         self.eigenvalues = z
         self.rates = exact
         self.radius = _plain(np.abs(z[0]))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, _files
 from .._brief import MAX_LINE, shortened, table
 from .._value import by_value
 from ..errors import ArgumentError
@@ -118,7 +118,7 @@ class Criteria(tuple[Criterion, ...]):
 
     def to_json(self, path: str | Path) -> None:
         """Write ``rows()``."""
-        _checks.file("path", path).write_text(json.dumps(self.rows(), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+        _files.write_text(_checks.file("path", path), json.dumps(self.rows(), ensure_ascii=False, indent=1) + "\n")
 
     def table(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of texts, for a page or a screen. Heads that end in ``>`` are of numbers."""

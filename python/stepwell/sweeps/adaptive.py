@@ -151,6 +151,6 @@ def why(status: int) -> str:
 
 #: What is told of members that are lost in the absolute tolerance.
 LOST = (
-    f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the longest "
-    f"that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
+    f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the "
+    f"longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
 )

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..errors import ArgumentError
+from ..errors import ArgumentError, TooLargeError
 from .axes import Chunk
 from .extras import need
 from .layout import Layout, Planned, along_dims, hash_of_all, hash_of_chunk
@@ -184,11 +184,23 @@ class NetCDF(Zarr):
             part = self.file.with_name(f".{self.file.name}.new")
             # Chunk after chunk, by Dask, so that it need not fit in memory.
             with opened(self.path, chunks={}) as dataset:
+                _room(self.file, dataset.nbytes)  # HDF5 may crash where a file cannot grow
                 dataset.drop_encoding().to_netcdf(part, engine="h5netcdf")
             os.replace(part, self.file)
         if self.path.exists():
             shutil.rmtree(self.path)
         return xarray.open_dataset(self.file, engine="h5netcdf")
+
+
+def _room(path: Path, needed: int) -> None:
+    """Raise unless the disk of a path has so many bytes left."""
+    free = shutil.disk_usage(path.parent).free
+    if needed > free:
+        raise TooLargeError(
+            f"store: {_checks.short(str(path), _checks.PATH)} needs {needed / 2**20:.3g} MiB, but its disk has "
+            f"{free / 2**20:.3g} MiB left; what is done so far is kept beside it: make room and call again, or take a path that "
+            f"ends in .zarr"
+        )
 
 
 def opened(path: Path, chunks: Any = None) -> Any:

@@ -3,7 +3,10 @@
 use std::{
     collections::HashMap,
     hash::Hash,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{
+        Arc, Mutex, OnceLock, PoisonError,
+        atomic::{AtomicUsize, Ordering::Relaxed},
+    },
 };
 
 use crate::{
@@ -440,8 +443,8 @@ const MAX_SERIES_OPERATIONS: usize = 100_000;
 impl Scene {
     /// What is known of it, or was found before.
     pub fn traced(&self) -> Result<Arc<Traced>, Error> {
-        static CACHE: OnceLock<Mutex<Cache<Scene, Traced>>> = OnceLock::new();
-        Cache::find(CACHE.get_or_init(Mutex::default), self, || {
+        static CACHE: OnceLock<Generation<Scene, Traced>> = OnceLock::new();
+        Cache::find(CACHE.get_or_init(Generation::default).now(), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
             let series = has_series(&self.how)?;
@@ -583,11 +586,40 @@ const MAX_CACHED_OPERATIONS: usize = 200_000;
 
 /// The cache of rates, by the system and its recorded quantities; all methods share it.
 fn rated() -> &'static Mutex<RatedCache> {
-    static CACHE: OnceLock<Mutex<RatedCache>> = OnceLock::new();
-    CACHE.get_or_init(Mutex::default)
+    static CACHE: OnceLock<Generation<(Given, Vec<String>), Rated>> = OnceLock::new();
+    CACHE.get_or_init(Generation::default).now()
 }
 
 type RatedCache = Cache<(Given, Vec<String>), Rated>;
+
+/// How often this process, or one that it descends from, began with new caches.
+static GENERATION: AtomicUsize = AtomicUsize::new(0);
+
+/// Begins with new caches. For a forked child of a process in which other threads were at work: what they had locked, or were compiling just
+/// then, is never released, and the child would wait for it for ever.
+pub fn forget() {
+    GENERATION.fetch_add(1, Relaxed);
+}
+
+/// A cache, and those of later generations. The former ones stay as they are: what they hold may be locked.
+struct Generation<K, V> {
+    cache: Mutex<Cache<K, V>>,
+    next: OnceLock<Box<Generation<K, V>>>,
+}
+
+impl<K, V> Default for Generation<K, V> {
+    fn default() -> Self {
+        Generation { cache: Mutex::default(), next: OnceLock::new() }
+    }
+}
+
+impl<K, V> Generation<K, V> {
+    /// The cache of now.
+    fn now(&self) -> &Mutex<Cache<K, V>> {
+        let of = (0..GENERATION.load(Relaxed)).fold(self, |of, _| of.next.get_or_init(Box::default));
+        &of.cache
+    }
+}
 
 struct Cache<K, V> {
     known: HashMap<K, Arc<V>>,

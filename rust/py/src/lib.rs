@@ -5,8 +5,8 @@ mod tape;
 mod world;
 
 use numpy::{
-    PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2,
-    PyReadwriteArrayDyn, ndarray::Dimension,
+    PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
+    PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
@@ -27,7 +27,7 @@ use stepwell_core::{
     },
 };
 
-use model::{ModelSpec, by_row, core_error};
+use model::{ModelSpec, by_row, core_error, readable};
 use tape::{Operation, operation};
 
 /// Everything that a method says of itself.
@@ -102,8 +102,8 @@ struct PlanOf {
 /// What a run begins with and what it fills: see `Arrays` in `engine.py`.
 #[derive(FromPyObject)]
 struct ArraysOf<'py> {
-    v: PyReadonlyArray2<'py, f64>,
-    y: PyReadonlyArray2<'py, f64>,
+    v: Bound<'py, PyArray2<f64>>,
+    y: Bound<'py, PyArray2<f64>>,
     carried: bool,
     saved_v: PyReadwriteArrayDyn<'py, f64>,
     saved_y: PyReadwriteArrayDyn<'py, f64>,
@@ -117,8 +117,8 @@ struct ArraysOf<'py> {
 /// some member diverged, now or before.
 #[pyfunction]
 fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
-    let rows = model.rows(py)?;
-    let tables = model.tables(py)?;
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
     let plan_of_core = Plan {
         model: model.model(model.started(plan.choice), &rows, &tables)?,
         clock: Clock { t0: plan.t0, h: plan.dt },
@@ -126,8 +126,8 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
         first: plan.first,
         steps: plan.steps,
         every: plan.every,
-        v: by_row(&arrays.v)?,
-        y: by_row(&arrays.y)?,
+        v: by_row(&v)?,
+        y: by_row(&y)?,
         members: arrays.first_bad.as_array().len(),
         carried: arrays.carried,
     };
@@ -177,8 +177,8 @@ struct PacingOf<'py> {
 /// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `engine.py`.
 #[derive(FromPyObject)]
 struct AdaptiveArraysOf<'py> {
-    v: PyReadonlyArray2<'py, f64>,
-    y: PyReadonlyArray2<'py, f64>,
+    v: Bound<'py, PyArray2<f64>>,
+    y: Bound<'py, PyArray2<f64>>,
     paces: PyReadonlyArray2<'py, f64>,
     saved_v: PyReadwriteArrayDyn<'py, f64>,
     saved_y: PyReadwriteArrayDyn<'py, f64>,
@@ -191,8 +191,8 @@ struct AdaptiveArraysOf<'py> {
 /// see `chosen::run`.
 #[pyfunction]
 fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<bool> {
-    let rows = model.rows(py)?;
-    let tables = model.tables(py)?;
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
@@ -200,8 +200,8 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         paces: by_row(&arrays.paces)?,
         begins: pacing.begins,
         budget: pacing.budget,
-        v: by_row(&arrays.v)?,
-        y: by_row(&arrays.y)?,
+        v: by_row(&v)?,
+        y: by_row(&y)?,
         members: arrays.status.as_array().len(),
     };
     let to_fill = chosen::Arrays {
@@ -404,6 +404,12 @@ fn in_parts(
     model.model(how, &rows, &tables)?.in_parts(Machine { level, threads: 1 }, members, attempts).map_err(core_error)
 }
 
+/// Begins with new caches: see `stepwell_core::trace::forget`.
+#[pyfunction]
+fn forget() {
+    stepwell_core::trace::forget();
+}
+
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -420,6 +426,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
+    m.add_function(wrap_pyfunction!(forget, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;

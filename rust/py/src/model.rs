@@ -33,6 +33,20 @@ pub fn error_of(name: &str, message: String) -> PyErr {
     }
 }
 
+/// Of an array that another thread uses just now, whatever NumPy's words are.
+pub fn in_use<E>(_: E) -> PyErr {
+    error_of(
+        "BusyError",
+        "an array is being stepped by a world in another thread; give a copy of it, or let one thread at a time use it"
+            .to_owned(),
+    )
+}
+
+/// Borrows an array of a user.
+pub fn readable<'py>(array: &Bound<'py, PyArray2<f64>>) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    array.try_readonly().map_err(in_use)
+}
+
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
     let name = match error {
@@ -178,12 +192,12 @@ impl ModelSpec {
 impl ModelSpec {
     /// Borrows the parameters.
     pub fn rows<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
-        self.rows.iter().map(|r| Ok(r.bind(py).try_readonly()?)).collect()
+        self.rows.iter().map(|r| readable(r.bind(py))).collect()
     }
 
     /// Borrows the tables.
     pub fn tables<'py>(&self, py: Python<'py>) -> PyResult<Tables<'py>> {
-        self.tables.iter().map(|(start, interval, t)| Ok((*start, *interval, t.bind(py).try_readonly()?))).collect()
+        self.tables.iter().map(|(start, interval, t)| Ok((*start, *interval, readable(t.bind(py))?))).collect()
     }
 
     /// Steps of fixed length, by a method that is started in its `choice`-th way.

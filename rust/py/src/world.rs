@@ -14,7 +14,7 @@ use stepwell_core::{
 
 use crate::{
     interruptible,
-    model::{ModelSpec, argument_error, core_error, error_of},
+    model::{ModelSpec, argument_error, core_error, error_of, in_use},
 };
 
 /// How the arrays are reached.
@@ -38,7 +38,7 @@ impl Arrays {
                 result
             }
             Arrays::Many { v, y } => {
-                let (mut v, mut y) = (v.bind(py).try_readwrite()?, y.bind(py).try_readwrite()?);
+                let (mut v, mut y) = (v.bind(py).try_readwrite().map_err(in_use)?, y.bind(py).try_readwrite().map_err(in_use)?);
                 act(v.as_slice_mut()?, y.as_slice_mut()?)
             }
         }
@@ -69,7 +69,7 @@ impl ForceArray {
                 buffer.copy_to_slice(py, copy)?;
                 world.set_force(copy);
             }
-            ForceArray::Many(array) => world.set_force(array.bind(py).try_readonly()?.as_slice()?),
+            ForceArray::Many(array) => world.set_force(array.bind(py).try_readonly().map_err(in_use)?.as_slice()?),
         }
         Ok(())
     }
@@ -152,7 +152,7 @@ impl World {
         let model = model.model(model.started(choice), &rows, &tables)?;
         let mut world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
         let sizes = world.sizes();
-        let (mut v_now, mut y_now) = (v.bind(py).try_readwrite()?, y.bind(py).try_readwrite()?);
+        let (mut v_now, mut y_now) = (v.bind(py).try_readwrite().map_err(in_use)?, y.bind(py).try_readwrite().map_err(in_use)?);
         let (v_now, y_now) = (v_now.as_slice_mut()?, y_now.as_slice_mut()?);
         if (v_now.len(), y_now.len()) != sizes {
             return Err(argument_error("v and y must be of the system's shape".to_owned()));

@@ -372,6 +372,7 @@ impl Job<'_, '_> {
         self.unfinish();
         if diverged {
             self.retrace(k);
+            self.note_velocities(k);
         }
     }
 
@@ -460,19 +461,19 @@ impl Job<'_, '_> {
     fn retrace(&mut self, k: i64) {
         let steps = k - self.checked;
         if steps == 1 {
-            self.note(k);
-            self.finish(k);
-            if self.carries {
-                self.note(k);
+            // Where rates are not finite of a state that is, as a root of a negative number, the velocity is not finite one step before the
+            // carry.
+            if self.carries && self.checked > self.plan.first {
+                self.go_back();
+                self.note_velocities(self.checked);
+                self.group.advance(self.checked, 1);
             }
-            self.unfinish();
+            self.note(k);
+            self.note_velocities(k);
             return self.remember(k);
         }
         // Back to the last check, and on in shorter pieces.
-        let (v, y) = self.group.slots_mut();
-        v.copy_from_slice(&self.good.v);
-        y.copy_from_slice(&self.good.y);
-        self.group.tally_mut().copy_from_slice(&self.good.tally);
+        self.go_back();
         let piece = (steps as u64).div_ceil(RETRACE_INTERVALS as u64) as i64;
         let mut at = self.checked;
         while at < k {
@@ -480,6 +481,24 @@ impl Job<'_, '_> {
             self.group.advance(at, n);
             at += n;
             self.check(at);
+        }
+    }
+
+    /// Back to the state that is kept.
+    fn go_back(&mut self) {
+        let (v, y) = self.group.slots_mut();
+        v.copy_from_slice(&self.good.v);
+        y.copy_from_slice(&self.good.y);
+        self.group.tally_mut().copy_from_slice(&self.good.tally);
+    }
+
+    /// Notes the members with a velocity that is not finite after step `k`, in whose state the group is, if it is computed from a carry.
+    /// Of the state at the start nothing is said: no step has been made.
+    fn note_velocities(&mut self, k: i64) {
+        if self.carries && k > self.plan.first {
+            self.finish(k);
+            self.note(k);
+            self.unfinish();
         }
     }
 
