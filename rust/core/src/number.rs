@@ -9,7 +9,10 @@ use std::{
 
 pub use stepwell_base::number::Number;
 
-use crate::tape::{Id, Op, Tape};
+use crate::{
+    real::Precision,
+    tape::{Id, Op, Tape},
+};
 
 thread_local! {
     /// The tape that symbols of this thread write to.
@@ -105,15 +108,19 @@ impl Not for SymbolTruth {
     }
 }
 
+/// A constant of bits, as [`Precision::pattern`] has it.
 fn bits(bits: u64) -> Id {
-    write(Op::Const(bits))
+    TAPE.with_borrow_mut(|tape| tape.bits_of(bits))
 }
 
 impl Number for Symbol {
     type Truth = SymbolTruth;
 
+    fn is_single() -> bool {
+        TAPE.with_borrow(|tape| tape.precision()) == Precision::Single
+    }
     fn of(x: f64) -> Symbol {
-        Symbol(bits(x.to_bits()))
+        Symbol(TAPE.with_borrow_mut(|tape| tape.constant(x)))
     }
     fn sqrt(self) -> Symbol {
         Symbol::new(Op::Sqrt(self.0))

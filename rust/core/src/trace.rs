@@ -16,6 +16,7 @@ use crate::{
     number::{Number, Symbol, record},
     pace::{Attempted, Pace, Stretched, attempt},
     program::Program,
+    real::{Precision, Real},
     run::stage::Stage,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
@@ -56,21 +57,23 @@ pub struct Scene {
     pub record: Vec<String>,
     /// Whether steps are computed with fused multiply-adds: see [`fuse`]. Recorded quantities are not.
     pub fused: bool,
+    /// The numbers that steps are computed with.
+    pub precision: Precision,
 }
 
 /// The tapes of a scene.
-pub struct Tapes {
+pub struct Tapes<T: Real = f64> {
     /// One step, or one attempt, of the whole state.
-    pub step: Stage,
+    pub step: Stage<T>,
     /// Turns velocities into what the method carries.
-    pub start: Option<Stage>,
+    pub start: Option<Stage<T>>,
     /// Turns what the method carries into velocities.
-    pub finish: Option<Stage>,
+    pub finish: Option<Stage<T>>,
     /// A step that also returns the velocities before it, after the next state, for a run that saves all of them; None if the state has
     /// them already.
-    pub shown: Option<Stage>,
+    pub shown: Option<Stage<T>>,
     /// The recorded numbers, behind v and y.
-    pub record: Option<Stage>,
+    pub record: Option<Stage<T>>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
 }
@@ -89,6 +92,8 @@ pub struct Traced {
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
+    /// The same for numbers of 32 bits.
+    singles: OnceLock<Arc<Tapes<f32>>>,
     /// By what is known of rates.
     courses: Mutex<Vec<(Facts, Arc<Courses>)>>,
 }
@@ -309,7 +314,7 @@ fn started(how: &How, choice: usize) -> How {
 }
 
 /// Cuts a tape.
-pub(crate) fn cut(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage {
+pub(crate) fn cut<T: Real>(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
 }
 
@@ -344,6 +349,9 @@ impl Scene {
             if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
+            if self.precision == Precision::Single {
+                self.fits_single(operations.1)?;
+            }
             let (mut tally, mut carries) = (false, false);
             if let How::Method { name, .. } = &self.how {
                 (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
@@ -359,6 +367,7 @@ impl Scene {
                 recorded: recorded(&self.given, &self.record)?,
                 operations,
                 tapes: OnceLock::new(),
+                singles: OnceLock::new(),
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
@@ -388,11 +397,17 @@ impl Traced {
 
     /// The tapes of all that a run needs.
     pub fn tapes(&self) -> Result<Arc<Tapes>, Error> {
-        if let Some(tapes) = self.tapes.get() {
+        self.tapes_of()
+    }
+
+    /// The same, for numbers of the scene's precision.
+    pub fn tapes_of<T: Traceable>(&self) -> Result<Arc<Tapes<T>>, Error> {
+        let known = T::known(self);
+        if let Some(tapes) = known.get() {
             return Ok(Arc::clone(tapes));
         }
         let tapes = Arc::new(self.scene.trace()?);
-        Ok(Arc::clone(self.tapes.get_or_init(|| tapes)))
+        Ok(Arc::clone(known.get_or_init(|| tapes)))
     }
 
     /// The rates as tapes of their own.
@@ -423,24 +438,58 @@ impl Traced {
     }
 }
 
+/// Numbers whose tapes are kept.
+pub trait Traceable: Real {
+    /// Where.
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<Self>>>;
+}
+
+impl Traceable for f64 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f64>>> {
+        &traced.tapes
+    }
+}
+
+impl Traceable for f32 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f32>>> {
+        &traced.singles
+    }
+}
+
 impl Scene {
+    /// An error if a step of so many operations cannot be computed with numbers of 32 bits.
+    fn fits_single(&self, operations: usize) -> Result<(), Error> {
+        if operations > MAX_TAPE_OPERATIONS {
+            return Err(Error::TooLongForSingle { operations, most: MAX_TAPE_OPERATIONS });
+        }
+        let of = match (&self.how, self.given.tables.first()) {
+            (How::Attempts { .. }, _) => "adaptive steps",
+            (How::Matrix { .. }, _) => "the matrix form",
+            (_, Some(_)) => "sampled inputs",
+            _ => return Ok(()),
+        };
+        Err(Error::NotSingle { of })
+    }
+
     /// Traces all that a run needs, anew.
-    pub fn trace(&self) -> Result<Tapes, Error> {
-        let steps = trace_step(Tape::default(), &self.given, &self.how)?;
+    pub fn trace<T: Real>(&self) -> Result<Tapes<T>, Error> {
+        debug_assert!(T::PRECISION == self.precision, "the tapes of a scene have its precision");
+        let new = || Tape::new(T::PRECISION);
+        let steps = trace_step(new(), &self.given, &self.how)?;
         let fused = |tape: Tape, next: Vec<Id>| if self.fused { fuse(&tape, &next) } else { (tape, next) };
         let (mut start, mut finish) = (None, None);
         if let How::Method { name, choice } = &self.how {
             let method = method(name)?;
             for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
-                    let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
+                    let (tape, next) = trace_slot(new(), &self.given, &program)?;
                     *slot = Some(fused(tape, next));
                 }
             }
         }
         let mut quantities = None;
         if !self.record.is_empty() {
-            quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
+            quantities = Some(cut(&self.given, &trace_record(new(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
         let step = fused(steps.tape, steps.next);

@@ -10,6 +10,7 @@ use pyo3::{
 use stepwell_core::{
     controls::force,
     error::Error,
+    real::Precision,
     run::Model,
     spec::{Given, Row, Spec, Table},
     systems::equations,
@@ -33,6 +34,11 @@ pub fn error_of(name: &str, message: String) -> PyErr {
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
     error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
+}
+
+/// That of 32 bits, or that of 64.
+pub fn precision(single: bool) -> Precision {
+    if single { Precision::Single } else { Precision::Double }
 }
 
 /// The rates of a user's own system.
@@ -90,6 +96,7 @@ pub struct ModelSpec {
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     record: Vec<String>,
     fused: bool,
+    pub precision: Precision,
 }
 
 /// The parameters, borrowed for a run.
@@ -116,9 +123,9 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 #[pymethods]
 impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
-    /// in its v slot, if it is asked for.
+    /// in its v slot, if it is asked for; `single` is whether steps are computed with numbers of 32 bits.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, single=false))]
     fn new(
         py: Python<'_>,
         system: String,
@@ -127,6 +134,7 @@ impl ModelSpec {
         matrix: Option<(Vec<f64>, usize)>,
         record: Vec<String>,
         fused: bool,
+        single: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
         let (mut rows, mut tables) = (Vec::new(), Vec::new());
@@ -153,7 +161,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record, fused }
+        ModelSpec { given: names, how, rows, tables, record, fused, precision: precision(single) }
     }
 }
 
@@ -196,6 +204,10 @@ impl ModelSpec {
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
         };
-        Ok(Model { spec, scene: Scene { given: self.given.clone(), how, record: self.record.clone(), fused: self.fused } })
+        let Self { given, record, fused, precision, .. } = self;
+        Ok(Model {
+            spec,
+            scene: Scene { given: given.clone(), how, record: record.clone(), fused: *fused, precision: *precision },
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! From a body to machine code, for any CPU, and to a kernel, for this one.
 
 use super::{Kernel, Tile, aarch64, frame::Frame, loops, machine::Machine, pages::Pages, plan::Plan, shape::Shape, x86};
-use crate::{isa::Level, tape::split::Body};
+use crate::{isa::Level, real::Real, tape::split::Body};
 
 /// Machine code for a CPU that this machine may not have.
 #[derive(Clone, Debug)]
@@ -14,14 +14,16 @@ pub struct Assembled {
     pub shape: Shape,
     /// The most values that are spilled at once.
     pub spills: usize,
-    constants: Vec<f64>,
+    /// The bits of each.
+    constants: Vec<u64>,
 }
 
 impl Assembled {
     /// The numbers that are the same for all, as the code wants them.
-    pub fn pool(&self, uniforms: &[f64]) -> Vec<f64> {
-        let numbers = self.constants.iter().chain(&uniforms[..self.frame.body.uniforms]);
-        numbers.flat_map(|x| std::iter::repeat_n(*x, self.shape.pool_copies())).collect()
+    pub fn pool<T: Real>(&self, uniforms: &[T]) -> Vec<T> {
+        let constants = self.constants.iter().map(|bits| T::from_pattern(*bits));
+        let numbers = constants.chain(uniforms[..self.frame.body.uniforms].iter().copied());
+        numbers.flat_map(|x| std::iter::repeat_n(x, self.shape.pool_copies())).collect()
     }
 }
 
@@ -43,12 +45,11 @@ fn assemble_for<M: Machine>(body: &Body, shape: Shape) -> Option<Assembled> {
     let (code, spills) = loops::function(&plan, machine, shape)?;
     let frame = Frame {
         pool: (plan.constants.len() + body.uniforms) * shape.pool_copies(),
-        scratch: (spills * shape.width).next_multiple_of(8),
+        scratch: (spills * shape.width).next_multiple_of(64 / shape.bytes),
         aligned_pool: shape.pool_copies() > 1,
         ..Frame::new(body, shape.lanes())
     };
-    let constants = plan.constants.iter().map(|bits| f64::from_bits(*bits)).collect();
-    Some(Assembled { code, frame, shape, spills, constants })
+    Some(Assembled { code, frame, shape, spills, constants: plan.constants })
 }
 
 /// A kernel as machine code of this machine.
@@ -90,16 +91,16 @@ impl Written {
     }
 }
 
-impl Kernel for Written {
+impl<T: Real> Kernel<T> for Written {
     fn lanes(&self) -> usize {
         self.shape().lanes()
     }
 
-    fn pool(&self, uniforms: &[f64]) -> Vec<f64> {
+    fn pool(&self, uniforms: &[T]) -> Vec<T> {
         self.assembled.pool(uniforms)
     }
 
-    fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
+    fn run(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         self.pages.run(tile, scratch);
     }
 

@@ -86,7 +86,7 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let whole = members - first >= model.lanes(&traced, machine, members, UNKNOWN_STEPS)?;
+            let whole = members - first >= model.lanes::<f64>(&traced, machine, members, UNKNOWN_STEPS)?;
             let mut group =
                 model.group(&traced, machine, if whole { members } else { members - first }, &clock, UNKNOWN_STEPS)?;
             let count = (members - first).min(group.lanes());

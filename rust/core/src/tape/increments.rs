@@ -37,7 +37,7 @@ struct Rewriting<'a> {
 
 /// The same tape, for these values, in which increments are multiplied last; and the values on it.
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
-    let made = Tape { written: tape.written, ..Tape::default() };
+    let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut work = Rewriting { tape, facts: Facts::new(tape, roots), made, values: Vec::with_capacity(tape.ops().len()) };
     for (id, op) in tape.ops().iter().enumerate() {
         let value = if work.facts.needed[id] { work.value(*op) } else { Value::Plain(0) };
@@ -93,7 +93,7 @@ impl Rewriting<'_> {
     /// An increment times what is known before the step.
     fn times(&mut self, of: Increment, p: Id) -> Increment {
         match self.tape.op(p) {
-            Op::Const(bits) => Increment { c: of.c * f64::from_bits(bits), ..of },
+            Op::Const(bits) => Increment { c: of.c * self.tape.precision().number(bits), ..of },
             _ => {
                 let p = self.plain(p);
                 Increment { factor: self.put(Op::Mul(p, of.factor)), ..of }

@@ -94,7 +94,12 @@ impl Machine for Code {
     const MOST_OPERATIONS: usize = 1 << 22;
 
     fn new(shape: Shape, instructions: usize) -> Code {
-        Code { bytes: Vec::with_capacity(16 * instructions + 512), evex: shape.level == Level::Avx512, width: shape.width }
+        Code {
+            bytes: Vec::with_capacity(16 * instructions + 512),
+            evex: shape.level == Level::Avx512,
+            width: shape.width,
+            size: shape.bytes,
+        }
     }
 
     fn doing(&self, op: Op) -> Doing {
@@ -123,7 +128,7 @@ impl Machine for Code {
     }
 
     fn negate(&self) -> (Doing, Option<u64>) {
-        (Doing::Two(x::XOR, true), Some(1 << 63))
+        (Doing::Two(x::XOR, true), Some(1 << (8 * self.size - 1)))
     }
 
     fn select(&self, is_mask: bool) -> Doing {
@@ -147,7 +152,7 @@ impl Machine for Code {
             }
             Doing::One(form, byte) => {
                 // Of single numbers such an instruction has two operands: the other lanes are those of the first.
-                let single = writer.shape.width == 1 && form.single.is_some();
+                let single = writer.shape.width == 1 && form.double.first.is_some();
                 let second = if single { Operand::Register(writer.fetch(of[0])?) } else { writer.operand(of[0], form)? };
                 let first = if let (true, Operand::Register(register)) = (single, second) { register } else { 0 };
                 let to = writer.result(step.id, vector, of)?;
@@ -274,7 +279,7 @@ impl Writer<'_, Code> {
     fn in_place(&self, value: Value, form: Form) -> Option<Memory> {
         let source = self.source(value);
         let single = self.shape.width == 1;
-        let is_whole = single && form.single.is_some();
+        let is_whole = single && form.double.first.is_some();
         let can = match source {
             // Its address must be loaded first.
             Source::Held(_) => false,
