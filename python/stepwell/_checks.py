@@ -248,6 +248,29 @@ def member(array: Array, index: Shape) -> Array:
 _FEW_BYTES = 1 << 24
 
 
+def is_single(dtype: Any) -> bool:
+    """Whether float32 is asked for; raise if it is neither that nor float64."""
+    try:
+        name = np.dtype(dtype).name if dtype is not None else ""
+    except TypeError:
+        name = ""
+    if name not in ("float64", "float32"):
+        raise DTypeError(f"dtype: expected 'float64' or 'float32', got {short(dtype)}")
+    return name == "float32"
+
+
+def fits_single(name: str, numbers: Array | None) -> None:
+    """Raise if finite numbers are beyond the range of float32."""
+    if numbers is not None and numbers.size and (large := np.abs(numbers[np.isfinite(numbers)])).size:
+        most = float(large.max())
+        if most > LARGEST_SINGLE:
+            raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {most:g}")
+
+
+#: What is larger than this rounds to infinity in float32.
+LARGEST_SINGLE = float(np.finfo(np.float32).max)
+
+
 def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0.0) -> None:
     """Raise if ``rows`` numbers for each member of a batch, and so many bytes beside, do not fit in what memory is available."""
     members = 1

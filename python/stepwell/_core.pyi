@@ -65,6 +65,7 @@ class ModelSpec:
         matrix: tuple[list[float], int] | None = None,
         record: list[str] = ...,
         fused: bool = False,
+        single: bool = False,
     ) -> ModelSpec: ...
 
 @final
@@ -94,6 +95,10 @@ class Symbol:
     @property
     def id(self) -> int:
         """The number of the operation that makes it."""
+
+    @property
+    def single(self) -> bool:
+        """Whether its numbers are those of float32."""
 
     def __add__(self, other: _Value, /) -> Symbol: ...
     def __radd__(self, other: _Value, /) -> Symbol: ...
@@ -134,9 +139,12 @@ _Value = Symbol | float
 
 @final
 class Tape:
-    """A list of operations, each once. Symbols write to it, and the core's steps are traced onto it."""
+    """A list of operations, each once. Symbols write to it, and the core's steps are traced onto it.
 
-    def __new__(cls) -> Tape: ...
+    If it is ``single``, its numbers are those of float32: constants are rounded to it, and operations on bits are on 32 of them.
+    """
+
+    def __new__(cls, *, single: bool = False) -> Tape: ...
     def state(self, i: int) -> Symbol: ...
     def param(self, i: int) -> Symbol: ...
     def budget(self) -> Symbol: ...

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _core, _memory
+from . import _checks, _core, _memory
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
@@ -32,7 +32,10 @@ Looped = tuple[Array, Array, Blocks, Whole]
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇."""
+    """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
+
+    ``single`` is whether steps are computed in float32.
+    """
 
     system: System
     method: Method
@@ -50,6 +53,12 @@ class Plan(NamedTuple):
     record: tuple[str, ...] = ()
     fused: bool = False
     force: Array | None = None
+    single: bool = False
+
+    @property
+    def dtype(self) -> type[Any]:
+        """Of the states."""
+        return np.float32 if self.single else np.float64
 
     @property
     def saves(self) -> Whole:
@@ -143,12 +152,14 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.scaled()
+    if plan.single:
+        v, y = v.astype(plan.dtype), y.astype(plan.dtype)
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
         made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
         return made
 
-    step = _fused_step(plan, s) if plan.fused else plain
+    step = _traced_step(plan, s) if plan.fused or plan.single else plain
     slot = v if carried else _start(plan, v, y)
     slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes, _velocity(plan))
     out = _finished(plan, slot, kept, first_bad)
@@ -161,16 +172,17 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     return out._replace(recorded=recorded, work=_per_step(plan, work))
 
 
-def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
-    """A method's "step" or "attempt", or how it goes from v to what it carries and back, of fused multiply-adds.
+def _traced(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
+    """A method's "step" or "attempt", or how it goes from v to what it carries and back, of fused multiply-adds or of float32.
 
     That is its tape, evaluated line by line: from the rows of a state, and the time, to the next ones.
     """
-    from .reference.fused import Evaluated  # only such runs need it
+    from .reference import single  # only such runs need it
+    from .reference.fused import Evaluated
     from .reference.traced import Tracer
 
     _core.check(model(plan))
-    tape = _core.Tape()
+    tape = _core.Tape(single=plan.single)
     tracer = Tracer(plan.system, tape, plan.force)
     match what:
         case "step":
@@ -181,10 +193,14 @@ def _fused(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))
     [(_, _, number_of_budget)], _ = tape.operations([tape.budget()])
-    evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables)
+    evaluated: Callable[..., list[Any]]
+    if plan.single:
+        evaluated = single.evaluated(tape, symbols, numbers, plan.fused)
+    else:
+        evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables)
 
     def made(state: list[Array], t: Any) -> Array:
-        out = np.empty((len(symbols), *plan.batch))
+        out = np.empty((len(symbols), *plan.batch), dtype=plan.dtype)
         for i, each in enumerate(evaluated(state, t, plan.dt)):
             out[i] = each
         return out
@@ -203,22 +219,22 @@ def _blocks(v: Array, y: Array, made: Array) -> Blocks:
     return made[:n_v].reshape(v.shape), made[n_v : n_v + n_y].reshape(y.shape)
 
 
-def _fused_step(plan: Plan, s: Any) -> reference.Step:
+def _traced_step(plan: Plan, s: Any) -> reference.Step:
     """A step; what a control of ``s`` adds up is added up there."""
-    made = _fused(plan, "step")
+    made = _traced(plan, "step")
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         if plan.system.control is None:
             return _blocks(v, y, made(_rows(plan, v, y), t))
-        *_, s.work = out = made([*_rows(plan, v, y), s.work], t)
+        *_, s.work = out = made([*_rows(plan, v, y), np.asarray(s.work, dtype=plan.dtype)], t)
         return _blocks(v, y, out)
 
     return step
 
 
-def _fused_slot(plan: Plan, which: str) -> reference.Velocity:
+def _traced_slot(plan: Plan, which: str) -> reference.Velocity:
     """What a method carries from velocities, or back."""
-    made = _fused(plan, which)
+    made = _traced(plan, which)
     return lambda t, v, y: _blocks(v, y, made(_rows(plan, v, y), t))[0]
 
 
@@ -226,7 +242,7 @@ def _per_step(plan: Plan, work: Array | None) -> Array | None:
     """What a control did, in units of energy, from h times the sum over all evaluations."""
     if work is None:
         return None
-    return np.asarray(work / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
+    return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
 
 
 def pushes(control: Any, evaluations: int) -> int:
@@ -248,8 +264,8 @@ def _velocity(plan: Plan) -> reference.Velocity | None:
     """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
     if plan.method.carry is None:
         return None
-    if plan.fused:
-        return _fused_slot(plan, "finish")
+    if plan.fused or plan.single:
+        return _traced_slot(plan, "finish")
     return partial(plan.method.steps.finish, plan.scaled(), plan.choice)
 
 
@@ -281,8 +297,8 @@ def _start(plan: Plan, v: Array, y: Array) -> Array:
         return v
     t = plan.t0 + plan.first * plan.dt
     with np.errstate(all="ignore"):
-        if plan.fused:
-            return _fused_slot(plan, "start")(t, v, y)
+        if plan.fused or plan.single:
+            return _traced_slot(plan, "start")(t, v, y)
         return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
 
@@ -300,6 +316,8 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
+    if plan.single:
+        return _single_model(plan)
     given = plan.system.parameters(plan.batch)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
@@ -308,19 +326,33 @@ def model(plan: Plan) -> _core.ModelSpec:
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
 
 
+def _single_model(plan: Plan) -> _core.ModelSpec:
+    """The same for steps of float32."""
+    given = plan.system.parameters(plan.batch, single=True)
+    if plan.force is not None:
+        given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
+    for name, value in given:
+        if isinstance(value, np.ndarray):
+            _checks.fits_single(name, value)
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, fused=plan.fused, single=True)
+
+
 def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
     kept = plan.kept
     empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
-    saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
-    carry = np.empty(v.shape) if carries else None
+    if plan.single:
+        saved_v, saved_y = np.empty((kept, *v.shape), plan.dtype), np.empty((kept, *y.shape), plan.dtype)
+    else:
+        saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
+    carry = np.empty(v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
         shapes = {name: plan.system.quantities[name] for name in plan.record}
         recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
-    work = None if plan.system.control is None else np.empty(plan.batch)
+    work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
     tally = None if work is None else work.reshape(-1)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     diverged = _core.run(
@@ -568,7 +600,7 @@ def pace_of(numbers: Array) -> Pace:
 
 def _fused_attempt(plan: Plan, budget: int) -> Any:
     """An attempt at an adaptive step."""
-    made = _fused(plan, "attempt", budget)
+    made = _traced(plan, "attempt", budget)
 
     def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
         out = made([*_rows(plan, v, y), *np.broadcast_arrays(*pace)], None)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _encounters, _memory, engine
+from . import _checks, _core, _encounters, _memory, _single, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
 from .control import AnyControl, a_control
@@ -65,6 +65,7 @@ def integrate(
     record: str | Sequence[str] | None = (),
     form: RunForm = "direct",
     fused: bool = False,
+    dtype: Any = "float64",
     t0: float = 0.0,
     start: str | None = None,
     max_steps: int | None = None,
@@ -114,6 +115,9 @@ def integrate(
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
+        dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are rounded
+            to it once, and so is the result of every operation of a step; v and y are returned in it. The same bits on every
+            machine and with either backend. For fixed steps of up to some 4000 operations in the direct form (docs/numerics.md).
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
@@ -156,6 +160,9 @@ def integrate(
     v = velocities(system, v)
     fits_together(system, how)
     fused = _checks.flag("fused", fused)
+    single = _checks.is_single(dtype)
+    if single and (tolerance is not None or at is not None):
+        raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
     if tolerance is not None or at is not None:
         fixed = {
             "steps": steps,
@@ -194,6 +201,8 @@ def integrate(
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    if single:
+        dt = _single.step(system, form, dt)
     goes_on_alike(how, dt, carried_by, dt_before)
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
@@ -205,6 +214,8 @@ def integrate(
             f"after {steps} steps of {dt:g}"
         )
     system.check_time(max(-begin, end))
+    if single:
+        _single.check_inputs(system, max(-begin, end))
     every = None if every is None else _checks.count("every", every, 1)
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
@@ -228,7 +239,7 @@ def integrate(
         batches["force"] = force.shape[len(system.v_shape) :]
     batch = _checks.batch_shape(batches)
     rows = prod(system.v_shape) + prod(system.y_shape)
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused)
+    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused, single=single)
     # What the core does not record is computed from the saved states, with some of them in between.
     recorded = 0
     for name in record:
@@ -240,17 +251,24 @@ def integrate(
         "keep less with every= or split the batch",
         beside=plan.kept * BYTES_PER_TIME,
     )
+    if single:
+        for name, block in (("v", v), ("y", y), ("force", force)):
+            _checks.fits_single(name, block)
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     if control is not None:
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
+        if single:
+            _single.check_control(system)
     system = system.stepped_by(how)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
         plan = plan._replace(force=_spread(force, system.v_shape, batch))
     if record or system is not plan.system:
-        plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
+        # In float32 they are computed from the saved states, in float64.
+        kept = () if single else tuple(name for name in record if name in system.quantities)
+        plan = plan._replace(system=system, record=kept)
     if _checks.flag("progress", progress):
         with _bar(f"{how.title}, {steps} steps") as told:
             out = engine.advance(plan._replace(progress=told), v, y, before, carried=carry is not None)
@@ -282,6 +300,8 @@ def integrate(
         work=out.work,
         force=plan.force,
     )
+    if single:
+        run.recorded |= {name: run.quantity(name) for name in record}
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     if out.diverged:

@@ -176,8 +176,11 @@ class System(Fixed, Value, ABC):
             given |= self.given_around()
         return given
 
-    def parameters(self, batch: Shape) -> Given:
-        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes."""
+    def parameters(self, batch: Shape, *, single: bool = False) -> Given:
+        """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes.
+
+        ``single`` is whether steps are computed in float32; the parameters are the same, operations among them are not.
+        """
         return flat(self.all_given(batch), batch)
 
     def named(self, name: str, index: Shape) -> str:
