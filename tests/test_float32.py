@@ -15,10 +15,10 @@ from cases import SYSTEMS, Case, assert_same, cases, thinned
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core, engine
-from stepwell.errors import ArgumentError, DTypeError, UnsupportedError
+from stepwell.errors import ArgumentError, DTypeError, TraceError, UnsupportedError
 from stepwell.reference import functions, trig
-from stepwell.reference.fused import odd_sum
 from stepwell.reference.functions import single as own
+from stepwell.reference.fused import odd_sum
 from stepwell.reference.single import evaluated, fma
 from stepwell.reference.traced import Tracer
 from test_graphs import assert_one_graph, methods
@@ -32,10 +32,7 @@ def refusal(case: Case) -> str | None:
     """Why float32 does not go with this case, or None."""
     try:
         case.run(1, steps=1, every=None, dtype="float32")
-    except (UnsupportedError, ArgumentError) as error:
-        return str(error)
-    except sw.errors.TraceError as error:
-        assert isinstance(error.__cause__, UnsupportedError)
+    except (UnsupportedError, ArgumentError, TraceError) as error:
         return str(error)
     return None
 
@@ -51,9 +48,9 @@ DIRECT = [case for case in cases() if case.form == "direct"]
 @pytest.mark.parametrize("fused", [False, True])
 def test_equals_the_reference(case: Case, fused: bool) -> None:
     if (why := refusal(case)) is not None:
-        assert why.startswith("dtype: ") or "dtype: " in why
+        assert "dtype: " in why
         return
-    for b in (1, 33):
+    for b in (33,) if fused else (1, 33):
         run, again = (case.run(b, dtype="float32", fused=fused, backend=backend) for backend in ("rust", "numpy"))
         assert run.y.dtype == run.v.dtype == again.y.dtype == again.v.dtype == F
         assert_same(run, again)
@@ -81,10 +78,12 @@ def test_a_step_of_both_is_one_graph(name: str) -> None:
     for method in methods(system):
         try:
             model = engine.model(engine.Plan(system, method, system.batch, 0.1, single=True))
-            tape = _core.Tape(single=True)
-            assert_one_graph(tape, tape.trace(model, "step"), Tracer(system, tape).step(method))
-        except sw.errors.TraceError as error:
-            assert isinstance(error.__cause__, UnsupportedError)
+        except TraceError:
+            with pytest.raises(TraceError, match=r"has no version of float32"):
+                Tracer(system, _core.Tape(single=True)).step(method)
+            continue
+        tape = _core.Tape(single=True)
+        assert_one_graph(tape, tape.trace(model, "step"), Tracer(system, tape).step(method))
 
 
 def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
@@ -116,8 +115,10 @@ def test_members_diverge_where_the_range_of_float32_ends(method: str) -> None:
     assert_same(run, sw.integrate(system, method, **options, backend="numpy"))
     wide = sw.integrate(system, method, **(options | {"dtype": "float64"}))
     bad = run.first_bad_step
-    assert (bad[0] == -1) and (bad > 0).any()
-    assert (bad[wide.first_bad_step > 0] > 0).all() and (bad[bad > 0] != wide.first_bad_step[bad > 0]).any()
+    assert bad[0] == -1
+    assert (bad > 0).any()
+    assert (bad[wide.first_bad_step > 0] > 0).all()
+    assert (bad[bad > 0] != wide.first_bad_step[bad > 0]).any()
 
 
 def test_small_and_large_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,7 +164,8 @@ def test_quantities_are_computed_in_float64_from_the_states() -> None:
     assert run.energy.dtype == np.float64
     v, y = run.v.astype(float), run.y.astype(float)
     np.testing.assert_allclose(run.energy, 0.5 * (v * v + y * y), rtol=1e-15)
-    assert "float32" in repr(run) and run.dtype == "float32"
+    assert "float32" in repr(run)
+    assert run.dtype == "float32"
 
 
 def test_a_control_keeps_the_energy() -> None:
@@ -258,7 +260,7 @@ def blocks(long: bool, stride: int = 9973) -> Iterator[Any]:
 
 
 def worst(f: Callable[[Any], Any], truth: Callable[[Any], Any], within: float = math.inf, long: bool = False) -> float:
-    """The largest error of a function in units in the last place of the result; what is not finite must be as it is.
+    """The largest error of a function in units in the last place of the result; infinite where it is wrong beside all numbers.
 
     The truth is NumPy's of float64, within 2⁻⁵² or so of its result: 2⁻²⁸ of a unit here.
     """
@@ -269,7 +271,8 @@ def worst(f: Callable[[Any], Any], truth: Callable[[Any], Any], within: float = 
             want, got = truth(x.astype(float)), f(x).astype(float)
             rounded = want.astype(F)
         ends = ~(np.isfinite(rounded) & np.isfinite(got))
-        np.testing.assert_array_equal(got[ends], rounded[ends])
+        if not np.array_equal(got[ends], rounded[ends], equal_nan=True):
+            return math.inf
         want, got = want[~ends], got[~ends]
         _, exponent = np.frexp(want)
         most = max(most, float((np.abs(got - want) / np.ldexp(1.0, np.maximum(exponent - 24, -149))).max(initial=0.0)))
@@ -313,17 +316,14 @@ def test_none_of_all_results_is_further_than_an_ulp_from_the_truth(name: str) ->
         ("exp", "EXP", (*own.EXP[:3], 0.0083, own.EXP[4])),
         ("exp", "OVERFLOW_FROM", 90.0),
         ("exp", "UNDERFLOW_UNTIL", -87.0),
-        ("log", "LOG", (*own.LOG[:2], 0.2857, own.LOG[3])),
+        ("log", "LOG", (own.LOG[0], 0.399, *own.LOG[2:])),
         ("log", "LEAST_NORMAL", 0.0),
     ],
 )
 def test_a_wrong_constant_is_noticed(name: str, constant: str, value: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own, constant, value)
     truth, within, most = TRUE[name]
-    try:
-        assert worst(function(getattr(functions, name)), truth, within) > most
-    except AssertionError as error:
-        assert "Arrays are not equal" in str(error)
+    assert worst(function(getattr(functions, name)), truth, within) > most
 
 
 def test_the_sine_of_built_in_systems() -> None:
@@ -397,7 +397,7 @@ REFUSED: list[tuple[Any, dict[str, Any], str]] = [
 def test_what_does_not_go_with_float32(system: Any, options: dict[str, Any], told: str) -> None:
     arguments: dict[str, Any] = {"method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 100, "dtype": "float32"} | options
     for backend in ("rust", "numpy"):
-        with pytest.raises((UnsupportedError, ArgumentError, sw.errors.TraceError), match=told.replace("(", r"\(")):
+        with pytest.raises((UnsupportedError, ArgumentError, TraceError), match=told.replace("(", r"\(")):
             sw.integrate(system, **arguments, backend=backend)
 
 

@@ -51,4 +51,6 @@ def check_inputs(system: System, last: float) -> None:
 def check_control(system: Any) -> None:
     """Raise if a control does not go with float32."""
     if isinstance(system, OwnSystem) and system.keeper is not None:
-        raise UnsupportedError(f"dtype: float32 does not go with a control of your own equations, got {system.keeper!r}; use float64")
+        raise UnsupportedError(
+            f"dtype: float32 does not go with a control of your own equations, got {system.keeper!r}; use float64"
+        )

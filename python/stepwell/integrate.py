@@ -116,8 +116,8 @@ def integrate(
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are rounded
-            to it once, and so is the result of every operation of a step; v and y are returned in it. The same bits on every
-            machine and with either backend. For fixed steps of up to some 4000 operations in the direct form (docs/numerics.md).
+            to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the same on
+            every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
@@ -239,7 +239,9 @@ def integrate(
         batches["force"] = force.shape[len(system.v_shape) :]
     batch = _checks.batch_shape(batches)
     rows = prod(system.v_shape) + prod(system.y_shape)
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused, single=single)
+    plan = engine.Plan(
+        system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused, single=single
+    )
     # What the core does not record is computed from the saved states, with some of them in between.
     recorded = 0
     for name in record:

@@ -23,7 +23,7 @@ class Increment(NamedTuple):
 class Rewriting:
     """A tape that is written anew, line by line."""
 
-    def __init__(self, tape: Sequence[Operation], roots: Sequence[int], single: bool) -> None:
+    def __init__(self, tape: Sequence[Operation], roots: Sequence[int], single: bool = False) -> None:
         self.tape = tape
         #: How constants are written: of 32 bits, or of 64.
         self.bits, self.float = ("<I", "<f") if single else ("<Q", "<d")

@@ -78,4 +78,8 @@ def evaluated(tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], fus
         operations, roots = fused(operations, roots, single=True)
     rounded = {i: np.asarray(number, dtype=np.float32) for i, number in numbers.items()}
     lines = Evaluated(operations, roots, rounded, (), MEANING)
-    return lambda state, t, h: lines(state, np.float32(t), np.float32(h))
+
+    def values(state: Sequence[Any], t: Any, h: Any) -> list[Any]:
+        return lines(state, np.float32(t), np.float32(h))  # type: ignore[arg-type]
+
+    return values

@@ -67,9 +67,7 @@ class Pendulum(System):
         with np.errstate(invalid="ignore"):
             beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > last)])
         return (
-            f"an angle grew to {beyond.max():.3g} rad, and beyond {last:.3g} rad its sine means nothing"
-            if beyond.size
-            else None
+            f"an angle grew to {beyond.max():.3g} rad, and beyond {last:.3g} rad its sine means nothing" if beyond.size else None
         )
 
     def energy(self, v: Array, y: Array) -> Array:

@@ -9,7 +9,19 @@ from collections.abc import Callable
 from typing import Any
 
 from ...errors import UnsupportedError
-from .operations import add_bits, and_bits, either_bits, equal, magnitude, or_bits, shift_down, shift_up, sign_of, turn_bits, where
+from .operations import (
+    add_bits,
+    and_bits,
+    either_bits,
+    equal,
+    magnitude,
+    or_bits,
+    shift_down,
+    shift_up,
+    sign_of,
+    turn_bits,
+    where,
+)
 from .pieces import fast_sum, polynomial
 
 #: 1.5·2²³: a number added to it is rounded to a whole one, which then stands in the low bits.
@@ -81,7 +93,7 @@ def cos(x: Any) -> Any:
 def exp(x: Any) -> Any:
     """Exponential of x, subnormal results included."""
     x = where(x < UNDERFLOW_UNTIL, x.number(UNDERFLOW_UNTIL), x)
-    x = where(OVERFLOW_FROM < x, x.number(OVERFLOW_FROM), x)
+    x = where(x > OVERFLOW_FROM, x.number(OVERFLOW_FROM), x)
     n = (x * LOG2_E + MAGIC) - MAGIC
     upper, lower = x - n * LN2[0], n * LN2[1]
     r = upper - lower

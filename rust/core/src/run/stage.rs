@@ -17,10 +17,13 @@ pub struct Stage<T: Real = f64> {
     /// The tape.
     pub split: Split,
     /// By the number of members that they are for.
-    kits: Mutex<Vec<(Level, usize, Arc<Kit<T>>)>>,
+    kits: Kits<T>,
     /// Those for rows of a length that something else has set.
-    long: Mutex<Vec<(Level, usize, Arc<Kit<T>>)>>,
+    long: Kits<T>,
 }
+
+/// Kits, each for a level and a number.
+type Kits<T> = Mutex<Vec<(Level, usize, Arc<Kit<T>>)>>;
 
 /// What makes the steps of a stage, and what is computed before them, over rows of one length.
 pub struct Kit<T: Real = f64> {
@@ -117,13 +120,7 @@ impl<T: Real> Stage<T> {
     }
 
     /// What was made before for such a number, or what is made now.
-    fn kept(
-        &self,
-        kits: &Mutex<Vec<(Level, usize, Arc<Kit<T>>)>>,
-        level: Level,
-        number: usize,
-        make: impl Fn(&Body) -> Runner<T>,
-    ) -> Arc<Kit<T>> {
+    fn kept(&self, kits: &Kits<T>, level: Level, number: usize, make: impl Fn(&Body) -> Runner<T>) -> Arc<Kit<T>> {
         // A thread that panicked while it held the lock has left a list that is whole: entries are made before they are put in.
         let mut kits = kits.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, known)) = kits.iter().find(|(at, known, _)| (*at, *known) == (level, number)) {

@@ -94,7 +94,8 @@ fn moves_on(i: &Instruction, block: u64, blocks: u64) {
 
 fn is_multiply_add(mnemonic: Mnemonic, is_single: bool) -> bool {
     let name = format!("{mnemonic:?}");
-    ["Vfmadd", "Vfmsub", "Vfnmadd"].iter().any(|kind| name.starts_with(kind)) && (name.ends_with(if is_single { "ps" } else { "pd" }) || name.ends_with(if is_single { "ss" } else { "sd" }))
+    ["Vfmadd", "Vfmsub", "Vfnmadd"].iter().any(|kind| name.starts_with(kind))
+        && (name.ends_with(if is_single { "ps" } else { "pd" }) || name.ends_with(if is_single { "ss" } else { "sd" }))
 }
 
 /// What kernels are made of. What is not here is not exact, or not the same on all machines.

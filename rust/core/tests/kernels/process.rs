@@ -94,7 +94,10 @@ fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
         return;
     }
     let (level, width) = *crate::widths().last().expect("machine code");
-    assert!(write(&oscillator(), Shape { level, bytes: 8, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true }).is_none());
+    assert!(
+        write(&oscillator(), Shape { level, bytes: 8, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true })
+            .is_none()
+    );
     // What was there before goes on.
     let inputs = crate::Inputs::<f64>::new(&mut crate::Random(1), &oscillator(), crate::Kernel::<f64>::lanes(&before), 3);
     inputs.run(&before, &mut Vec::new());
