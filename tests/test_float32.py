@@ -98,9 +98,10 @@ def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
     np.testing.assert_array_equal(run.v[-1], together.v[-1])
 
 
-@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 0}, "float32 diverges alike") or [])
+@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 0}, "float32 diverges alike"))
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
 def test_diverging_members_too(case: Case) -> None:
+    """In the long run only: the next test has a few members that diverge."""
     if refusal(case) is None:
         options = {"dt": 60.0, "steps": 60, "every": 20, "dtype": "float32"}
         assert_same(case.run(40, **options), case.run(40, **options, backend="numpy"))
@@ -407,3 +408,23 @@ def test_warnings_are_those_of_its_range() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sw.integrate(sw.Pendulum(), "rk4", v=1.0, y=0.0, dt=0.1, steps=100, dtype="float32")
+
+
+# ---- what a digit costs
+
+
+def test_a_chart_has_a_curve_of_each() -> None:
+    steps = [200, 400, 800, 12800]
+    chart = sw.charts.work_precision("oscillator", ["rk4"], steps, tolerances=[], fused="both", dtype="both")
+    names = ["rk4", "rk4, fused", "rk4, float32", "rk4, fused, float32"]
+    assert [curve.name for curve in chart.curves] == names
+    assert [curve.dtype for curve in chart.curves] == ["float64", "float64", "float32", "float32"]
+    wide, _, half, _ = ([point.state_error for point in curve.points] for curve in chart.curves)
+    # Where the method errs by more than float32 rounds, both err alike; then float32 stays where it is, or worse.
+    scene = sw.scenes.scene("oscillator")
+    rounded = 20 * 2.0**-24 * np.array(steps)
+    assert (np.abs(np.subtract(wide, half)) <= rounded * np.abs(scene.exact(np.zeros(1))[1]).max()).all()
+    assert half[-1] > 1e3 * wide[-1]
+    chart.plot()
+    with pytest.raises(ArgumentError, match="dtype"):
+        sw.charts.work_precision("oscillator", ["rk4"], steps, dtype="half")

@@ -43,8 +43,8 @@ def check_inputs(system: System, last: float) -> None:
             angle = float(np.abs(given.omega).max() * abs(last) + np.abs(given.phase).max())
             if angle > LAST_SINGLE_ANGLE:
                 raise ArgumentError(
-                    f"{name}: in float32 a sinusoid's angle may grow to {LAST_SINGLE_ANGLE:.3g} rad, but reaches {angle:.3g} rad by "
-                    f"t = {last:g}"
+                    f"{name}: in float32 a sinusoid's angle may grow to {LAST_SINGLE_ANGLE:.3g} rad, but reaches {angle:.3g} rad "
+                    f"by t = {last:g}"
                 )
 
 

@@ -115,9 +115,9 @@ def integrate(
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
-        dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are rounded
-            to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the same on
-            every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
+        dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
+            rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
+            same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.

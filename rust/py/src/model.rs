@@ -126,6 +126,7 @@ impl ModelSpec {
     /// in its v slot, if it is asked for; `single` is whether steps are computed with numbers of 32 bits.
     #[new]
     #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, single=false))]
+    #[allow(clippy::too_many_arguments, reason = "Python gives them by name")]
     fn new(
         py: Python<'_>,
         system: String,
