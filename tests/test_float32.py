@@ -131,6 +131,44 @@ def test_small_and_large_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
             assert_same(run, sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments, backend="numpy"))
 
 
+@pytest.mark.parametrize("members", [3, 300])
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
+def test_a_world_steps_arrays_of_float32_in_place(method: str, members: int) -> None:
+    """A few numbers are copied, many are stepped where they are; a force changes between steps; another world goes on."""
+    rng = np.random.default_rng(4)
+    system = sw.Pendulum(rng.uniform(0.5, 2.0, members))
+    v, y = (rng.normal(size=members).astype(F) for _ in range(2))
+    options: dict[str, Any] = {"dt": 0.1, "dtype": "float32"}
+    run = sw.integrate(system, method, v=v, y=y, steps=300, every=100, **options)
+    world = sw.World(system, method, v=v, y=y, **options)
+    for i in (1, 2):
+        world.step(100)
+        np.testing.assert_array_equal(y, run.y[i])
+        np.testing.assert_array_equal(v, run.v[i])
+    later = sw.World(system, method, dt=0.1, **world.resume)
+    assert later.y.dtype == F
+    later.step(100)
+    np.testing.assert_array_equal(later.y, run.y[3])
+    on = sw.integrate(system, method, dt=0.1, steps=100, **world.resume)
+    np.testing.assert_array_equal(on.y[-1], run.y[3])
+    # Pushed from outside, by numbers of float32.
+    force = np.zeros(members, dtype=F)
+    v, y = (rng.normal(size=members).astype(F) for _ in range(2))
+    pushed = sw.integrate(system, "rk4", v=v, y=y, steps=50, force=0.1, **options)
+    world = sw.World(system, "rk4", v=v, y=y, force=force, **options)
+    force[:] = 0.1
+    world.step(50)
+    np.testing.assert_array_equal(y, pushed.y[-1])
+
+
+def test_a_world_takes_arrays_of_its_dtype_only() -> None:
+    for dtype, other in (("float32", np.float64), ("float64", np.float32)):
+        with pytest.raises(DTypeError, match=rf"^v: expected dtype {dtype} to step in place, got {np.dtype(other)}"):
+            sw.World(sw.Oscillator(), "rk4", v=np.zeros(3, other), y=np.zeros(3, dtype), dt=0.1, dtype=dtype)
+    with pytest.raises(UnsupportedError, match=r"does not go with samples"):
+        sw.World(sw.Oscillator(x=sw.Sampled([0.0, 1.0], 1.0)), "rk4", v=np.zeros(1, F), y=np.zeros(1, F), dt=0.1, dtype="float32")
+
+
 # ---- what is computed
 
 

@@ -355,12 +355,20 @@ def _fields(path: str) -> dict[str, int]:
     return {line[0]: int(line[1]) for line in map(str.split, _read(path).splitlines()) if len(line) > 1}
 
 
-def in_place(argument: str, array: Any, shape: Shape, what: str = "to step in place", *, written: bool = True) -> Array:
+def in_place(
+    argument: str,
+    array: Any,
+    shape: Shape,
+    what: str = "to step in place",
+    *,
+    written: bool = True,
+    dtype: Any = np.float64,
+) -> Array:
     """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied."""
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
-    if array.dtype != np.float64 or not array.dtype.isnative:
-        raise DTypeError(f"{argument}: expected dtype float64 {what}, got {array.dtype}")
+    if array.dtype != dtype or not array.dtype.isnative:
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

@@ -70,19 +70,22 @@ class ModelSpec:
 
 @final
 class World:
-    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first`` and ``members``."""
+    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first`` and ``members``.
+
+    The arrays are of float32 if the model is single, else of float64.
+    """
 
     def __new__(
         cls,
         model: ModelSpec,
         plan: Plan,
-        v: NDArray[np.float64],
-        y: NDArray[np.float64],
-        carry: NDArray[np.float64] | None = None,
-        force: NDArray[np.float64] | None = None,
+        v: NDArray[Any],
+        y: NDArray[Any],
+        carry: NDArray[Any] | None = None,
+        force: NDArray[Any] | None = None,
     ) -> World: ...
     def step(self, n: int = 1) -> None: ...
-    def carry(self) -> NDArray[np.float64] | None: ...
+    def carry(self) -> NDArray[Any] | None: ...
     @property
     def t(self) -> float: ...
     @property

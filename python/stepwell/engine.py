@@ -330,7 +330,7 @@ def _single_model(plan: Plan) -> _core.ModelSpec:
     """The same for steps of float32."""
     given = plan.system.parameters(plan.batch, single=True)
     if plan.force is not None:
-        given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
+        given.append(("added.force", rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
     for name, value in given:
         if isinstance(value, np.ndarray):
             _checks.fits_single(name, value)

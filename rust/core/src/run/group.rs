@@ -28,7 +28,7 @@ pub trait Group<T: Real = f64>: Send + Sync {
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
     /// Takes the force from outside for the members from `first`, for the steps to come.
-    fn set_force(&mut self, _force: &Force, _first: usize, _count: usize) {}
+    fn set_force(&mut self, _force: &Force<T>, _first: usize, _count: usize) {}
 
     /// Compiles now instead of after some interpreted steps: for real-time loops.
     fn compile_now(&mut self) {}
@@ -169,7 +169,7 @@ impl<T: Traceable> Group<T> for Lanes<T> {
         self.tally_mut().fill(T::default());
     }
 
-    fn set_force(&mut self, force: &Force, first: usize, count: usize) {
+    fn set_force(&mut self, force: &Force<T>, first: usize, count: usize) {
         self.step.set_force(&self.tapes.step, force, first, count);
         for (side, stage) in self.side_stages() {
             side.prepared.set_force(stage, force, first, count);

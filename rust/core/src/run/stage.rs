@@ -7,7 +7,7 @@ use crate::{
     isa::Level,
     kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner, writer},
     real::Real,
-    spec::{Row, Spec},
+    spec::Spec,
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
 };
@@ -159,18 +159,18 @@ impl Clock {
 
 /// A force from outside that changes between steps: rows of one number for each member.
 #[derive(Clone, Copy, Debug)]
-pub struct Force<'a> {
+pub struct Force<'a, T = f64> {
     /// The rows, one for each number of v.
-    pub numbers: &'a [f64],
+    pub numbers: &'a [T],
     /// How long a row is.
     pub members: usize,
     /// The number of the first row among all parameters.
     pub place: usize,
 }
 
-impl Force<'_> {
+impl<T> Force<'_, T> {
     /// A row.
-    pub fn row(&self, i: usize) -> &[f64] {
+    pub fn row(&self, i: usize) -> &[T] {
         &self.numbers[i * self.members..][..self.members]
     }
 }
@@ -284,11 +284,13 @@ impl<T: Real> PreparedStage<T> {
     }
 
     /// Takes the force for the members that were prepared.
-    pub fn set_force(&mut self, stage: &Stage<T>, force: &Force, first: usize, count: usize) {
+    pub fn set_force(&mut self, stage: &Stage<T>, force: &Force<T>, first: usize, count: usize) {
         let (lanes, rows) = (self.lanes(), force.numbers.len() / force.members);
         for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
             if let Some(i) = (*param as usize).checked_sub(force.place).filter(|i| *i < rows) {
-                Row(force.row(i)).fill(first, count, raw);
+                let row = &force.row(i)[first..first + count];
+                raw[..count].copy_from_slice(row);
+                raw[count..].fill(row[count - 1]);
             }
         }
         self.find_rows();
