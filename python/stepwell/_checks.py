@@ -261,10 +261,14 @@ def is_single(dtype: Any) -> bool:
 
 def fits_single(name: str, numbers: Array | None) -> None:
     """Raise if finite numbers are beyond the range of float32."""
-    if numbers is not None and numbers.size and (large := np.abs(numbers[np.isfinite(numbers)])).size:
-        most = float(large.max())
-        if most > LARGEST_SINGLE:
-            raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {most:g}")
+    if numbers is None or not numbers.size:
+        return
+    least, most = float(np.fmin.reduce(numbers, axis=None)), float(np.fmax.reduce(numbers, axis=None))
+    if max(-least, most) <= LARGEST_SINGLE:
+        return  # the usual case, found without another array
+    large = np.abs(numbers[np.isfinite(numbers)])
+    if large.size and float(large.max()) > LARGEST_SINGLE:
+        raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {large.max():g}")
 
 
 #: What is larger than this rounds to infinity in float32.

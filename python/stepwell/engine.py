@@ -344,7 +344,7 @@ def _rust(
     kept = plan.kept
     empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
     if plan.single:
-        saved_v, saved_y = np.empty((kept, *v.shape), plan.dtype), np.empty((kept, *y.shape), plan.dtype)
+        saved_v, saved_y = (_memory.empty((kept, *a.shape), plan.dtype) for a in (v, y))
     else:
         saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
     carry = np.empty(v.shape, plan.dtype) if carries else None

@@ -256,7 +256,8 @@ def integrate(
     if single:
         for name, block in (("v", v), ("y", y), ("force", force)):
             _checks.fits_single(name, block)
-        v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
+        if control is not None:  # whose target is that of the start as it is stepped
+            v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     if control is not None:
         system = system.controlled(control, v, y, dt)
