@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import ArgumentError, UnsupportedError
-from .systems import Pendulum3D, Rods, Sampled, Sinusoid
+from .systems import Sampled, Sinusoid
 from .systems.inputs import LAST_SINGLE_ANGLE
-from .systems.own import OwnSystem
 
 if TYPE_CHECKING:
     from .systems import System
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 def step(system: System, form: str, dt: float) -> float:
     """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
+    from .systems import Pendulum3D, Rods  # only such runs need them
+
     if form != "direct":
         raise UnsupportedError(f"dtype: float32 goes with form='direct' only, got form={form!r}")
     if isinstance(system, (Pendulum3D, Rods)) and system.contacts:
@@ -50,6 +51,8 @@ def check_inputs(system: System, last: float) -> None:
 
 def check_control(system: Any) -> None:
     """Raise if a control does not go with float32."""
+    from .systems.own import OwnSystem
+
     if isinstance(system, OwnSystem) and system.keeper is not None:
         raise UnsupportedError(
             f"dtype: float32 does not go with a control of your own equations, got {system.keeper!r}; use float64"
