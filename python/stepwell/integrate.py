@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _encounters, _memory, _single, engine
+from . import _checks, _core, _encounters, _memory, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
 from .control import AnyControl, a_control
@@ -202,6 +202,8 @@ def integrate(
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     if single:
+        from . import _single  # only such runs need it
+
         dt = _single.step(system, form, dt)
     goes_on_alike(how, dt, carried_by, dt_before)
     t0 = _checks.number("t0", t0, unit="units of time")

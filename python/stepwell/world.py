@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _checks, _core, _single, engine
+from . import _checks, _core, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
 from .control import AnyControl, a_control
@@ -91,6 +91,8 @@ class World:
         single = _checks.is_single(dtype)
         kind: Any = np.float32 if single else np.float64
         if single:
+            from . import _single  # only such worlds need it
+
             dt = _single.step(system, "direct", dt)
         goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
