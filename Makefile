@@ -16,13 +16,17 @@ LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs"
 WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long test-wheels wheel wheels release dev bench lint rust-test python-test format clean
+.PHONY: help demo docs test test-long test-wheels wheel wheels release dev bench lint rust-test python-test format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: .venv/demo ## set up, build, and chart error against cost for two scenes into out/
 	$(BIN)/stepwell chart oscillator clover -o $(OUT)
+
+docs: .venv/docs ## build the site into out/docs, without a network; a warning is an error
+	$(BIN)/sphinx-build -n -W --keep-going -q docs $(OUT)/docs
+	@echo "open $(OUT)/docs/index.html"
 
 test: lint rust-test python-test ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
 
@@ -81,7 +85,7 @@ format: .venv/test ## format Rust and Python
 	$(BIN)/python docs/generate.py
 
 clean: ## remove everything that was built
-	rm -rf .venv dist target out
+	rm -rf .venv dist target out docs/gallery
 
 # ---- set-up; the files in .venv are stamps
 
@@ -114,11 +118,12 @@ clean: ## remove everything that was built
 	for target in $(WHEELS); do PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --zig --target $$target --out dist/wheels || exit 1; done
 	@touch $@
 
-# The wheel with the extra that a target asks for.
+# The wheel with the extras that a target asks for.
 .venv/demo: EXTRA = chart
-.venv/test: EXTRA = test
+.venv/docs: EXTRA = docs
+.venv/test: EXTRA = test,docs
 .venv/bench: EXTRA = bench
-.venv/demo .venv/test .venv/bench: .venv/wheel
+.venv/demo .venv/docs .venv/test .venv/bench: .venv/wheel
 	$(BIN)/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRA)]"
 	$(BIN)/pip install --quiet --disable-pip-version-check --force-reinstall --no-deps dist/*.whl
 	@touch $@

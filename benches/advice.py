@@ -59,6 +59,14 @@ class Try(NamedTuple):
     error: float
 
 
+def _evaluations(method: Method, scene: Scene) -> float:
+    """Function evaluations of a step; infinitely many if the method cannot step the scene."""
+    try:
+        return sw.stability.operations(method, scene.system).rate_evaluations
+    except UnsupportedError:
+        return math.inf
+
+
 class Brute:
     """All that can be tried on a scene, with any steps or in frames.
 
@@ -71,7 +79,7 @@ class Brute:
         self.prices: dict[str, float] = {}
         for method in sw.methods():
             self.prices |= {
-                method.name: float(method.evaluations),
+                method.name: float(_evaluations(method, scene)),
                 f"{method.name}, tolerance": float(method.attempt_evaluations),
             }
         self.prices |= prices or {}
@@ -195,7 +203,7 @@ class Brute:
         """The cheapest with a tolerance, of those that cost no more than ``most``."""
         found: list[Try] = []
         for method in sw.methods():
-            if method.error_order is None or self.scene.control is not None:
+            if method.error_order is None or method.has_series or self.scene.control is not None:
                 continue
             kept = self._adaptive.setdefault(method.name, [])
             while not kept or kept[-1].cost <= most or kept[-1].error == math.inf:

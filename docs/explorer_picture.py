@@ -1,4 +1,4 @@
-"""Takes the picture of docs/explorer.md in Chromium: ``.venv/bin/python docs/explorer_picture.py``."""
+"""Takes the picture of docs/howto/explorer.md in Chromium: ``.venv/bin/python docs/explorer_picture.py``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes the tables of README.md and docs/*.md that are made from the methods' records.
+"""Writes the tables of README.md and of the pages in docs that are made from the methods' records.
 
 A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->``. After a change to a record run
 ``.venv/bin/python docs/generate.py``; the tests fail while a table is stale.
@@ -7,11 +7,15 @@ A table stands between ``<!-- generated: NAME -->`` and ``<!-- end generated -->
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import stepwell as sw
 from stepwell.stability.criterion import signed
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import speed
 
 ROOT = Path(__file__).resolve().parent.parent
 PLACE = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
@@ -128,7 +132,25 @@ def paper() -> str:
     return "\n" + "\n".join(parts) + "\n"
 
 
+def speeds() -> str:
+    """How many times as fast as a compiled peer, from the report of the benches."""
+    head = "work", "peer", "the same arithmetic", "the best of each", "error"
+    return table(head, speed.rows())
+
+
+def from_report(begin: str) -> str:
+    """A table of the report of the benches, as it stands there."""
+    title, rows = next((title, rows) for title, rows in speed.tables().items() if title.startswith(begin))
+    lines = list(rows.values())
+    return f"{title}\n\n" + table(lines[0], (line.values() for line in lines))
+
+
 TABLES = {
+    "speeds": speeds,
+    "stages": lambda: from_report("A call by stages"),
+    "one_orbit": lambda: from_report("Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, one orbit"),
+    "many_orbits": lambda: from_report("Chosen steps: Kepler's ellipse, e = 0.9, 10 periods, 10,000"),
+    "one_round": lambda: from_report("Chosen steps: Arenstorf's orbit, once round, one"),
     "paper": paper,
     "methods": methods,
     "names": names,
@@ -146,7 +168,7 @@ def current(text: str) -> str:
 
 def pages() -> list[Path]:
     """The pages that may hold tables."""
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 if __name__ == "__main__":

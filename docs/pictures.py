@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and docs/*.md anew into docs/images. Takes some minutes.
+"""Draws the pictures of README.md and of the pages in docs anew into docs/images. Takes some minutes.
 
 Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and look at what it drew.
 """
@@ -28,6 +28,9 @@ IMAGES = DOCS / "images"
 ERRORS = (0.1, 1e-2, 1e-4, 1e-6, 1e-9)
 PLACE = re.compile(r"(<!-- drawn: best -->\n).*?(<!-- end drawn -->)", re.DOTALL)
 
+#: A colour of fewer pixels than this share of a picture is a shade at an edge.
+RARE = 2e-4
+
 #: Colours of an example's picture, of few lines.
 COLOURS = 64
 #: The picture of an example has as many colours as fit into so many bytes.
@@ -37,12 +40,25 @@ MOST_BYTES = 60 * 1024
 MAPS = ("standard_euler", "false_euler", "standard_heun", "rk4", "merson", "fehlberg_5")
 
 
-def write(name: str, figure: Figure) -> None:
-    """Write a picture with all its colours: a palette would merge methods."""
+def write(name: str, figure: Figure, dpi: float | None = None) -> None:
+    """Write a picture, with fewer dots an inch than the figure has if ``dpi`` says so."""
     drawn = io.BytesIO()
-    figure.savefig(drawn, format="png", facecolor="white")
-    Image.open(drawn).convert("RGB").save(IMAGES / name, optimize=True)
-    print(f"docs/images/{name}")
+    figure.savefig(drawn, format="png", facecolor="white", dpi=dpi or "figure")
+    save(Image.open(drawn), IMAGES / name)
+
+
+def save(drawn: Image.Image, path: Path) -> None:
+    """Save all colours that are seen as such, in RGB: a palette would merge methods.
+
+    Only the many shades at the edges of lines and letters are rounded, each channel to one of six steps: a quarter less to store.
+    """
+    pixels = np.asarray(drawn.convert("RGB"))
+    code = pixels.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
+    _, place, times = np.unique(code, return_inverse=True, return_counts=True)
+    rare = (times < RARE * code.size)[place].reshape(code.shape)
+    rounded = (np.rint(pixels / 51.0) * 51.0).astype(np.uint8)
+    Image.fromarray(np.where(rare[..., np.newaxis], rounded, pixels)).save(path, optimize=True)
+    print(f"docs/images/{path.name}")
 
 
 #: The scenes of each picture of errors against cost: all in one would be too small to read. No fixed step of the chart is short
@@ -59,6 +75,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "work-precision-springs.png": ("rope_bridge", "jelly_cube"),
     "work-precision-contact.png": ("bouncing_ball", "sliding_block", "sticking_block"),
 }
+#: Dots an inch of these, the largest pictures of all.
+PANEL_DPI = 75
 #: Where the error of one step says nothing of the next, a table of the cheapest would list lucky ones.
 NO_ROWS = ("work-precision-contact.png",)
 
@@ -71,9 +89,9 @@ def write_best(charts: Iterable[sw.charts.WorkPrecision]) -> None:
         found = [chart.best(error) for error in ERRORS]
         lines.append([f"`{chart.scene.name}`", *(f"{row['method']}: {row['cost']:.3g}" if row else "—" for row in found)])
     made = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    page = DOCS / "work-precision.md"
+    page = DOCS / "benchmarks" / "work-precision.md"
     page.write_text(PLACE.sub(lambda m: m[1] + made + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
-    print("docs/work-precision.md")
+    print("docs/benchmarks/work-precision.md")
 
 
 def wing_nut() -> None:
@@ -81,9 +99,7 @@ def wing_nut() -> None:
     with tempfile.TemporaryDirectory() as folder:
         drawn = Path(folder) / "wing-nut.png"
         runpy.run_path(str(DOCS.parent / "examples" / "wing_nut.py"))["picture"](str(drawn))
-        few = Image.open(drawn).convert("RGB").convert("P", palette=Image.Palette.ADAPTIVE, colors=COLOURS)
-        few.save(IMAGES / "wing-nut.png", optimize=True)
-        print("docs/images/wing-nut.png")
+        save(Image.open(drawn), IMAGES / "wing-nut.png")
 
 
 def examples() -> None:
@@ -138,7 +154,7 @@ def contact() -> Figure:
         ("one-sided spring, Φ = 1.5", impacts(sw.Floor(way="spring", omega=1.5)), COLOURS[2], (0.12, 0.83)),
         ("one-sided spring, Φ = 0.5", impacts(sw.Floor(way="spring", omega=0.5)), COLOURS[1], (0.55, 0.92)),
         ("v and y turned over", mirrored(), COLOURS[4], (0.12, 1.78)),
-        ("safe, and flip", impacts(sw.Floor()), COLOURS[0], (0.24, 1.02)),
+        ("safe, and flip", impacts(sw.Floor()), "black", (0.24, 1.02)),
     )
     with rc_context(FONT):
         figure = Figure(figsize=(12.0, 6.4), dpi=100)
@@ -184,14 +200,14 @@ def tumbling() -> Figure:
         axes = figure.add_axes((0.02, 0.12, 0.55, 0.68))
         for i, place in enumerate(run.y):
             late = 0.25 + 0.75 * i / len(run.y)
-            axes.plot(*place.T, color=COLOURS[0], alpha=late, linewidth=1.2, zorder=1)
+            axes.plot(*place.T, color="black", alpha=late, linewidth=1.2, zorder=1)
             axes.scatter(*place.T, s=[22.0, 44.0], color=[COLOURS[1], COLOURS[2]], alpha=late, zorder=2, linewidths=0.0)
         axes.axhline(0.0, color="black", linewidth=1.5, zorder=0)
         axes.set_aspect("equal")
         axes.set_axis_off()
         right = figure.add_axes((0.66, 0.17, 0.31, 0.63))
         for name, ended, colour, at in (
-            ("found together", together, COLOURS[0], (20.0, 1.04)),
+            ("found together", together, "black", (20.0, 1.04)),
             ("the point alone,\nthen the rod", apart, COLOURS[2], (46.0, 0.28)),
         ):
             right.plot(np.degrees(angle), ended.energy[-1], color=colour, linewidth=2.2)
@@ -305,7 +321,7 @@ if __name__ == "__main__":
         write(f"{scene}.png", sw.charts.work_precision(scene).plot())
     panels = {name: sw.charts.panel(scenes) for name, scenes in FAMILIES.items()}
     for name, panel in panels.items():
-        write(name, panel.plot())
+        write(name, panel.plot(), PANEL_DPI)
     write_best(chart for name, panel in panels.items() if name not in NO_ROWS for chart in panel.charts)
     stability = sw.charts.stability()
     write("stability-loci.png", stability.plot(kind="loci"))

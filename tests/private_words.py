@@ -1,4 +1,6 @@
-"""The one list of words and names that this project once had for what the field has a word for; docs/naming.md has the glossary.
+"""The one list of words and names that this project once had for what the field has a word for.
+
+docs/developing/naming.md has the glossary.
 
 Each is an expression that ``tests/test_words.py`` looks for in the sources and pages. What replaced it stands beside it.
 """

@@ -1,4 +1,4 @@
-"""A new method is two files, a new system three: those of ``docs/adding.md`` are added to a copy of the tree and tested there."""
+"""A new method is two files, a new system three: those of ``docs/developing/adding.md`` are tested in a copy of the tree."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project with what the page adds, and its wheel unpacked into ``site``."""
     tree = tmp_path_factory.mktemp("tree") / "stepwell"
     shutil.copytree(ROOT, tree, ignore=LEFT_OUT)
-    page = (tree / "docs" / "adding.md").read_text(encoding="utf-8")
+    page = (tree / "docs" / "developing" / "adding.md").read_text(encoding="utf-8")
     added = FILES.findall(page)
     assert sorted(name for name, _ in added) == [
         "python/stepwell/reference/steppers/midpoint.py",
@@ -126,7 +126,7 @@ def test_it_is_the_system_of_that_name(tree: Path) -> None:
 
 
 def test_what_is_added_is_formatted(tree: Path) -> None:
-    page = (ROOT / "docs" / "adding.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "developing" / "adding.md").read_text(encoding="utf-8")
     files = {name for name, _ in [*FILES.findall(page), *CHANGES.findall(page)]}
     python, rust = ([name for name in files if name.endswith(end)] for end in (".py", ".rs"))
     run(tree, "-m", "ruff", "format", "--check", "--quiet", *python)

@@ -115,7 +115,21 @@ def test_files_and_pictures(chart: ControlSweep, tmp_path: Path) -> None:
     assert [row["kind"] for row in whole["summary"]] == [line.kind for line in chart.lines]
     figure = chart.plot(tmp_path / "c.png")
     assert (tmp_path / "c.png").stat().st_size > 10_000
-    assert [axes.get_ylabel() for axes in figure.axes] == ["largest |E − E₀| / K₀", "error of the last state, relative"]
+    names = ["largest |E − E₀| / K₀", "error of the last state, relative"]
+    assert [axes.get_ylabel() for axes in figure.axes[:2]] == names
+    assert [axes.get_title(loc="left") for axes in figure.axes[2:]] == [f"{name}: before and after" for name in names]
+    # The mark before is that of the run without control, and the mark after the median of the gains that did not diverge.
+    marks = {
+        (float(line.get_xdata()[0]), float(line.get_ydata()[0]))  # type: ignore[index]
+        for line in figure.axes[2].lines
+        if len(line.get_xdata()) == 1  # type: ignore[arg-type]
+    }
+    methods = list(dict.fromkeys(line.method.name for line in chart.lines))
+    for row, method in enumerate(methods):
+        assert (float(chart.line(method, "none").energy_error[0]), float(row)) in marks
+        if method != "leapfrog":
+            held = chart.line(method, "limited").energy_error
+            assert (float(np.median(held[np.isfinite(held)])), float(row)) in marks
 
 
 def test_the_title_says_what_control_changes() -> None:
@@ -150,7 +164,7 @@ def test_what_diverged_is_drawn_above_the_frame_and_summed_up() -> None:
     told = next(row for row in chart.summary() if row["kind"] == "printed")
     assert (told["diverged"], told["diverged_from"]) == (1, 10.0)
     figure = chart.plot()
-    for axes in figure.axes:
+    for axes in figure.axes[:2]:
         above = [
             each for each in axes.lines if np.size(each.get_ydata()) and np.max(each.get_ydata()) > 1 and not each.get_clip_on()
         ]

@@ -14,17 +14,20 @@ import pytest
 import stepwell as sw
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted((ROOT / "docs").glob("*.md"))
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted((ROOT / "docs").rglob("*.md"))
 #: Where a page may find the files that it names, by their last parts.
 FOLDERS = ["benches", "docs", "examples", "python", "rust", "tests"]
 
-FENCE = re.compile(r"(?:<!-- file: python/(\S+)\.py -->\n)?^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"(?:<!-- file: python/(\S+)\.py -->\n)?^```([^`\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SAID = re.compile(r"#\s*→ (.*)$", re.MULTILINE)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 NAMED = re.compile(r"`([\w.*{},/-]+(?:/|\.(?:rs|py|pyi|md|toml|txt|png)))`")
 INTRODUCED = re.compile(r"<!-- file: (\S+) -->")
 
-pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+#: What a page needs beside what every page may use. The extra ``test`` has it.
+NEEDS = {"interop.md": ("gymnasium", "pandas", "xarray")}
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 
 
 def text(page: Path) -> str:
@@ -49,6 +52,8 @@ def blocks(page: Path) -> list[tuple[int, str, str]]:
 
 @pages
 def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
+    for package in NEEDS.get(page.name, ()):
+        pytest.importorskip(package)
     monkeypatch.chdir(tmp_path)
     namespace = {"__name__": page.stem}
     for line, code, module in blocks(page):
@@ -115,9 +120,9 @@ def test_every_scene_is_in_a_picture_of_errors_against_cost() -> None:
     drawn = runpy.run_path(str(ROOT / "docs" / "pictures.py"))
     names = [name for scenes in drawn["FAMILIES"].values() for name in scenes]
     assert sorted([*names, "cloth"]) == [scene.name for scene in sw.scenes.scenes()]
-    page = (ROOT / "docs" / "work-precision.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "benchmarks" / "work-precision.md").read_text(encoding="utf-8")
     assert "The scene `cloth` is missing" in page
     for picture, scenes in drawn["FAMILIES"].items():
-        assert f"](images/{picture})" in page
+        assert f"](../images/{picture})" in page
         for scene in scenes:
             assert (f"| `{scene}` |" in page) is (picture not in drawn["NO_ROWS"])

@@ -170,3 +170,29 @@ def test_arrays_that_change_later_do_not_matter() -> None:
     expected = run.encounters
     v[:], y[:] = 7.0, 8.0
     assert run.encounters == expected
+
+
+def test_bodies_that_others_pull_apart_are_not_looked_for(monkeypatch):
+    """At the start of the figure-eight bodies 0 and 1 are at rest against each other: alone they would fall together.
+
+    The third, half way between them, pulls each towards itself by m/r², r half of their distance: the two pulls differ by 2m/r²,
+    where they pull each other together by 2/(2r)², a quarter. Looking for their encounter takes 20 times as long as the run.
+    """
+    scene = sw.scenes.figure_eight()
+    v, y, masses = (np.asarray(each) for each in (scene.v, scene.y, scene.system.masses))
+    assert np.array_equal(v[0], v[1])
+    assert np.array_equal(y[0], -y[1])
+    assert not y[2].any()
+    assert (masses == 1.0).all()
+    assert not _encounters.may_meet(scene.system, 1e-3, 100.0, v.tolist(), y.tolist())
+    two = sw.NBody(masses[:2], force="newton")
+    assert _encounters.may_meet(two, 1e-3, 100.0, v[:2].tolist(), y[:2].tolist())
+    light = sw.NBody([1.0, 1.0, 0.24], force="newton")  # 0.24·2/r² is less than 2/(2r)² = 0.25·2/r²
+    heavy = sw.NBody([1.0, 1.0, 0.26], force="newton")
+    for bodies, expected in ((light, True), (heavy, False)):
+        assert _encounters.may_meet(bodies, 1e-3, 100.0, v.tolist(), y.tolist()) == expected
+    runs = []
+    advance = _encounters.engine.advance
+    monkeypatch.setattr(_encounters.engine, "advance", lambda *given, **how: runs.append(1) or advance(*given, **how))
+    sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=6.3e-4, steps=20_000)
+    assert len(runs) == 1

@@ -4,6 +4,7 @@ import re
 import runpy
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,6 +40,13 @@ MISTAKES = {
 }
 
 
+@pytest.fixture(autouse=True)
+def _figures_are_closed():
+    """Pyplot keeps every figure of the examples, and warns of the twenty-first."""
+    yield
+    plt.close("all")
+
+
 def run(code, name, folder):
     """Runs ``main`` of an example's text."""
     names = {"__name__": name}
@@ -49,8 +57,8 @@ def run(code, name, folder):
 def test_every_example_is_pinned_shown_and_told_of():
     known = sorted(file.stem for file in EXAMPLES.glob("*.py"))
     assert known == sorted(LAST_LINES) == sorted(MISTAKES) == sorted(file.stem for file in PICTURES.glob("*.png"))
-    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
-    assert sorted(re.findall(r"\(images/equations/(\w+)\.png\)", page)) == known
+    page = (ROOT / "docs" / "howto" / "examples.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"\(\.\./images/equations/(\w+)\.png\)", page)) == known
 
 
 @pytest.mark.parametrize("name", LAST_LINES)
@@ -72,7 +80,7 @@ def test_a_mistake_is_noticed(name, tmp_path):
 @pytest.mark.parametrize("name", LAST_LINES)
 def test_the_page_has_the_lines_of_the_file(name):
     """What the gallery shows is what runs."""
-    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "howto" / "examples.md").read_text(encoding="utf-8")
     code = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
     (shown,) = re.findall(rf"<!-- lines of examples/equations/{name}\.py -->\n```python\n(.*?)```\n", page, re.DOTALL)
     assert shown in code

@@ -8,6 +8,7 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 LAST_LINES = {
+    "bifurcation": "periods at γ = 0.20, 0.28, 0.29, 0.37, 0.50, 0.65: 1, 2, 4, 5, chaos, 2",
     "chain_wave": "front at mass 201 of 400, energy within 0.0188 of its start",
     "compare_methods": "false_euler at Φ = 1.999: 500.5, at Φ = 2.001: 8e+110",
     "game_loop": "t = 10 s after 2400 steps: y = -0.042682, -0.000932, 0.000000 m",

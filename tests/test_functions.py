@@ -25,11 +25,11 @@ from stepwell.reference.functions import exponential, hyperbolic, inverse, logar
 from true_functions import OF_ONE, OF_TWO, PRECISION, SPECIALS, TRUE, arguments, errors, same, sizes
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "functions.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "theory" / "functions.md").read_text(encoding="utf-8")
 
 
 def table() -> dict[str, list[str]]:
-    """The table of docs/functions.md: of each function its cells."""
+    """The table of docs/theory/functions.md: of each function its cells."""
     lines = [line for line in PAGE.splitlines() if line.startswith("| `")]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return {name.strip("` "): row[1:] for row in rows for name in row[0].split(",")}

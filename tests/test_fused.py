@@ -139,6 +139,33 @@ def test_multiplying_increments_last_changes_roundings_alone(name: str) -> None:
     assert shorter > 0
 
 
+@pytest.mark.parametrize("by_core", [True, False], ids=["core", "reference"])
+def test_which_of_two_negated_products_was_met_first_decides_nothing(by_core: bool) -> None:
+    """−a·b − (c + d)·d: a tape makes (−a·b) − … of it, or (−(c + d)·d) − …, by the order in which it comes upon the two."""
+    plain, found = [], []
+    for deep_first in (False, True):
+        tape = _core.Tape()
+        a, b, c, d = (tape.state(i) for i in range(4))
+        deep = -((c + d) * d) if deep_first else None
+        flat = -(a * b)
+        total = flat + (-((c + d) * d) if deep is None else deep)
+        lines, roots = operations(tape, [total])
+        plain.append(graph(lines, roots))
+        found.append(graph(*(operations(*tape.fused([total])) if by_core else fused(lines, roots))))
+    assert plain[0] != plain[1]
+    assert found[0] == found[1]
+
+
+def graph(lines: Any, roots: Any) -> list[Any]:
+    """What values are made of, whatever the order of lines and of operands that commute."""
+    keys: list[Any] = []
+    for name, of, what in lines:
+        operands = [keys[line] for line in of]
+        free = 2 if name in ("add", "multiply", "multiply add") else 0
+        keys.append((name, *sorted(operands[:free], key=repr), *operands[free:], what))
+    return [keys[root] for root in roots]
+
+
 def test_the_order_of_writing_decides_nothing() -> None:
     # x·y + z·x, its products written down in either order, and its sum either way round.
     found = set()

@@ -30,7 +30,7 @@ def test_the_project_says_what_an_index_shows() -> None:
 
 
 def test_every_extra_that_a_page_or_a_message_names_is_there() -> None:
-    files = [*(ROOT / "python").rglob("*.py"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
+    files = [*(ROOT / "python").rglob("*.py"), *(ROOT / "docs").rglob("*.md"), ROOT / "README.md"]
     named = {name for file in files for name in re.findall(r"stepwell\[(\w+)\]", file.read_text(encoding="utf-8"))}
     assert "chart" in named
     assert named <= set(PROJECT["optional-dependencies"])

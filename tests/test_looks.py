@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.charts import labels, style
+from stepwell.charts.figures_picture import finding as figures_finding
+from stepwell.charts.figures_picture import groups
 from stepwell.charts.panel_picture import leader
 from stepwell.charts.picture import finding
 
@@ -213,3 +215,34 @@ def test_what_cannot_be_drawn_is_said():
         batch.plot()
     with pytest.raises(sw.errors.ArgumentError, match="expected two saved states or more, got 1; run with every="):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5).plot()
+
+
+def test_the_title_of_the_figures_counts_what_the_methods_do():
+    """With Φ = 0.5 Standard Euler (§5) and Standard Heun (§9) grow, two Heuns decay (§10, §11); the §7 and §8 turn too fast."""
+    chart = sw.charts.figures()
+    apart, exact = groups(chart)
+    assert [sorted(samples.method.name for samples in same) for same in apart if len(same) > 1] == [
+        ["damped_euler", "false_euler", "leapfrog", "verlet"]
+    ]
+    assert all(samples.method.order >= 4 for samples in exact)
+    assert all(abs(samples.y - np.cos(samples.t)).max() < 0.05 for samples in exact)
+    told = f"Of 14 methods 2 gain energy, 2 lose it, 4 keep the amplitude but not the time, {len(exact)} look exact"
+    assert figures_finding(chart) == told
+    assert told in [text.get_text() for text in chart.plot().texts]
+    # At Φ = 2 the four have a double eigenvalue −1, and grow, although r₁ is 1.
+    assert "keep the amplitude" not in figures_finding(sw.charts.figures(["false_euler", "leapfrog"], phi=2.0))
+
+
+def test_names_at_the_ends_of_curves_do_not_cover_each_other():
+    figure = style.new_figure(6.0, 4.0)
+    axes = figure.add_axes((0.1, 0.1, 0.6, 0.8))
+    axes.set(yscale="log", ylim=(1e-3, 1.0), xlim=(0.0, 1.0))
+    ends = [(1.0, y, f"curve {i}", "#000000") for i, y in enumerate((0.5, 0.51, 0.9, 0.95, 2e-3))]
+    labels.at_ends(axes, ends, 10.0, 0.08)
+    boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    assert len(boxes) == 5
+    heights = [boxes[f"curve {i}"].y0 for i in (4, 0, 1, 2, 3)]
+    assert heights == sorted(heights)
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes.values(), 2))
+    frame = axes.get_window_extent()
+    assert all(frame.x1 <= box.x0 and frame.y0 <= box.y0 and box.y1 <= frame.y1 for box in boxes.values())

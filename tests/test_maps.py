@@ -29,7 +29,7 @@ POLYNOMIALS = {
 
 @pytest.fixture(scope="module")
 def false_euler():
-    return sw.charts.stability_map("false_euler", size=(200, 101))
+    return sw.charts.stability_map("false_euler", phi=(0, 4), size=(200, 101))
 
 
 def read(path):
@@ -73,7 +73,8 @@ def test_every_row_ends_where_the_limit_is(method):
             assert row["stable_up_to"] < 0.1  # where growth of a high order begins it is lost in rounding
             continue
         assert row["stable_up_to"] <= limit * (1 + 1e-9)
-        assert limit <= row["stable_up_to"] + chart.phi[0] * (1 + 1e-9)
+        # A series is stable beyond the largest Φ of the map.
+        assert min(limit, chart.phi[-1]) <= row["stable_up_to"] + chart.phi[0] * (1 + 1e-9)
 
 
 def test_the_grid(false_euler):
@@ -83,6 +84,18 @@ def test_the_grid(false_euler):
     chart = sw.charts.stability_map("rk4", phi=(1, 2), damping=(0.5, 0.7), size=3)
     assert (chart.phi[0], chart.phi[-1], chart.damping[0], chart.damping[-1]) == pytest.approx((4 / 3, 2, 0.5, 0.7))
     assert sw.charts.stability_map("rk4").radius.shape == (512, 512)
+
+
+@pytest.mark.parametrize("method", DAMPED, ids=lambda m: m.name)
+def test_a_map_is_fitted_to_the_limit(method):
+    """It ends past the largest limit of its rows, and by no more than the quarter, a coarse point and the rounding up."""
+    chart = sw.charts.stability_map(method, size=(8, 5))
+    limits = [float(sw.stability_limit(sw.Oscillator(damping=d), method)) for d in np.linspace(0, 2, 33)]
+    assert max(limits) < chart.phi[-1] <= 1.25 * (max(limits) + 0.06) + 0.05
+    said = chart.plot().texts[0].get_text()
+    assert said.startswith(f"{method.title}: ")
+    assert ("never stable undamped" in said) == (limits[0] == 0.0)
+    assert f"to Φ = {limits[16]:.3g} at D = 1" in said
 
 
 def test_a_map_takes_less_than_a_second():
@@ -96,7 +109,7 @@ def test_a_map_takes_less_than_a_second():
 
 
 def test_a_double_eigenvalue_on_the_circle_is_not_stable():
-    chart = sw.charts.stability_map("false_euler", damping=None, size=(4, 1))
+    chart = sw.charts.stability_map("false_euler", phi=(0, 4), damping=None, size=(4, 1))
     assert chart.phi.tolist() == [1, 2, 3, 4]
     assert chart.stable.tolist() == [[True, False, False, False]]
     assert chart.radius[0, 1] == 1
@@ -284,7 +297,8 @@ def test_the_picture_has_lines_numbers_and_hatching(method, tmp_path):
     assert image.shape[:2] == (700, 1000)
     assert image[..., :3].std() > 0.1
     axes, bar = figure.axes
-    assert f"Where {method.title} is stable ({method.section})" in [text.get_text() for text in figure.texts]
+    assert figure.texts[0].get_text().startswith(f"{method.title}: ")
+    assert figure.texts[1].get_text().startswith(f"{method.section}. Damped oscillator")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Φ = ω₀·dt (rad)", "damping ratio D")
     assert "r₁" in bar.get_ylabel()
     assert any(hatch for collection in axes.collections for hatch in getattr(collection, "hatches", ()))

@@ -53,6 +53,9 @@ MUTANTS = [
     ("fehlberg_5", "-9 / 50, 2 / 55)", "2 / 55, -9 / 50)", "two weights exchanged"),
     ("pefrl", "v = v + LAMBDA * s.dv(t + (XI + CHI) * h, v, y)", "v = v + LAMBDA * s.dv(t, v, y)", "wrong stage time"),
     ("pefrl", "(1.0 - 2.0 * (CHI + XI))", "(1.0 - 2.0 * CHI)", "a drift too long"),
+    ("taylor", "ORDER = 8", "ORDER = 7", "a lost order"),
+    ("taylor", "reversed(terms))", "reversed(terms[1:]))", "a lost first term"),
+    ("taylor", "term[1] + total[1]", "term[0] + total[1]", "the wrong block"),
     ("verlet", "y_prev = y - s.dy(t, v, y)", "y_prev = y + s.dy(t, v, y)", "a wrong sign at the start"),
 ]
 IDS = [f"{method}: {mistake} #{i}" for i, (method, _, _, mistake) in enumerate(MUTANTS)]
@@ -88,6 +91,8 @@ def _true(method: str) -> bool:
         np.allclose(matrix_of(method, phi, "canonical", "numpy"), CLOSED_FORMS[method](phi), rtol=0, atol=1e-11)
         for phi in (0.1, 0.7, 1.9)
     )
+    if sw.method(method).has_series:  # its error vanishes at some steps; of its order and its times, see ``test_taylor.py``
+        return closed
     order = sw.method(method).order
     return (
         closed

@@ -280,4 +280,6 @@ def test_the_tableau_is_the_printed_one(name: str) -> None:
 
 
 def test_every_method_has_its_order_measured() -> None:
-    assert {m.name for m in METHODS} | set(HIGH) == {m.name for m in sw.methods()}
+    """That of a series is in ``test_taylor.py``: of order 8, it takes fewer and longer steps than these tests make."""
+    series = {m.name for m in sw.methods() if m.has_series}
+    assert {m.name for m in METHODS} | set(HIGH) | series == {m.name for m in sw.methods()}

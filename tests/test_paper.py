@@ -13,7 +13,7 @@ from stepwell.cli import main
 
 ENTRIES = paper.entries()
 SECTIONS = [*(f"§{n}" for n in range(1, 13)), *(f"App. {letter}" for letter in "ABCDE")]
-PAGE = Path(__file__).parent.parent / "docs" / "paper.md"
+PAGE = Path(__file__).parent.parent / "docs" / "theory" / "paper.md"
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=[f"{entry.section}-{entry.name}" for entry in ENTRIES])
@@ -34,7 +34,7 @@ def test_names_and_pictures_are_unique():
 
 
 def test_every_misprint_of_the_errata_is_named():
-    """The table of docs/errata.md and the entries with a correction are about the same sections."""
+    """The table of docs/theory/errata.md and the entries with a correction are about the same sections."""
     table = (PAGE.parent / "errata.md").read_text(encoding="utf-8")
     rows = [line for line in table.splitlines() if re.match(r"\| \[(§|App)", line)]
     named = {part for row in rows for part in re.findall(r"§\d+|[B-E](?=[,\]])", row.split("|")[1])}

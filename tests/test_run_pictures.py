@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import json
 import math
+import pickle
 import sys
 from itertools import pairwise
 
@@ -238,11 +239,42 @@ def test_bodies_are_told_apart():
 
 
 def test_a_long_run_does_not_hide_the_exact_orbit():
-    chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=runs_picture.LONG_CURVE + 1)
+    chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=3 * runs_picture.LONG_CURVE)
+    assert runs_picture.crowded(chart, 2.4)
     lines = chart.plot().axes[0].lines
     paths = [line.get_zorder() for line in lines if len(line.get_xdata()) == len(chart.run.t)]
     exact = [line.get_zorder() for line in lines if line.get_linestyle() == "--"]
     assert min(exact) > max(paths)
+
+
+def test_bodies_on_one_curve_are_all_seen():
+    """The last one drawn would hide the others: each has its colour where it went in the last third of a period."""
+    chart = looked_at(sw.scenes.clover(), "rk4")
+    axes = chart.plot().axes[0]
+    arcs = [line for line in axes.lines if line.get_linewidth() == 3.0]
+    assert [line.get_color() for line in arcs] == [look["color"] for look in runs_picture.BODIES[:3]]
+    assert [line.get_xydata()[-1].tolist() for line in arcs] == chart.run.y[-1].tolist()
+    third = chart.scene.period / 3
+    for line in arcs:
+        assert len(line.get_xdata()) == pytest.approx(third / chart.run.dt, abs=1.0)
+    assert not runs_picture.one_curve(looked_at(sw.scenes.pythagorean(), "rk4", steps=100))
+    assert not runs_picture.one_curve(looked_at(sw.scenes.kepler()))
+
+
+def test_the_distance_from_the_centre_is_drawn_over_the_angle(pictures):
+    """Kepler's ellipse: r = a·(1 − e²)/(1 + e·cos θ) of each body, half of the relative orbit; a turn a period."""
+    chart = pictures["two"]
+    axes = next(a for a in chart.plot().axes if a.get_title(loc="left").startswith("distance from the centre"))
+    for i, line in enumerate(line for line in axes.lines if line.get_zorder() == 3):
+        np.testing.assert_allclose(line.get_ydata(), np.hypot(*chart.run.y[:, i].T), rtol=1e-15)
+    grey = next(line for line in axes.lines if line.get_zorder() == 1)
+    angle, r = 2 * np.pi * grey.get_xdata(), grey.get_ydata()
+    e = 0.9
+    nearest = angle[np.argmin(r)]
+    # The least is found among 6001 points, 1e-3 of a turn apart where r is least; the ellipse is flat there.
+    found = 0.5 * (1 - e * e) / (1 + e * np.cos(angle - nearest))
+    np.testing.assert_allclose(r, found, rtol=0.05)
+    assert not any(a.get_title(loc="left").startswith("distance") for a in pictures["orbits"].plot().axes)
 
 
 def test_what_leaves_the_picture_is_said(pictures):
@@ -542,3 +574,12 @@ def test_without_matplotlib_the_numbers_are_still_there(monkeypatch, tmp_path):
         with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
             draw()
     chart.to_csv(tmp_path / "run.csv")
+
+
+def test_a_notebook_shows_a_figure_without_pyplot():
+    """IPython asks an object for ``_repr_png_``; what it knows of matplotlib's figures it learns from pyplot."""
+    run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=2.0, dt=0.1, steps=30, every=1)
+    figure = run.plot()
+    assert figure._repr_png_() == style.png(figure)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS
+from cases import ADAPTIVE, SYSTEMS, fits
+from stepwell import engine
 from stepwell._value import changed
 from stepwell.reference import adaptive, contact
 from stepwell.reference.traced import Tracer
@@ -34,10 +35,6 @@ def made(name: str) -> tuple[sw.System, Any, Any]:
     v, y = (0.5 * rng.normal(size=(*shape, MEMBERS)) for shape in (system.v_shape, system.y_shape))
     system = changed(system, batch=(MEMBERS,))
     return system, v, y
-
-
-def fits(system: sw.System, method: sw.Method) -> bool:
-    return not method.needs_acceleration or (system.second_order and system.velocity_term is None)
 
 
 def numbers(system: sw.System, tape: Tape, symbols: list[Symbol], *state: Any, h: float = H, budget: float = 0.0) -> list[Any]:
@@ -154,9 +151,10 @@ def test_every_attempt(name: str) -> None:
     for method in ABLE:
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
-        s, steps = adaptive.Attempted(system.scaled(1.0, system.batch)), method.steps
+        s = adaptive.Attempted(system.scaled(1.0, system.batch))
         with np.errstate(all="ignore"):
-            outcomes = [adaptive.attempt(steps, s, method.error_order, axes, each, 9.0, v, y) for each in paces]  # type: ignore[arg-type]
+            attempt = engine.attempts(method, s, axes)
+            outcomes = [attempt(each, 9.0, v, y) for each in paces]
         for each, (after, v1, y1) in zip(paces, outcomes, strict=True):
             assert_computes(numbers(system, tape, symbols, v, y, *each, budget=9.0), v1, y1, *after)
 

@@ -48,7 +48,8 @@ def test_the_documents_own_program(method: str) -> None:
         np.testing.assert_allclose(run.y, theirs, rtol=0, atol=200**2 * np.finfo(float).eps * size)
 
 
-@pytest.mark.parametrize("method", METHODS)
+# The error of a series in v all but vanishes at some of these steps: test_taylor.py measures its order on the same system.
+@pytest.mark.parametrize("method", [m for m in METHODS if not sw.method(m).has_series])
 @pytest.mark.parametrize("block", ["v", "y"])
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
 def test_order_on_a_forced_system(method: str, block: str, backend: str) -> None:
@@ -138,10 +139,12 @@ def test_each_limit_from_both_sides(method: str) -> None:
     """Bounded a thousandth below the recorded limit, growing a thousandth above."""
     limit = sw.method(method).limit
     phi = limit * np.array([0.999, 1.001])
-    run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=4000, every=100)
+    # A series of order 8 has a radius of 1.0006 above, whose power of 4000 is 11.02 (test_taylor.py), and of 16 000 is 14 700.
+    steps = 16_000 if sw.method(method).has_series else 4000
+    run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=steps, every=100)
     size = np.abs(run.y).max(axis=0)
     # Below, the axes of the ellipse of False Euler are in the ratio √((2+Φ)/(2−Φ)) < 45. Above, an eigenvalue passes 1 by at
-    # least 1e-3·|dz/dlnΦ|; the flattest of these methods grows by more than e⁷ in 4000 steps.
+    # least 1e-3·|dz/dlnΦ|; the flattest of these methods grows by more than e⁷ in so many steps.
     assert size[0] < 50
     assert size[1] > 1e3
 

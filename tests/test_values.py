@@ -40,6 +40,10 @@ def point() -> charts.WorkPrecision:
     return charts.work_precision("oscillator", ["false_euler"], [100])
 
 
+def passage(t: Any, v: Any, y: Any) -> Any:
+    return y
+
+
 def exactly(scene: sw.Scene, times: Any, setting: float) -> charts.Solved:
     """A peer that knows the solution."""
     assert scene.exact is not None
@@ -184,7 +188,21 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Projection("nacozy"),
         lambda: sw.Projection(target=[1.0, 2.0]),
     ],
+    "Event": [
+        lambda: sw.Event(passage),
+        lambda: sw.Event(quiet),
+        lambda: sw.Event(passage, direction=1),
+        lambda: sw.Event(passage, terminal=True),
+        lambda: sw.Event(passage, most=10),
+        lambda: sw.Event(passage, name="zero"),
+    ],
+    "Occurrences": [
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, events=passage).events["passage"],
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=40, events=passage).events["passage"],
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=30, events=passage).events["passage"],
+    ],
     "Run": [
+        lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, events=passage),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, every=1),
         lambda: sw.integrate(FREE, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, force=0.0),

@@ -15,10 +15,13 @@ import warnings
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
+from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import own_systems as own
 import pytest
 import stepwell as sw
 from stepwell import charts, stability
@@ -152,6 +155,13 @@ OF_METHODS = {"methods": ["rk4"]}
 KEPLER = sw.scenes.kepler()
 
 
+def passage(t: Any, v: Any, y: Any) -> Any:
+    return y
+
+
+PASSAGES = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=[1.0, 2.0], dt=0.1, steps=30, events=passage).events["passage"]
+
+
 def _world(**given: Any) -> sw.World:
     arrays = {name: np.full(3, given[name]) for name in ("v", "y") if isinstance(given.get(name), float)}
     return sw.World(**given | arrays)
@@ -159,6 +169,13 @@ def _world(**given: Any) -> sw.World:
 
 def _of_run(name: str) -> Callable[..., Any]:
     return getattr(sw.integrate(**FREE, dt=0.1, steps=3, every=1), name)
+
+
+FILES = TemporaryDirectory()
+SAVED, SAVED_OWN = (Path(FILES.name) / f"{name}.npz" for name in ("run", "own"))
+A_RUN = sw.integrate(sw.Oscillator(np.ones(3)), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+A_RUN.save(SAVED)
+sw.integrate(own.pendulum, "rk4", v=0.0, y=1.0, dt=0.1, steps=3).save(SAVED_OWN)
 
 
 #: Every public function and class that users call, with arguments that are right and quick. Several entries of one name are
@@ -217,6 +234,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "NormControl": (sw.NormControl, {"k": 0.5}),
     "EnergyControl": (sw.EnergyControl, {"gain": 0.1, "form": "limited", "target": 1.0}),
     "EnergyControl relative": (sw.EnergyControl, {"relative": 0.1}),
+    "Event": (sw.Event, {"function": passage, "direction": 1, "terminal": False, "most": 10, "name": "passage"}),
+    "Occurrences.of": (PASSAGES.of, {"index": 0}),
     "Projection": (sw.Projection, {"way": "scaling", "target": 1.0}),
     "method": (sw.method, {"name": "rk4"}),
     "integrate": (
@@ -234,6 +253,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         }
         | {"control": None, "tolerance": None, "at": None, "max_steps": None},
     ),
+    "integrate events": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "events": [sw.Event(passage, terminal=True)]}),
     "integrate bodies": (
         sw.integrate,
         BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
@@ -320,6 +340,19 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 4, "exponents": "all"}
         | {"transient": 2, "every": 2, "t0": 0.0},
     ),
+    "load": (sw.load, {"path": SAVED, "system": None}),
+    "load own": (sw.load, {"path": SAVED_OWN, "system": own.pendulum}),
+    "Run.save": (A_RUN.save, {"path": SAVED}),
+    "solve_ivp": (
+        sw.solve_ivp,
+        {"fun": own.lorenz, "t_span": (0.0, 0.1), "y0": [1.0, 2.0, 3.0], "method": None, "t_eval": None, "dense_output": False}
+        | {"events": None, "args": None, "first_step": None, "max_step": np.inf, "rtol": 1e-3, "atol": 1e-6},
+    ),
+    "solve_ivp at times": (
+        sw.solve_ivp,
+        {"fun": lambda t, y, k: -k * y, "t_span": (0.1, 0.0), "y0": [1.0], "method": "merson", "t_eval": [0.05, 0.0]}
+        | {"events": [lambda t, y, k: y[0]], "args": (2.0,), "vectorized": False},
+    ),
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,
@@ -378,6 +411,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "charts.peers.heyoka": (charts.peers.heyoka, {"settings": [1e-3]}),
 }
 
+
+if find_spec("pandas") and find_spec("xarray"):
+    CALLS["Run.to_dataframe"] = A_RUN.to_dataframe, {"dims": None}
+    CALLS["Run.to_xarray"] = A_RUN.to_xarray, {"dims": None, "coords": None}
 
 #: A system that is not there has arguments with defaults.
 for _name, _each in vars(sw).items():

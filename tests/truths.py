@@ -58,6 +58,7 @@ CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
     "false_heun": lambda f: np.array([[1 - f**2 / 2, -f * (1 - f**2 / 2)], [f * (1 - f**2 / 2), 1 - f**2 + f**4 / 2]]),
     "semi_false_heun": lambda f: np.array([[1 - f**2 / 2, -f], [f * (1 - f**2 / 2), 1 - f**2 / 2]]),
     "rk4": _rk4,
+    "taylor": lambda f: _taylor(f, *(Fraction(1, math.factorial(k)) for k in range(5, 9))),
     # Polynomials of z = iΦ: the exponential's to the order, then what the tableau leaves.
     "merson": lambda f: _taylor(f, Fraction(1, 144)),
     "fehlberg": lambda f: _taylor(f, Fraction(1, 104)),

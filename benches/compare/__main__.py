@@ -6,6 +6,7 @@ import argparse
 import warnings
 from pathlib import Path
 
+from .. import stages
 from . import extras, machine, peers, report, runner, workloads
 from .chosen import tables
 from .own import first_call
@@ -20,7 +21,8 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parents[1] / "RESULTS.md", help="the report")
     parser.add_argument("--quick", action="store_true", help="a little of everything, to see that it works")
     parser.add_argument("--repeats", type=int, default=9, help="how many samples of each contestant (default: 9)")
-    about = "only the works whose names begin so, with commas between; chosen for adaptive steps, W7 for own equations"
+    about = "only the works that begin so, with commas between; chosen for adaptive steps, W7 for own equations, stages for a "
+    about += "call; the others stay in the report as they are"
     parser.add_argument("--only", default="", metavar="W4", help=about)
     parser.add_argument("--members", type=int, default=10_000, help="orbits with adaptive steps (default: 10 000)")
     given = parser.parse_args()
@@ -29,7 +31,8 @@ def main() -> None:
 
     load = machine.load()
     reading = report.READING.format(repeats=repeats, sample=1e3 * runner.SAMPLE / (10 if given.quick else 1))
-    parts = ["## How to read", reading]
+    parts = [f"## How to read\n\n{reading}"]
+    before = given.output.read_text(encoding="utf-8") if given.only and given.output.is_file() else None
     contestants = peers.catalogue()
     described = [*machine.describe(), ("load of the machine", f"{load} before")]
 
@@ -37,7 +40,8 @@ def main() -> None:
         """What is known so far, so that nothing is lost if a later work fails or is interrupted."""
         told = "\n".join(f"- {what}: {value}" for what, value in described)
         whole = ["# Every language on the same work", "Written by `python -m benches.compare`; do not edit.", told, *parts]
-        given.output.write_text("\n\n".join(part.strip() for part in whole) + "\n", encoding="utf-8")
+        text = "\n\n".join(part.strip() for part in whole) + "\n"
+        given.output.write_text(text if before is None else report.renewed(before, text, given.only), encoding="utf-8")
 
     for work in workloads.catalogue():
         if not work.name.startswith(only):
@@ -58,6 +62,10 @@ def main() -> None:
     if first_call.NAME.startswith(only):
         parts.append("## Own equations\n\n" + first_call.READING.format(members=first_call.MEMBERS, repeats=repeats))
         made = first_call.table(repeats, given.quick)
+        report.show(*made)
+        parts.append(report.markdown(*made))
+    if "stages".startswith(only):
+        made = stages.table()
         report.show(*made)
         parts.append(report.markdown(*made))
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]

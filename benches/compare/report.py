@@ -92,3 +92,18 @@ def markdown(title: str, head: list[str], lines: list[list[str]]) -> str:
     """As Markdown."""
     rows = [head, ["---"] * len(head), *lines]
     return "\n".join([f"## {title}", "", *(f"| {' | '.join(row)} |" for row in rows), ""])
+
+
+def sections(text: str) -> dict[str, str]:
+    """The parts of a report by their titles; what is before the first has none."""
+    parts = ("\n" + text).split("\n## ")
+    return {"": parts[0].strip()} | {part.partition("\n")[0]: f"## {part.strip()}" for part in parts[1:]}
+
+
+def renewed(before: str, now: str, only: str) -> str:
+    """A report in which some works were done again, in a run of their own. Ratios are within a work, so they hold on."""
+    old, new = sections(before), sections(now)
+    date = next((line for line in new[""].splitlines() if line.startswith("- date: ")), "- date: unknown")
+    again = f"- done again in a run of their own, {date.removeprefix('- date: ')}: {only}"
+    head = [line for line in old[""].splitlines() if line != again]
+    return "\n\n".join((old | new | {"": "\n".join([*head, again])}).values()) + "\n"

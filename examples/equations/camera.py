@@ -1,4 +1,7 @@
-"""Games: a camera on a spring, and the frame rate at which it flies away.
+"""A camera on a spring flies away below 24 frames a second
+========================================================
+
+Games: a camera on a spring, and the frame rate at which it flies away.
 
 The camera follows its target by a critically damped spring, stepped once a frame by False Euler, as games do. That is stable
 only for omega·dt < 2·√2 − 2: a spring of 20 rad/s wants 24.1 frames a second.
@@ -7,9 +10,9 @@ only for omega·dt < 2·√2 − 2: a spring of 20 rad/s wants 24.1 frames a sec
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 
 @sw.system
@@ -26,7 +29,7 @@ def main(folder: Path) -> None:
     limit = sw.stability_limit(camera(), "false_euler", v=0.0, y=1.0)
     assert abs(20.0 * limit / (2.0 * 2.0**0.5 - 2.0) - 1.0) < 1e-12, limit
 
-    figure = Figure(figsize=(7.2, 3.6), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 3.6), dpi=120, layout="constrained")
     panels = figure.subplots(1, 3, sharey=True)
     found = {23: "flies away", 30: "jerks, and arrives", 120: "is nearly right"}
     for axes, (rate, what) in zip(panels, found.items(), strict=True):
@@ -46,4 +49,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

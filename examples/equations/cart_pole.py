@@ -1,4 +1,7 @@
-"""Control: which tilts a motor can catch, for every gain.
+"""Which poles a controller catches
+================================
+
+Control: which tilts a motor can catch, for every gain.
 
 A pole stands on a cart of mass M with a bob of mass m on top; the motor pushes with F = gain·tilt + damping·(its rate), at most
 LIMIT. A pole at rest comes back only if F·cos(tilt) is above (M + m)·g·sin(tilt): gain > (M + m)·g·tan(tilt)/tilt, and
@@ -8,9 +11,9 @@ tan(tilt) < LIMIT/((M + m)·g).
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 CART, BOB, LENGTH, G, LIMIT = 1.0, 0.5, 0.8, 9.81, 10.0  # kg, kg, m, m/s², N
 WEIGHT = (CART + BOB) * G
@@ -33,7 +36,7 @@ def main(folder: Path) -> None:
     predicted = (gain > WEIGHT * np.tan(tilt[:, None]) / tilt[:, None]) & (np.tan(tilt[:, None]) < LIMIT / WEIGHT)
     assert (caught == predicted).all(), np.argwhere(caught != predicted)
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.contourf(gain, np.degrees(tilt), caught, levels=[-0.5, 0.5, 1.5], colors=["#ffffff", "#b3d3e8"])
     border = np.radians(np.linspace(0.5, np.degrees(np.arctan(LIMIT / WEIGHT)), 100))
@@ -50,4 +53,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

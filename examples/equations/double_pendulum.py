@@ -1,4 +1,7 @@
-"""Mechanics: a double pendulum, and its energy.
+"""A double pendulum loses energy by the method, not by friction
+=============================================================
+
+Mechanics: a double pendulum, and its energy.
 
 Runge-Kutta 4 with 50 steps a second loses energy whenever the swing is wild. A projection after each step keeps it. Small swings
 have the frequencies √(g/l·(2 ± √2)), which checks the equations.
@@ -7,9 +10,9 @@ have the frequencies √(g/l·(2 ± √2)), which checks the equations.
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 G, LENGTH, MASS = 9.81, 1.0, 1.0  # m/s², of each rod in m, of each bob in kg
 
@@ -44,7 +47,7 @@ def main(folder: Path) -> None:
     lost, kept = (run.recorded["energy"] - run.recorded["energy"][0] for run in (alone, projected))
     assert abs(kept).max() < 0.01 * abs(lost).max()
 
-    figure = Figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(alone.t, lost, color="#d55e00", linewidth=1.2)
     axes.plot(projected.t, kept, color="#0072b2", linewidth=2.5)
@@ -58,4 +61,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

@@ -1,4 +1,7 @@
-"""Epidemics: how many fall ill in all, for every reproduction number.
+"""An epidemic ends with the share that a formula foretells
+========================================================
+
+Epidemics: how many fall ill in all, for every reproduction number.
 
 Where nobody is immune at first, the share z that falls ill in the end solves z = 1 − exp(−R0·z) (Kermack and McKendrick 1927).
 At the peak 1 − (1 + ln R0)/R0 are ill at once.
@@ -7,9 +10,9 @@ At the peak 1 − (1 + ln R0)/R0 are ill at once.
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 FIRST = 1e-4  # the share that is ill at the start
 
@@ -35,7 +38,7 @@ def main(folder: Path) -> None:
     # The formula is for very few at the start. Half a step from the peak (dt/duration)²/8 of it is missing at most.
     assert abs(at_once - peak).max() < FIRST + 0.1**2 / 8
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(r0, 100 * true, color="#0072b2")
     axes.plot(r0, 100 * peak, color="#d55e00", linestyle="--")
@@ -51,4 +54,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

@@ -1,15 +1,18 @@
-"""Optics: Luneburg's lens, a ball of glass that brings all parallel rays to one point of its rim.
+"""Luneburg's lens brings parallel rays to one point
+=================================================
 
-Its index of refraction is n = √(2 − r²) within the ball and 1 outside. A ray follows ÿ = ½·∇n², with |ẏ| = n: within the ball
+Optics: Luneburg's lens, a ball of glass that brings all parallel rays to one point of its rim.
+
+Its index of refraction is n = √(2 − r²) within the ball and 1 outside. A ray follows ÿ = ½·∇n², with the speed n: within the ball
 that is a harmonic oscillation, whose quarter period leads every ray to the far end of the axis (Luneburg 1944).
 """
 
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 DT = 0.001
 
@@ -38,7 +41,7 @@ def main(folder: Path) -> None:
     assert abs(run.recorded["speed"]).max() < 2 * DT
     assert miss.max() < DT**2 / 2, miss
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     rim = np.linspace(0.0, 2.0 * np.pi, 200)
     axes.fill(np.cos(rim), np.sin(rim), color="#e3eef5")
@@ -57,4 +60,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

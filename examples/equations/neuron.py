@@ -1,4 +1,7 @@
-"""Neurons: which current makes Hodgkin and Huxley's axon fire, and how often.
+"""An axon is silent, or fires fast
+================================
+
+Neurons: which current makes Hodgkin and Huxley's axon fire, and how often.
 
 Firing is possible from 6.26 µA/cm² on, and rest loses its stability at 9.78 (Rinzel and Miller 1980). A current that is switched
 on at rest makes the axon fire for good soon beyond the first, and at once fifty times a second: there is no slow firing.
@@ -7,9 +10,9 @@ on at rest makes the axon fire for good soon beyond the first, and at once fifty
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 
 def ratio(x):
@@ -54,7 +57,7 @@ def main(folder: Path) -> None:
     assert FIRING < onset < FIRING + 0.25, onset  # the next current of the sweep
     assert slowest > 50.0, slowest
 
-    figure = Figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(current, rate, "o", color="#0072b2", markersize=4)
     axes.axvline(UNSTABLE, color="#666666", linestyle="--")
@@ -70,4 +73,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

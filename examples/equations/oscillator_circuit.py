@@ -1,4 +1,7 @@
-"""Circuits: the period of Van der Pol's oscillator, from a gentle hum to relaxation.
+"""Weak and strong triodes follow two known laws
+=============================================
+
+Circuits: the period of Van der Pol's oscillator, from a gentle hum to relaxation.
 
 With a weak triode (small µ) it swings like a coil and a capacitor, with the period 2π·(1 + µ²/16) (Lindstedt); with a strong one
 it charges and tips over, with the period (3 − 2·ln 2)·µ + 7.0143·µ^(−1/3) (Haag, Dorodnitsyn).
@@ -7,9 +10,9 @@ it charges and tips over, with the period (3 − 2·ln 2)·µ + 7.0143·µ^(−1
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 
 @sw.system
@@ -35,7 +38,7 @@ def main(folder: Path) -> None:
     assert (abs(period - weak) < 1.2 * 2.0 * np.pi * 5.0 * mu**4 / 3072.0 + 1e-4)[mu < 0.7].all()
     assert abs(period[-1] / strong[-1] - 1.0) < 0.01
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.loglog(mu[mu < 6], weak[mu < 6], color="#0072b2", linewidth=2)
     axes.loglog(mu[mu > 0.3], strong[mu > 0.3], color="#d55e00", linestyle="--", linewidth=2)
@@ -54,4 +57,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

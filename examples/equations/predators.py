@@ -1,4 +1,7 @@
-"""Ecology: predators and prey, whose numbers go round for ever.
+"""Predators and prey go round in a loop, if the method lets them
+==============================================================
+
+Ecology: predators and prey, whose numbers go round for ever.
 
 In logarithms Lotka's and Volterra's equations are a pair of blocks, each of which depends on the other alone. False Euler then
 stays on a closed curve at the cost of Standard Euler, which spirals outward. Over time, mean numbers are those of the equilibrium
@@ -8,9 +11,9 @@ stays on a closed curve at the cost of Standard Euler, which spirals outward. Ov
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 BIRTHS, HUNTED, EATEN, DEATHS = 1.0, 0.5, 0.2, 0.8  # per year; numbers in thousands
 
@@ -38,7 +41,7 @@ def main(folder: Path) -> None:
     prey = np.exp(closed.y[:-1]).mean()
     assert abs(prey - DEATHS / EATEN) <= np.ptp(closed.v) / EATEN / closed.t[-1]
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(np.exp(spiral.y), np.exp(spiral.v), color="#d55e00", linestyle="--", linewidth=1.2)
     axes.plot(np.exp(closed.y), np.exp(closed.v), color="#0072b2", linewidth=2.5)
@@ -54,4 +57,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

@@ -1,4 +1,7 @@
-"""Celestial mechanics: orbits of stars in a galaxy, from order to chaos.
+"""Stars go from order to chaos as their energy grows
+==================================================
+
+Celestial mechanics: orbits of stars in a galaxy, from order to chaos.
 
 Hénon and Heiles (1964) asked whether a star has a further constant of motion beside its energy. At low energy, the points where
 an orbit crosses the plane x = 0 lie on curves: it has. At a higher one those of most orbits scatter over an area: they have not.
@@ -7,9 +10,9 @@ an orbit crosses the plane x = 0 lie on curves: it has. At a higher one those of
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 
 @sw.system
@@ -41,7 +44,7 @@ def main(folder: Path) -> None:
     escape = [float(energy(0.0 * each.y, each.y)) for each in saddles]
     assert np.allclose(escape, 1 / 6, rtol=1e-12), escape
 
-    figure = Figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.0), dpi=120, layout="constrained")
     both = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, level, title in zip(
         both, (1 / 12, 1 / 8), ("E = 1/12: curves, so order", "E = 1/8: islands in a sea of chaos"), strict=True
@@ -57,4 +60,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

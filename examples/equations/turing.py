@@ -1,4 +1,7 @@
-"""Chemistry: stripes out of nothing, in the Brusselator on a ring.
+"""Diffusion makes stripes of the length that Turing predicts
+==========================================================
+
+Chemistry: stripes out of nothing, in the Brusselator on a ring.
 
 Two substances react, and one diffuses faster. Where the uniform mixture is stable without diffusion, diffusion makes it
 unstable to waves of one length, 2π·(Dx·Dy)^¼/√a, and stripes of that length grow out of noise (Turing 1952).
@@ -7,9 +10,9 @@ unstable to waves of one length, 2π·(Dx·Dy)^¼/√a, and stripes of that leng
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import stepwell as sw
-from matplotlib.figure import Figure
 
 A, B, DX, DY = 3.0, 9.0, 5.0, 12.0
 WAVELENGTH = 2.0 * np.pi * (DX * DY) ** 0.25 / A**0.5  # 10.1 units of length
@@ -38,7 +41,7 @@ def main(folder: Path) -> None:
     dull = sw.integrate(brusselator(dy=0.5 * DY), "rk4", y=uniform + noise, dt=0.02, steps=3000)
     assert np.ptp(dull.y[-1, 0]) < 1e-3 < np.ptp(run.y[-1, 0])
 
-    figure = Figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
+    figure = plt.figure(figsize=(7.2, 4.2), dpi=120, layout="constrained")
     axes = figure.add_subplot()
     shades = axes.pcolormesh(run.t, SPACING * np.arange(CELLS), run.y[:, 0].T, cmap="cividis", shading="nearest")
     top = SPACING * (CELLS // 3 + run.y[-1, 0, CELLS // 3 : CELLS // 3 + CELLS // STRIPES].argmax())
@@ -52,4 +55,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "."))
+    main(Path(sys.argv[1] if len(sys.argv) == 2 else "."))

@@ -3,7 +3,8 @@
 ``integrate`` steps one trajectory or a hundred thousand; ``World`` is the real-time loop. ``methods`` and ``method`` describe
 the methods; ``analyse``, ``stability_limit`` and ``criteria`` their stability; ``explain`` what a step computes. ``jacobian``,
 ``equilibria`` and ``lyapunov`` describe a system near its states. ``scenes`` and ``charts`` show the cost and error of each
-method and where it becomes unstable; ``advise`` recommends one. ``explore`` shows scenes in a browser.
+method and where it becomes unstable; ``advise`` recommends one. ``explore`` shows scenes in a browser. ``load`` reads saved
+runs, and ``solve_ivp`` is called as SciPy's is.
 """
 
 from __future__ import annotations
@@ -49,15 +50,20 @@ if TYPE_CHECKING:
         quaternion,
         scenes,
         stability,
+        sweeps,
     )
     from .advice import advise
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
+    from .events import Event
     from .explanation import Explanation, explain
     from .explorer import Explorer, explore
     from .exports import ExportedStep, export
+    from .interop.saving import load
+    from .interop.solve_ivp import solve_ivp
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
+    from .sweeps import sweep
     from .systems import Aircraft
 
 __version__: str = _core.__version__
@@ -70,6 +76,7 @@ __all__ = [
     "ControlWarning",
     "DivergenceWarning",
     "EnergyControl",
+    "Event",
     "Explanation",
     "Explorer",
     "ExportedStep",
@@ -119,15 +126,19 @@ __all__ = [
     "isa",
     "isa_levels",
     "jacobian",
+    "load",
     "lyapunov",
     "method",
     "methods",
     "paper",
     "quaternion",
     "scenes",
+    "solve_ivp",
     "stability",
     "stability_along",
     "stability_limit",
+    "sweep",
+    "sweeps",
     "system",
 ]
 
@@ -160,6 +171,7 @@ _LATER = {
     "advice": "advice",
     "Scene": "scenes.Scene",
     "advise": "advice.advise",
+    "Event": "events.Event",
     "Explanation": "explanation.Explanation",
     "charts": "charts",
     "derivatives": "derivatives",
@@ -176,9 +188,14 @@ _LATER = {
     "equations": "equations",
     "export": "exports.export",
     "exports": "exports",
+    "gym": "gym",  # needs gymnasium, so it is not among the names that are listed
+    "load": "interop.saving.load",
     "paper": "paper",
     "quaternion": "quaternion",
     "scenes": "scenes",
+    "solve_ivp": "interop.solve_ivp.solve_ivp",
+    "sweep": "sweeps.sweep",
+    "sweeps": "sweeps",
     "system": "equations.system",
     "stability": "stability",
     "analyse": "stability.analyse",
@@ -199,6 +216,6 @@ if not TYPE_CHECKING:  # to which any name would else be one of the package
             raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
         import importlib
 
-        module, _, attribute = _LATER[name].partition(".")
-        found = importlib.import_module(f"stepwell.{module}")
-        return getattr(found, attribute) if attribute else found
+        module, _, attribute = _LATER[name].rpartition(".")
+        found = importlib.import_module(f"stepwell.{module or attribute}")
+        return getattr(found, attribute) if module else found

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from . import _core
 from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
 from .reference.types import Array as Array
 from .reference.types import Whole
@@ -26,11 +27,6 @@ Word = TypeVar("Word", bound=str)
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
-
-_FLOAT64 = np.dtype(np.float64)
-
-#: Up to so many booleans are checked as bytes, which costs a copy but is faster than a call of NumPy.
-_FEW_TRUTHS = 1 << 16
 
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
 MOST_AXES = 24
@@ -59,14 +55,10 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     """Return ``value`` as float64 if it is real, and by the options finite and positive."""
     if type(value) is float and isfinite(value) and (not positive or value > 0.0):
         return np.array(value)  # the most frequent case: nothing more to check
-    if (
-        type(value) is np.ndarray
-        and value.dtype is _FLOAT64
-        and value.flags.aligned
-        and (not finite or all_true(np.isfinite(value)))
-        and (not positive or all_true(value > 0.0))
-    ):
+    if type(value) is np.ndarray and _core.sound(value, finite, positive):
         return value  # likewise; the checks below say what is wrong with any other
+    if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
+        value = shared(argument, value)
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, RecursionError) as error:
@@ -91,9 +83,17 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     return array
 
 
-def all_true(truths: Any) -> bool:
-    """Whether all booleans of an array, or a single one, are true."""
-    return b"\0" not in truths.tobytes() if truths.size <= _FEW_TRUTHS else bool(truths.all())
+def shared(argument: str, value: Any) -> Any:
+    """An array of another library, such as PyTorch or JAX, as NumPy's, over the same memory."""
+    try:
+        return np.from_dlpack(value)
+    except Exception as error:  # of what kind it is differs from library to library
+        why = str(error).strip().splitlines() or [type(error).__name__]
+        raise DTypeError(
+            f"{argument}: expected an array in the memory of the CPU, of a type that NumPy has and without gradients, got "
+            f"{type(value).__module__}.{type(value).__name__} ({short(why[0])[1:-1]}); convert it first: PyTorch's by "
+            f".detach().cpu().double(), JAX's by jax.device_get outside of jax.jit"
+        ) from None
 
 
 def _masked(value: Any) -> int:
@@ -198,13 +198,16 @@ def over(array: Array, shape: Shape) -> Array:
 
 def batch_shape(shapes: dict[str, Shape]) -> Shape:
     """Return the shape to which all batches broadcast, the arguments by name."""
-    different = set(shapes.values()) - {()}
-    if not different:
-        return ()
-    if len(different) == 1:
-        (shape,) = different
-        if len(shape) <= MOST_AXES and 0 not in shape:
-            return shape
+    one: Shape = ()
+    for shape in shapes.values():
+        if shape and shape != one:
+            if one:
+                break
+            one = shape
+    else:  # the most frequent case: all have one shape, or none
+        if len(one) <= MOST_AXES and 0 not in one:
+            return one
+    different = set(shapes.values())
     if longest := ", ".join(name for name, shape in shapes.items() if len(shape) > MOST_AXES):
         raise ShapeError(f"{longest}: expected at most {MOST_AXES} batch axes, got {max(map(len, different))}")
     try:
@@ -368,7 +371,12 @@ def in_place(
     written: bool = True,
     dtype: Any = np.float64,
 ) -> Array:
-    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied."""
+    """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied.
+
+    Of another library's array in the memory of the CPU it is NumPy's array over that memory.
+    """
+    if hasattr(array, "__dlpack__") and not isinstance(array, np.ndarray):
+        array = shared(argument, array)
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != dtype or not array.dtype.isnative:

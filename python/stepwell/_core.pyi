@@ -40,6 +40,10 @@ class Equations:
     def reads_v(self) -> bool:
         """Whether a rate of v depends on v."""
 
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+
 @final
 class ModelSpec:
     """What to step: a system, what is given for it, and a method.
@@ -54,6 +58,8 @@ class ModelSpec:
 
     ``matrix`` is the nodes and the number of rows in the v slot, for the transition-matrix form of the system "matrix": ``n`` and
     ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
+
+    ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length.
     """
 
     def __new__(
@@ -65,6 +71,7 @@ class ModelSpec:
         matrix: tuple[list[float], int] | None = None,
         record: list[str] = ...,
         fused: bool = False,
+        order: int = 0,
         single: bool = False,
     ) -> ModelSpec: ...
 
@@ -154,6 +161,9 @@ class Tape:
     def step(self) -> Symbol: ...
     def time(self) -> Symbol: ...
     def number(self, x: float) -> Symbol: ...
+    def value(self, id: int) -> Symbol:
+        """The value that the operation of that number makes."""
+
     def sample(self, table: int, t: _Value) -> Symbol: ...
     def trace(self, model: ModelSpec, what: str) -> list[Symbol]:
         """What the core makes of a model: "step", "attempt", "start 0", "finish 0", or "record" with a quantity behind it."""
@@ -170,8 +180,11 @@ class Tape:
         dy: list[Symbol] | None = None,
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
+        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]]]] = ...,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
+
+        ``functions`` are values with, for each that they depend on, the derivative by it.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """
@@ -188,6 +201,9 @@ class Tape:
     def __len__(self) -> int: ...
 
 def catalogue() -> list[dict[str, Any]]: ...
+def sound(value: object, finite: bool, positive: bool) -> bool:
+    """Whether it is a contiguous, aligned array of floats, and all are finite, and above zero, where that is asked."""
+
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
@@ -212,7 +228,8 @@ def compiled(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     ``level``; ``written`` and ``computed``, numbers of operations by kind: before equal ones were merged, but for those that a
     method does to blocks, and as every member makes them in every step; ``per_run``, ``per_member`` and ``per_step``, how many
     are made before; ``lanes``, how many members go together; ``bytes`` of machine code, 0 where it is interpreted; ``spills``,
-    how many values are kept beside the registers at most; ``trace`` and ``compile``, how long both took, in seconds.
+    how many values are kept beside the registers at most; ``packing``, the fields of ``explanation.Packing``, or None where equal
+    operations of one member were not considered; ``trace`` and ``compile``, how long both took, in seconds.
     ``attempts``: at adaptive steps.
 
     ``interpreted`` is None, and ``width`` (numbers in a vector), ``block_vectors`` (vectors in a turn of the loop), ``blocks``
@@ -233,9 +250,12 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
 
+def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
+    """To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series."""
+
 def program(method: str, *, attempts: bool = False) -> tuple[list[tuple[str, list[int], float]], list[int]]:
     """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
 
     Names are "v", "y", "dv" and "dy" (with the time, as a share of the step; operands are v and y), "velocity", "add",
-    "subtract", and "scale" (with the factor).
+    "subtract", "scale" (with the factor), "series of v" and "series of y" (with the order of the coefficient).
     """

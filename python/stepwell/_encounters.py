@@ -2,7 +2,8 @@
 
 In such a step the line from one body to the other turns by more than a right angle, or they move past each other by more than
 twice the distance at which they begin or end. Looking for it takes the run again with all of its states. So it is done on
-request (``Run.encounters``), and by itself only where two bodies alone, begun as some saved state has them, would meet so.
+request (``Run.encounters``), and by itself only where two bodies alone, begun as some saved state has them, would meet so, and
+the others pull them apart, or together, by less than the two pull each other.
 """
 
 from __future__ import annotations
@@ -176,9 +177,26 @@ def may_meet(bodies: NBody, h: float, time: float, v: Any, y: Any) -> bool:
                 continue
             # At the speed that it has half way in, or less, it comes there in this time or more.
             middle = potential(strength, 0.25 * r2 + soft2)
-            if math.sqrt(r2) <= 2.0 * time * math.sqrt(max(0.0, 2.0 * (energy - middle))):
+            if math.sqrt(r2) > 2.0 * time * math.sqrt(max(0.0, 2.0 * (energy - middle))):
+                continue
+            others = [k for k in range(len(y)) if k not in (i, j)]
+            pulls = ([_pull(gravity, masses, y, k, body, soft2, newton) for body in (i, j)] for k in others)
+            apart = [sum(axis) for axis in zip(*([a - b for a, b in zip(*pull, strict=True)] for pull in pulls), strict=True)]
+            if math.hypot(*apart) <= math.sqrt(r2) * strength / _spread(r2 + soft2, newton):
                 return True
     return False
+
+
+def _spread(square: Any, newton: bool) -> Any:
+    """What the distance is divided by in the attraction of a unit of mass: r³ by Newton's law, or r²."""
+    return square * np.sqrt(square) if newton else square
+
+
+def _pull(gravity: float, masses: Any, y: Any, k: int, i: int, soft2: float, newton: bool) -> list[float]:
+    """The acceleration of body i by body k, in floats."""
+    d = [a - b for a, b in zip(y[k], y[i], strict=True)]
+    square = sum(a * a for a in d) + soft2
+    return [gravity * masses[k] * a / float(_spread(square, newton)) if square > 0.0 else math.inf for a in d]
 
 
 def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> Any:
@@ -203,5 +221,13 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         reaches = energy > potential(near2 + soft2) + 2.0 * (near2 + soft2) / (h * h)
         middle = energy - potential(0.25 * r2 + soft2)
         in_time = np.sqrt(r2) <= 2.0 * time * np.sqrt(np.maximum(0.0, 2.0 * middle))
-        may = (strength > 0.0) & ((r2 <= near2) | (~parts & reaches & in_time))
+        by_others = np.zeros_like(d)
+        for k in range(len(y)):
+            to_j, to_i = y[k] - y[j], y[k] - y[i]  # pairs, coordinates, batch
+            for toward, sign in ((to_i, 1.0), (to_j, -1.0)):
+                square = (toward * toward).sum(axis=1, keepdims=True) + soft2
+                pull = (bodies.G * masses[k]) * toward / _spread(square, newton)
+                by_others += sign * np.where((k != i) & (k != j), pull.T, 0.0).T
+        alone = np.sqrt((by_others * by_others).sum(axis=1)) <= np.sqrt(r2) * strength / _spread(r2 + soft2, newton)
+        may = (strength > 0.0) & ((r2 <= near2) | (~parts & reaches & in_time & alone))
     return may.any(axis=0)

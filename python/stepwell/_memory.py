@@ -21,8 +21,8 @@ from ._checks import Array, Shape
 LEAST_LENT = 1 << 17
 #: The most bytes that are kept in all while no array uses them.
 MOST_KEPT = 1 << 26
-#: Size of a large page, in numbers.
-_LARGE_PAGE = (1 << 21) // 8
+#: Sizes of a large page and of a cache line, in numbers. Other programs take arrays without a copy only if they begin at a line.
+_LARGE_PAGE, _CACHE_LINE = (1 << 21) // 8, 64 // 8
 
 #: Memory that no array uses, by identity, the newest last. Memory may be released between any two operations on this.
 _kept: dict[int, Array] = {}
@@ -57,10 +57,9 @@ def _memory(numbers: int) -> Array:
     for memory in list(_kept.values()):
         if numbers <= memory.size <= numbers + numbers // 8 and _kept.pop(id(memory), None) is memory:
             return memory
-    if numbers < 2 * _LARGE_PAGE:
-        return np.empty(numbers)
-    room = np.empty(numbers + _LARGE_PAGE)
-    first = -(room.__array_interface__["data"][0] // 8) % _LARGE_PAGE
+    boundary = _CACHE_LINE if numbers < 2 * _LARGE_PAGE else _LARGE_PAGE
+    room = np.empty(numbers + boundary)
+    first = -(room.__array_interface__["data"][0] // 8) % boundary
     return room[first : first + numbers]
 
 

@@ -11,15 +11,26 @@ from .systems import Sampled, Sinusoid
 from .systems.inputs import LAST_SINGLE_ANGLE
 
 if TYPE_CHECKING:
+    from .methods import Method
     from .systems import System
 
 
-def step(system: System, form: str, dt: float) -> float:
+def step(system: System, how: Method, form: str, dt: float, *, events: bool = False) -> float:
     """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
     from .systems import Pendulum3D, Rods  # only such runs need them
 
     if form != "direct":
         raise UnsupportedError(f"dtype: float32 goes with form='direct' only, got form={form!r}")
+    if how.has_series:
+        raise UnsupportedError(
+            f"dtype: float32 does not go with {how.name}, whose series are computed in float64 only; use float64, or a "
+            f"Runge-Kutta method such as rk4"
+        )
+    if events:
+        raise UnsupportedError(
+            "dtype: float32 does not go with events=, which are located in float64 only; use float64, or look for them in the "
+            "saved states"
+        )
     if isinstance(system, (Pendulum3D, Rods)) and system.contacts:
         raise UnsupportedError(
             f"dtype: float32 does not go with rods that meet surfaces, whose joints are decided by more digits than it has, got "

@@ -138,6 +138,7 @@ class Fixed(metaclass=Maker):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """After a copy or a pickle, whose arrays may be new."""
+        aligned(state)
         vars(self).update(state)
         read_only(vars(self))
 
@@ -153,6 +154,13 @@ def complete(one: Any, **found: Any) -> None:
     """Give attributes to an object that cannot be changed and that was just made."""
     read_only(found)
     vars(one).update(found)
+
+
+def aligned(attributes: dict[str, Any]) -> None:
+    """Copy arrays that begin at an odd place in memory, as those of a message from another process may (pickle protocol 5)."""
+    for name, value in attributes.items():
+        if isinstance(value, np.ndarray) and not value.flags.aligned:
+            attributes[name] = value.copy()
 
 
 def read_only(attributes: dict[str, Any]) -> None:
@@ -171,6 +179,7 @@ class FixedDict(dict[str, Any]):
 
     def __init__(self, items: dict[str, Any]) -> None:
         items = dict(items)
+        aligned(items)
         read_only(items)
         super().__init__(items)
 

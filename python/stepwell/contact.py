@@ -105,7 +105,7 @@ class Floor(Surface):
     | ``"spring"`` | a spring pushes it back with ω² times its depth | may be added |
 
     With ``"safe"`` no contact adds energy, for any method, step and time of impact, where the force is uniform over a step. A
-    point whose next flight would be shorter than two steps comes to rest on the surface. See docs/contact.md.
+    point whose next flight would be shorter than two steps comes to rest on the surface. See docs/howto/contact.md.
 
     Args:
         restitution: e, the velocity after an impact divided by that before it, 0 to 1, without a unit; broadcasts over the batch.

@@ -31,10 +31,17 @@ if TYPE_CHECKING:
 Looped = tuple[Array, Array, Blocks, Whole]
 
 
+class Watched(NamedTuple):
+    """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
+
+    quantities: _core.Equations
+    number: int
+
+
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
 
-    ``single`` is whether steps are computed in float32.
+    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32.
     """
 
     system: System
@@ -53,6 +60,8 @@ class Plan(NamedTuple):
     record: tuple[str, ...] = ()
     fused: bool = False
     force: Array | None = None
+    watched: Watched | None = None
+    order: int = 0
     single: bool = False
 
     @property
@@ -119,7 +128,8 @@ class Arrays(NamedTuple):
 class Outcome(NamedTuple):
     """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
 
-    ``diverged`` is False if it is known that no member has such a step.
+    ``diverged`` is False if it is known that no member has such a step. ``noticed`` has for each watched quantity its value at
+    the start of the last step, and last how many changes of sign there were up to there; NaN where the core did not count.
     """
 
     v: Array
@@ -129,6 +139,7 @@ class Outcome(NamedTuple):
     recorded: dict[str, Array] | None = None
     work: Array | None = None
     diverged: bool = True
+    noticed: Array | None = None
 
 
 def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
@@ -188,7 +199,7 @@ def _traced(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], An
         case "step":
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
-            symbols = tracer.attempt(plan.method)
+            symbols = tracer.attempt(plan.method, plan.order)
         case _:
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))
@@ -318,12 +329,15 @@ def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
     if plan.single:
         return _single_model(plan)
-    given = plan.system.parameters(plan.batch)
+    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
-    if not plan.record and not plan.fused:
+    if plan.watched is not None:
+        given.append(("watched()", plan.watched.quantities))
+    if not plan.record and not plan.fused and not plan.order:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
-    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, record=list(plan.record), fused=plan.fused)
+    options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
 
 
 def _single_model(plan: Plan) -> _core.ModelSpec:
@@ -353,7 +367,11 @@ def _rust(
         shapes = {name: plan.system.quantities[name] for name in plan.record}
         recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
     work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
-    tally = None if work is None else work.reshape(-1)
+    tally, noticed = None if work is None else work.reshape(-1), None
+    if plan.watched is not None:
+        before_it = 0 if work is None else 1
+        sums = np.full((before_it + plan.watched.number + 1, *plan.batch), np.nan)
+        tally, noticed, work = sums.reshape(-1), sums[before_it:], None
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     diverged = _core.run(
         model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
@@ -364,7 +382,7 @@ def _rust(
             mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
             by_name[name] = mine.reshape(kept, *shape, *plan.batch)
     work = None if work is None else _per_step(plan, work)
-    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged, noticed)
 
 
 # ---- the transition-matrix form
@@ -588,7 +606,8 @@ def pace(plan: Plan, v: Array, y: Array, first: Array | None, relative: Array, a
     wide = np.zeros(plan.batch) if absolute is None else absolute
     first, relative, wide = (a if a.shape == plan.batch else np.broadcast_to(a, plan.batch) for a in (first, relative, wide))
     tolerance = relative, wide, 1.0 if absolute is None else 0.0
-    return adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    pace = adaptive.start(plan.t0, first, tolerance, plan.system.samples, v, y, plan.block_axes)
+    return pace._replace(before=pace.h) if plan.method.has_series else pace
 
 
 def pace_of(numbers: Array) -> Pace:
@@ -596,6 +615,32 @@ def pace_of(numbers: Array) -> Pace:
     from .reference import adaptive
 
     return adaptive.Pace(*numbers)
+
+
+def evaluations(method: Method, system: System, *, order: int = 0, paced: bool = False) -> int:
+    """Function evaluations of a step, or of an attempt at an adaptive one by a series of that order.
+
+    Of a series: operations of all coefficients of the rates over those of one evaluation, rounded up. All operations count alike.
+
+    Raises:
+        UnsupportedError: if the series of the system is too long.
+    """
+    if method.has_series:
+        batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
+        plan = Plan(system, method, batch, 1.0, order=order)
+        return _core.series_evaluations(model(plan), attempts=paced)
+    return method.attempt_evaluations if paced else method.evaluations
+
+
+def attempts(method: Method, system: Any, block_axes: tuple[int, int], order: int = 0) -> Any:
+    """An attempt at an adaptive step by the reference: a function of a pace, a budget, v and y."""
+    from .reference import adaptive, series_pace
+
+    steps: Any = method.steps
+    if method.has_series:
+        return partial(series_pace.attempt, order or steps.ORDER, system, block_axes)
+    assert method.error_order is not None
+    return partial(adaptive.attempt, steps, system, method.error_order, block_axes)
 
 
 def _fused_attempt(plan: Plan, budget: int) -> Any:
@@ -616,10 +661,8 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
     if plan.backend == "numpy":
         if plan.fused:
             return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
-        pair: Any = plan.method.steps
-        assert plan.method.error_order is not None
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
-        attempt = partial(adaptive.attempt, pair, system, plan.method.error_order, plan.block_axes)
+        attempt = attempts(plan.method, system, plan.block_axes, plan.order)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     saved_v, saved_y = (np.empty((len(pacing.at), *a.shape)) for a in (v, y))
     n_v, members = prod(plan.system.v_shape), plan.members

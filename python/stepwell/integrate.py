@@ -14,7 +14,7 @@ import numpy as np
 from . import _checks, _core, _encounters, _memory, engine
 from ._checks import Array
 from ._doubt import in_words, warn_of_nonsense
-from .control import AnyControl, a_control
+from .control import AnyControl, EnergyControl, a_control
 from .errors import (
     ArgumentError,
     DivergenceWarning,
@@ -28,11 +28,14 @@ from .methods import method as find_method
 from .methods import methods as every_method
 from .reference.types import Whole
 from .result import AdaptiveState, Collision, Paces, Run, Status
-from .systems import NBody, Sampled, System
+from .systems import NBody, Sampled, Sinusoid, System
 from .systems.base import TINY, a_system
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ._words import Backend, RunForm
+    from .events import Event
     from .reference.adaptive import Pace
 
 BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
@@ -63,6 +66,7 @@ def integrate(
     control: AnyControl | None = None,
     force: Any = None,
     record: str | Sequence[str] | None = (),
+    events: Any = None,
     form: RunForm = "direct",
     fused: bool = False,
     dtype: Any = "float64",
@@ -111,6 +115,9 @@ def integrate(
             per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. In a ``World`` it may change.
         record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
+        events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
+            g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed steps in the direct form
+            (docs/howto/events.md).
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
@@ -148,7 +155,7 @@ def integrate(
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
             sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
             which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -171,6 +178,7 @@ def integrate(
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
             "force": force,
+            "events": events,
         }
         if not isinstance(form, str) or form != "direct":
             fixed["form"] = form
@@ -197,14 +205,20 @@ def integrate(
         raise UnsupportedError(f"force: goes with form='direct' only, got form={form!r}; a linear system has inputs")
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    asked = None if events is None else _asked(events, form)
     control = a_control(control)
+    if form != "direct" and how.has_series and any(isinstance(each, Sinusoid) for each in system.given_inputs().values()):
+        raise UnsupportedError(
+            f"form: {how.name} takes the derivatives of inputs too, and the transition matrix their values only; "
+            f"use form='direct'"
+        )
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     if single:
         from . import _single  # only such runs need it
 
-        dt = _single.step(system, form, dt)
+        dt = _single.step(system, how, form, dt, events=asked is not None)
     goes_on_alike(how, dt, carried_by, dt_before)
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
@@ -275,11 +289,18 @@ def integrate(
         # In float32 they are computed from the saved states, in float64.
         kept = () if single else tuple(name for name in record if name in system.quantities)
         plan = plan._replace(system=system, record=kept)
+    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
+    ended = None
+    if asked is not None:
+        from .events import driver  # only such runs need it
+
+        ended = driver.Run(asked, v, y, before, carry is not None)
+        make = ended.made
     if _checks.flag("progress", progress):
         with _bar(f"{how.title}, {steps} steps") as told:
-            out = engine.advance(plan._replace(progress=told), v, y, before, carried=carry is not None)
+            out = make(plan._replace(progress=told))
     else:
-        out = engine.advance(plan, v, y, before, carried=carry is not None)
+        out = make(plan)
     collides = isinstance(system, NBody)
     if collides:
         v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
@@ -306,14 +327,28 @@ def integrate(
         work=out.work,
         force=plan.force,
     )
+    if ended is not None:
+        ended.tell(run)
     if single:
         run.recorded |= {name: run.quantity(name) for name in record}
+    for name in plan.record:
+        if name not in run.recorded:
+            run.recorded[name] = run.quantity(name)
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before)
     warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
     return run
+
+
+def _asked(events: Any, form: str) -> list[Event]:
+    """The events that were asked for."""
+    from .events.event import several
+
+    if form != "direct":
+        raise UnsupportedError(f"events: goes with form='direct' only, got form={form!r}")
+    return several(events)
 
 
 def forced(system: System) -> None:
@@ -390,6 +425,8 @@ def _adapt(
     if system.contacts:
         raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
     control = a_control(control)
+    if how.has_series:
+        _has_series(system, control)
     not_of_a_step(system.keeper if control is None else control)
     if at is None or (tolerance is None) == (went is None):
         if at is not None and went is not None:
@@ -401,7 +438,7 @@ def _adapt(
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
     carry = None if went is None else _paces_of(how, *went)
     since = t0 if carry is None else float(carry.target.max(initial=t0))
-    if times[0] < since or (np.diff(times) <= 0).any():
+    if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
         raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
     system.check_time(max(abs(t0), abs(float(times[-1]))))
@@ -442,8 +479,12 @@ def _adapt(
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused)
         pace = engine.pace(plan, v, y, first, relative, absolute) if carry is None else carry
         pace = pace._replace(work=np.zeros(batch))
+        plan = plan._replace(order=_order(how, pace))
         out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget), pace, v, y)
     accepted, rejected, extra_steps = (a.astype(np.int64) for a in (out.pace.accepted, out.pace.rejected, out.pace.extra_steps))
+    # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
+    again = out.pace.held > 0.0 if how.has_series and not fused else extra_steps
+    evaluations = engine.evaluations(how, system, order=plan.order, paced=True) * (accepted + rejected + again)
     run = Run(
         t=times,
         v=out.v,
@@ -458,7 +499,7 @@ def _adapt(
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, how.attempt_evaluations * (accepted + rejected + extra_steps)),
+        paces=Paces(out.pace.t, out.pace.h, accepted, rejected, evaluations),
         stand=AdaptiveState(
             out.last_v, out.last_y, np.array(out.pace._replace(target=np.full(batch, times[-1]))), float(times[-1]), how.name
         ),
@@ -470,6 +511,36 @@ def _adapt(
     _warn_of_stops(run)
     _warn_of_lost(run, out.pace)
     return run, None if carry is not None else (v, y)
+
+
+def _has_series(system: System, control: Any) -> None:
+    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
+    instead = "use another method, such as dop853"
+    if system.samples[0] < np.inf:
+        raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
+    if isinstance(control or system.control, EnergyControl):
+        raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
+    if system.chooses:
+        raise UnsupportedError(
+            f"tolerance: {system!r} chooses between values (np.where, abs, minimum, floor, …), and a series does not see that "
+            f"another one is chosen within a step; {instead}"
+        )
+
+
+def _order(method: Method, pace: Pace) -> int:
+    """The order of a series for the tolerance; 0 of a method that has one order."""
+    if not method.has_series or not pace.relative.size:
+        return 0
+    from .reference import series_pace  # only such runs need it
+
+    least, most = float(pace.relative.min()), float(pace.relative.max())
+    order = series_pace.order_of(least)
+    if series_pace.order_of(most) != order:
+        raise UnsupportedError(
+            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
+            f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
+        )
+    return order
 
 
 def _paces_of(method: Method, carry: Any, carried_by: Any) -> Pace:
@@ -528,6 +599,8 @@ def _warn_of_stops(run: Run) -> None:
 
 def _warn_of_lost(run: Run, pace: Any) -> None:
     """Warn of members whose absolute tolerance is most of what a step may err, and much of the motion itself."""
+    if not pace.absolute.any():
+        return
     lost = np.zeros(run.status.shape, dtype=bool)
     for square in (pace.longest_v, pace.longest_y):
         longest = np.sqrt(square)
@@ -563,6 +636,10 @@ def _kept(array: Array) -> Array:
 
 def fits_together(system: System, method: Method) -> None:
     """Raise if the method cannot do the system."""
+    if method.has_series and getattr(system, "push", None) is not None:
+        raise UnsupportedError(
+            f"control: {method.name} goes with projections, not with {system.keeper!r}, which is a part of the rates; use dop853"
+        )
     if not method.needs_acceleration:
         return
     if not system.second_order:

@@ -48,7 +48,8 @@ class Method(Fixed):
     false_friends: tuple[str, ...]
     #: Order of convergence.
     order: int
-    #: Function evaluations per step of fixed length (of both rates: rate evaluations).
+    #: Function evaluations per step of fixed length (of both rates: rate evaluations). Of a series those of a linear system; of
+    #: others it may be more, see ``stepwell.stability.operations``.
     evaluations: int
     #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
     attempt_evaluations: int
@@ -91,6 +92,11 @@ class Method(Fixed):
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
 
+    @property
+    def has_series(self) -> bool:
+        """Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work."""
+        return self.family == "Taylor"
+
     def start_choice(self, start: str | None) -> int:
         """The number of a start, for the core."""
         if start is None:
@@ -121,6 +127,8 @@ class Method(Fixed):
         return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
 
     def _costs(self) -> str:
+        if self.has_series:
+            return f"{self.evaluations} function evaluations (of a linear system)"
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
 
     def _repr_html_(self) -> str:
@@ -157,7 +165,7 @@ def methods() -> tuple[Method, ...]:
 
     Example:
         >>> [method.name for method in sw.methods() if method.error_order is not None]
-        ['fehlberg', 'merson', 'fehlberg_5', 'dop853']
+        ['fehlberg', 'merson', 'fehlberg_5', 'dop853', 'taylor']
     """
     return tuple(_catalogue().values())
 

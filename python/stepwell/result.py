@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from .events import Occurrences
 
 
 class Status(IntEnum):
@@ -42,6 +46,8 @@ class Status(IntEnum):
     UNDERFLOW = 3
     #: With a tolerance: no step, however short, gave a finite state.
     NOT_FINITE = 4
+    #: A terminal event stopped it; ``Run.stopped_at`` says when.
+    EVENT = 5
 
 
 class Collision(NamedTuple):
@@ -69,7 +75,8 @@ class Paces(NamedTuple):
         h: the length of the next step to try.
         accepted: number of accepted steps, since the first piece of the run.
         rejected: number of steps whose error was above the tolerance, likewise.
-        evaluations: function (rate) evaluations of both, and of the extra steps for the output times, likewise.
+        evaluations: function (rate) evaluations of both, and of the extra steps for the output times, likewise; of a series, the
+            operations of its coefficients over those of one evaluation, and none for output times.
     """
 
     t: Array
@@ -108,7 +115,8 @@ class Run(Value):
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
         first_bad_step: per member, the number of the first step after which the state was not finite, or at which a run with a
             tolerance stopped; −1 if there is none, shape (*batch).
-        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None.
+        carry: what the method carries in place of v (Verlet: ``y_prev``, leapfrog: ``v_half``), or None; NaN for members that
+            stopped at an event.
         system: the system that was stepped, with its control.
         method: the method.
         dt: the step.
@@ -117,11 +125,15 @@ class Run(Value):
         steps: number of steps.
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
+        events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
+        stopped_at: the time at which a terminal event stopped each member, NaN for others, shape (*batch); later saved states are
+            that of the event. None if there was no such event to look for.
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
         force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
+            None in a run with events.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -185,6 +197,8 @@ class Run(Value):
         self.stand = stand
         self.fused = fused
         self.force = force
+        self.events: dict[str, Occurrences] = {}
+        self.stopped_at: Array | None = None
 
     @property
     def dtype(self) -> str:
@@ -266,10 +280,18 @@ class Run(Value):
         """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
 
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
-        last one. A carry is for the same method only. ``np.savez`` writes all of it to a file; a control is an object, for which
-        ``np.load`` needs ``allow_pickle=True``. ``dt`` is that of this run; another
-        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning.
+        last one. A carry is for the same method only. ``save`` writes all of it to a file. ``dt`` is that of this run; another
+        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are
+        given again.
+
+        Raises:
+            UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
+        if (stopped := np.count_nonzero(self.status == Status.EVENT)) > 0:
+            raise UnsupportedError(
+                f"resume: {stopped} of {self.status.size} member(s) stopped at an event, at times of their own; begin a new run "
+                f"for each: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+            )
         told: dict[str, Any] = {"fused": True} if self.fused else {}
         if self.dtype != "float64":
             told["dtype"] = self.dtype
@@ -288,6 +310,60 @@ class Run(Value):
         if self.force is not None:
             state["force"] = self.force
         return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
+
+    def save(self, path: str | Path) -> None:
+        """Write the run to a file, from which ``stepwell.load`` reads it again, bit for bit, and from which it goes on.
+
+        All arrays are there under their names, for any program that reads such files: ``np.load(path)["y"]``. The system, its
+        control and what a method carries are there, too. Of a system of your own equations there are the name of its function and
+        a digest of its operations, but not the function. A file that is there already is replaced when the new one is complete.
+
+        Args:
+            path: the file, ending in .npz, or in .zarr for a folder of compressed arrays, which needs the package zarr.
+
+        Raises:
+            ArgumentError: if the ending is another, or the file cannot be written.
+            UnsupportedError: if the file ends in .zarr and zarr is not installed.
+        """
+        from .interop.saving import save
+
+        save(self, path)
+
+    def to_xarray(self, dims: Sequence[str] | None = None, coords: Mapping[str, Any] | None = None) -> Dataset:
+        """The run as an xarray ``Dataset``: the saved states, what was recorded, and how the members ended.
+
+        The arrays are those of the run, not copies. They have the axis ``t``, those of a block, and those of the batch.
+
+        Args:
+            dims: names of the batch axes; "member", or "member_0", "member_1", … if None.
+            coords: further coordinates, as ``Dataset`` takes them: ``{"omega": ("member", omega)}`` for the parameter of a sweep.
+
+        Raises:
+            ArgumentError: if there is not one name for each axis, or a name is given twice.
+            UnsupportedError: if xarray is not installed.
+        """
+        from .interop.tables import to_xarray
+
+        made: Dataset = to_xarray(self, dims, coords)
+        return made
+
+    def to_dataframe(self, dims: Sequence[str] | None = None) -> DataFrame:
+        """The run as a pandas ``DataFrame``: a row for each saved state of each member, a column for each of its numbers.
+
+        The index is the time, and the member in a batch. The columns are v and y, or v_0, v_1, … of a block, and what was
+        recorded.
+
+        Args:
+            dims: names of the batch axes in the index; "member", or "member_0", "member_1", … if None.
+
+        Raises:
+            ArgumentError: if there is not one name for each axis, or a name is given twice.
+            UnsupportedError: if pandas is not installed.
+        """
+        from .interop.tables import to_dataframe
+
+        made: DataFrame = to_dataframe(self, dims)
+        return made
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Draw the motion and its energy error, and write the picture to ``path`` if given.
@@ -344,17 +420,24 @@ class Run(Value):
 
     def _told(self) -> list[tuple[str, str]]:
         """What it is, by name: steps, time, saved states, members, and how they ended."""
-        members, bad = self.status.size, int(np.count_nonzero(self.status))
+        diverged = (self.status != 0) & (self.status != Status.EVENT)
+        members, bad, stopped = (
+            self.status.size,
+            int(np.count_nonzero(diverged)),
+            int(np.count_nonzero(self.status == Status.EVENT)),
+        )
         if self.paces is None:
             steps = f"{_counted(self.steps, 'step')} of {self.dt:g}"
             first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
-            how, number = "diverged", int(self.first_bad_step[self.status != 0].min()) if bad else None
+            how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
             steps = f"{_counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
             first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
         verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
+        if stopped:
+            verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
         return [
             ("steps", steps + (", fused" if self.fused else "") + ("" if self.dtype == "float64" else f", {self.dtype}")),
             ("time", f"{first:g} to {last:g}"),

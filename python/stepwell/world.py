@@ -51,7 +51,8 @@ class World:
     for them. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between
     steps, the method starts again from the new values. Ctrl-C leaves the world at the last complete step, or at the
     one before (leapfrog of many bodies, whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays.
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. Arrays of another library are stepped in place,
+    too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
     ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
@@ -93,7 +94,7 @@ class World:
         if single:
             from . import _single  # only such worlds need it
 
-            dt = _single.step(system, "direct", dt)
+            dt = _single.step(system, how, "direct", dt)
         goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
         batch = _checks.shape_of("y", y)[len(system.y_shape) :]
@@ -228,4 +229,6 @@ class World:
 
 
 def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
+    # Arrays of a message from another process may be read-only, and begin at an odd place in memory.
+    state = {name: np.array(value) if isinstance(value, np.ndarray) else value for name, value in state.items()}
     return World(system, method, dt=dt, **state)

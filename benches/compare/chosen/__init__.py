@@ -3,5 +3,5 @@
 Each contestant goes over the same orbits with tolerances from coarse to fine. Compared is the time that it takes to be as exact
 as asked, between the two tolerances that enclose that error, on logarithmic scales.
 
-``orbits`` has the problems, ``contestants`` the programs, ``tables`` the measurement.
+``orbits`` has the problems, ``contestants`` the programs, ``tables`` the measurement. ``solar`` is a long run at rounding level.
 """

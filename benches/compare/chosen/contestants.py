@@ -31,6 +31,8 @@ def contestants() -> Iterator[Contestant]:
     for method in sw.methods():
         if method.error_order is not None:
             yield Contestant(f"stepwell {method.name}", lambda orbits, name=method.name: ours(orbits, name))
+    yield Contestant("stepwell taylor, own equations", our_equations)
+    yield Contestant("stepwell taylor, own equations, fused", lambda orbits: our_equations(orbits, fused=True))
     for maker in (numbas, heyokas, scipys):
         try:
             yield from maker()
@@ -48,6 +50,39 @@ def ours(orbits: Orbits, method: str) -> Solve:
     def solve(tolerance: float) -> Array:
         end = sw.integrate(system, method, v=v, y=y, tolerance=tolerance, at=[orbits.end], threads=1).y[-1]
         return np.asarray(end[1] if orbits.kind == "kepler" else end)
+
+    return solve
+
+
+def our_equations(orbits: Orbits, fused: bool = False) -> Solve:
+    """The equations that heyoka gets: one body that moves, where ``NBody`` moves both. Each call traces them anew."""
+
+    @sw.system
+    def kepler(t: Any, v: Any, y: Any) -> Any:
+        r2 = y[0] * y[0] + y[1] * y[1]
+        f = -1.0 / (r2 * np.sqrt(r2))
+        return np.array([f * y[0], f * y[1]])
+
+    @sw.system
+    def arenstorf(t: Any, v: Any, y: Any) -> Any:
+        from_heavy, from_light = y[0] + MU, y[0] - (1.0 - MU)
+        square = from_heavy * from_heavy + y[1] * y[1]
+        heavy = (1.0 - MU) / (square * np.sqrt(square))
+        square = from_light * from_light + y[1] * y[1]
+        light = MU / (square * np.sqrt(square))
+        return np.array(
+            [
+                y[0] + 2.0 * v[1] - heavy * from_heavy - light * from_light,
+                y[1] - 2.0 * v[0] - heavy * y[1] - light * y[1],
+            ]
+        )
+
+    system = {"kepler": kepler, "arenstorf": arenstorf}[orbits.kind]
+    v, y = (block[:, 0] if orbits.members == 1 else block for block in (orbits.v, orbits.y))
+
+    def solve(tolerance: float) -> Array:
+        run = sw.integrate(system, "taylor", v=v, y=y, tolerance=tolerance, at=[orbits.end], threads=1, fused=fused)
+        return np.asarray(run.y[-1].reshape(2, -1))
 
     return solve
 

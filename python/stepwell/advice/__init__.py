@@ -120,7 +120,7 @@ def advise(
     rejected = []
     for method in chosen:
         ways: list[Candidate] = [Fixed(method, trials, known.grid, known.share)]
-        ways += [Adaptive(method, adaptive)] if method.error_order is not None and not fixed else []
+        ways += [Adaptive(method, adaptive)] if method.error_order is not None and not (fixed or method.has_series) else []
         for candidate in ways:
             why = _refusal(scene, candidate)
             if why is None:

@@ -7,6 +7,7 @@ that is the method's order. The search knows no more of them.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Protocol
 
 from ..methods import Method
@@ -34,7 +35,6 @@ class Candidate(Protocol):
         by: ``"step"`` or ``"tolerance"``.
         name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``.
         first: the least k.
-        evaluations: function evaluations of a step, or of an attempt at one.
         share: of the error that is allowed, what the run may have.
         seen: the runs that were made, by k.
     """
@@ -43,9 +43,12 @@ class Candidate(Protocol):
     by: str
     name: str
     first: int
-    evaluations: int
     share: float
     seen: dict[int, Trial]
+
+    @property
+    def evaluations(self) -> int:
+        """Function evaluations of a step, or of an attempt at one."""
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
@@ -68,8 +71,12 @@ class Fixed:
     def __init__(self, method: Method, trials: Trials, grid: Grid, share: float) -> None:
         self.method, self.name, self.share = method, method.name, share
         self.trials, self.grid, self.first = trials, grid, grid.first
-        self.evaluations = method.evaluations
         self.seen: dict[int, Trial] = {}
+
+    @cached_property
+    def evaluations(self) -> int:
+        """Function evaluations of a step."""
+        return self.trials.evaluations(self.method)
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
@@ -98,10 +105,15 @@ class Adaptive:
     def __init__(self, method: Method, trials: AdaptiveTrials) -> None:
         assert method.error_order is not None
         self.method, self.name = method, f"{method.name}, tolerance"
-        self.trials, self.power, self.evaluations = trials, method.error_order, method.attempt_evaluations
+        self.trials, self.power = trials, method.error_order
         self.seen: dict[int, Trial] = {}
         # A single step may be wrong by the tolerance; more than what is allowed is luck.
         self.first = math.ceil(UNIT_TOLERANCE_K * min(1.0, trials.allowed) ** (-1.0 / self.power))
+
+    @property
+    def evaluations(self) -> int:
+        """Function evaluations of an attempt at a step."""
+        return self.method.attempt_evaluations
 
     def tolerance(self, k: int) -> float:
         """The tolerance of that k, in two digits, so that the tolerance shown is the one that was run."""

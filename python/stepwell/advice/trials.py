@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import engine
 from .._checks import Array
 from ..charts.measure import MIN_GROWTH, TIMED_STEP, TIMED_TOLERANCE
 from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
@@ -104,10 +105,17 @@ class Trials:
         self.numbers = self.scene.v.size + self.scene.y.size
         self._done: dict[tuple[str, int, float], Trial] = {}
         self._dense: dict[tuple[str, int, float], Trial] = {}
+        self._evaluations: dict[str, int] = {}
         #: The last run, for what is looked at is often confirmed at once.
         self._last: tuple[tuple[str, int, float], Run] | None = None
         #: Runs, and rate evaluations of all.
         self.made, self.work = 0, 0.0
+
+    def evaluations(self, method: Method) -> int:
+        """Function evaluations of a step."""
+        if method.name not in self._evaluations:
+            self._evaluations[method.name] = engine.evaluations(method, self.scene.system)
+        return self._evaluations[method.name]
 
     def look(self, method: Method, dt: float, steps: int) -> Trial:
         """The run, of which some two thousand states are compared with the true ones."""
@@ -155,7 +163,7 @@ class Trials:
         """The run, of which the rest is left out if it is long and was wrong altogether; and the largest error that was seen."""
         every = self._every(steps)
         piece = every * math.ceil(steps / (PIECES * every))
-        if method.evaluations * steps <= self.long or piece >= steps:
+        if self.evaluations(method) * steps <= self.long or piece >= steps:
             run = self._run(method, dt, steps)
             self._last = (method.name, steps, dt), run
             return run, 0.0
@@ -170,7 +178,7 @@ class Trials:
                 pieces.append(run := integrate(self.scene.system, method, steps=number, every=every, **state))
                 done, state = done + number, run.resume
                 worst = max(worst, float(self.scene.state_error(_part(run, np.array([-1])))[0]))
-        self.work += method.evaluations * done
+        self.work += self.evaluations(method) * done
         whole = copy.copy(pieces[-1])
         for name in ("t", "v", "y"):
             blocks = [getattr(each, name) for each in pieces]
@@ -182,7 +190,7 @@ class Trials:
 
     def _run(self, method: Method, dt: float, steps: int) -> Run:
         self.made += 1
-        self.work += method.evaluations * steps
+        self.work += self.evaluations(method) * steps
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", ControlWarning)

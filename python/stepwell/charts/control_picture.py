@@ -11,52 +11,58 @@ from ..errors import UnknownNameError
 from ..methods import Method
 from .control import ControlSweep
 from .control_runs import Held
-from .labels import title
+from .labels import at_ends, title
 from .style import FONT, GREY, apart, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Lines of the two forms; the markers are the methods'.
+#: Lines of the two forms.
 FORMS: dict[str, dict[str, Any]] = {
-    "limited": {"linestyle": "-", "linewidth": 1.6, "fillstyle": "full", "markersize": 5.5},
-    "printed": {"linestyle": (0, (1, 1.2)), "linewidth": 1.6, "fillstyle": "none", "markersize": 8.5},
+    "limited": {"linestyle": "-", "linewidth": 2.0, "fillstyle": "full", "markersize": 5.0},
+    "printed": {"linestyle": (0, (1, 1.2)), "linewidth": 1.4, "fillstyle": "none", "markersize": 6.0},
 }
 
-#: Where the marks of runs without a gain begin, as a share of the width: no control at the left, projections at the right.
-PLACES = {"none": 0.0, "scaling": 0.93, "nacozy": 0.965}
+#: Marks of what has no gain, and what they are called.
+MARKS: dict[str, tuple[str, str]] = {
+    "none": ("o", "without control"),
+    "scaling": ("s", "velocities scaled"),
+    "nacozy": ("D", "Nacozy's projection"),
+}
 
-#: Height of the row of a method in the strip of diverged runs, and the first above the frame, as shares of the frame's height.
-ROW, FIRST = 0.031, 0.022
+#: Height of the strip of diverged runs, as a share of that of the panel below it.
+STRIP = 0.1
 
-#: What is exact has no place on a logarithmic axis.
-LEAST_DRAWN = 1e-17
+#: Names at the ends of the curves are so far apart, as a share of the panel's height.
+ROOM = 0.065
+
+#: What is exact has no place on a logarithmic axis; an error below this is rounding, and stands at the edge of the picture.
+LEAST_DRAWN, ROUNDING = 1e-17, 1e-12
 
 
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
-    figure = new_figure(16.0, 8.6)
+    figure = new_figure(16.0, 10.0)
     from matplotlib import rc_context
 
     with rc_context(FONT):
-        places = {"left": 0.065, "right": 0.985, "bottom": 0.235, "top": 0.755, "wspace": 0.17}
-        left, right = figure.subplots(1, 2, gridspec_kw=places)
-        methods = list(dict.fromkeys(line.method for line in chart.lines))
-        _panel(left, chart, "energy_error")
-        left.set_ylabel("largest |E − E₀| / K₀")
-        _panel(right, chart, "state_error" if chart.exact else "largest")
-        right.set_ylabel("error of the last state, relative" if chart.exact else "largest coordinate")
-        title(figure, 0.012, 0.945, f"{chart.title}: {finding(chart)}", 20)
+        kinds = ("energy_error", "state_error" if chart.exact else "largest")
+        names = ("largest |E − E₀| / K₀", "error of the last state, relative" if chart.exact else "largest coordinate")
+        for i, (what, name) in enumerate(zip(kinds, names, strict=True)):
+            _over_gains(figure.add_axes((0.065 + 0.49 * i, 0.135, 0.325, 0.31)), chart, what, name)
+        for i, (what, name) in enumerate(zip(kinds, names, strict=True)):
+            _before_and_after(figure.add_axes((0.122 + 0.466 * i, 0.6, 0.392, 0.25)), chart, what, name, named=i == 0)
+        title(figure, 0.012, 0.95, f"{chart.title}: {finding(chart)}", 20)
         evaluations = ", ".join(map(str, chart.evaluations))
         what = f"{chart.system!r}, {chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
-        figure.text(0.012, 0.905, textwrap.shorten(what, 150), size=13.5, color=GREY)
-        _legend(figure, chart, methods)
+        figure.text(0.012, 0.915, textwrap.shorten(what, 150), size=13.5, color=GREY)
         note = (
-            "Left edge: without control. Right edge: projected after every step. Above the frame: gains at which a run diverged. "
-            "K: kinetic energy. In the title: the limited form, median of all gains."
+            "Above: hollow without control; full the median of all gains in the limited form, its line from the least to the "
+            "largest;\nsquare: velocities scaled after every step; diamond: Nacozy's projection; left edge: rounding alone. "
+            "Below: solid limited form, dotted printed form; in the strip: diverged. K: kinetic energy."
         )
-        figure.text(0.012, 0.022, note, size=12, color=GREY)
+        figure.text(0.012, 0.018, note, size=12, color=GREY, linespacing=1.35)
     return figure
 
 
@@ -85,77 +91,94 @@ def finding(chart: ControlSweep) -> str:
 
 def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
     """Each method has a colour of its own."""
-    return apart({line.method.name: line.method for line in chart.lines}.values(), method)
+    return apart(_methods(chart), method)
 
 
-def _panel(axes: Axes, chart: ControlSweep, what: str) -> None:
-    """The lines of one kind of error, with the marks at the edges and above."""
+def _methods(chart: ControlSweep) -> list[Method]:
+    """The methods, each once."""
+    return list({line.method.name: line.method for line in chart.lines}.values())
+
+
+def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, named: bool) -> None:
+    """A row for each method: what an error is without control, and what it becomes."""
+    methods = _methods(chart)
+    values = np.concatenate([getattr(line, what) for line in chart.lines] or [np.ones(1)])
+    values = values[np.isfinite(values) & (values > ROUNDING)]
+    low, high = (0.3 * values.min(), 3.0 * values.max()) if values.size else (LEAST_DRAWN, 1.0)
+    axes.set(xscale="log", xlim=(low, high), ylim=(len(methods) - 0.4, -0.6))
+    for row, method in enumerate(methods):
+        colour = _look(chart, method)["color"]
+        kinds: dict[str, list[Held]] = {}
+        for line in chart.lines:
+            if line.method == method:
+                kinds.setdefault(line.kind, []).append(line)
+        held = np.concatenate([getattr(line, what) for line in kinds.get("limited", [])] or [np.empty(0)])
+        held = np.maximum(held[np.isfinite(held)], low)
+        before = [float(getattr(line, what)[0]) for line in kinds.get("none", [])]
+        if held.size:
+            axes.plot([held.min(), held.max()], [row, row], color=colour, linewidth=2.0, zorder=2)
+            after = float(np.median(held))
+            axes.plot([after], [row], color=colour, marker="o", markersize=12, zorder=4)
+            for each in before:
+                if np.isfinite(each):
+                    way: dict[str, Any] = {"arrowstyle": "-|>", "color": "#888888", "shrinkA": 7, "shrinkB": 7}
+                    axes.annotate("", (after, row - 0.28), (max(each, low), row - 0.28), arrowprops=way)
+        for kind, (mark, _) in MARKS.items():
+            for line in kinds.get(kind, []):
+                value = float(getattr(line, what)[0])
+                if np.isfinite(value):
+                    size = 12 if kind == "none" else 8
+                    style: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 2.2, "clip_on": False}
+                    axes.plot([max(value, low)], [row], color=colour, marker=mark, markersize=size, zorder=3, **style)
+    axes.set_yticks(range(len(methods)), [method.title for method in methods] if named else [""] * len(methods))
+    for tick, method in zip(axes.get_yticklabels(), methods, strict=True):
+        tick.set_color(_look(chart, method)["color"])
+        tick.set_fontweight("bold")
+    axes.tick_params(axis="y", length=0, pad=9)
+    axes.set_title(f"{name}: before and after", loc="left", size=14)
+    axes.grid(which="major", axis="x", color="#dddddd", linewidth=0.8)
+    axes.minorticks_off()
+
+
+def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
+    """The errors over the gain, and above them what diverged."""
+    from matplotlib.patches import Rectangle
+
     gains = np.unique(np.concatenate([line.relative[np.isfinite(line.relative)] for line in chart.lines] or [np.ones(1)]))
     low, high = (gains[0], gains[-1]) if gains.size else (1e-1, 1e1)
     wide = max(float(np.log10(high / low)), 1.0)
-    axes.set(xscale="log", yscale="log", xlabel="gain h·C·K at the start")
-    axes.set_xlim(low / 10 ** (0.09 * wide), high * 10 ** (0.13 * wide))
-    for line in chart.lines:
-        values = np.maximum(getattr(line, what), LEAST_DRAWN)
-        seen = _look(chart, line.method)
-        if line.kind in FORMS:
-            shown = np.where(np.isfinite(values), values, np.nan)
-            axes.plot(line.relative, shown, **(seen | FORMS[line.kind]), markevery=_every(line, chart))
-            _strip(axes, line, ~np.isfinite(values), chart)
-            continue
-        start = PLACES[line.kind]
-        if not np.isfinite(values[0]):
-            continue
-        hollow = "none" if line.kind == "nacozy" else "full"
-        at = axes.get_yaxis_transform()
-        where = {"transform": at, "color": seen["color"]}
-        axes.plot([start, start + 0.03], [values[0]] * 2, linewidth=2.2, **where)
-        axes.plot([start + 0.015], [values[0]], marker=seen["marker"], markersize=9, fillstyle=hollow, **where)
+    axes.set(xscale="log", yscale="log", xlabel="gain h·C·K at the start", ylabel=name)
+    axes.set_xlim(low / 10 ** (0.02 * wide), high * 10 ** (0.02 * wide))
     axes.axvline(1.0, color=GREY, linewidth=0.9)
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
+    below: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
+    axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **below))
+    axes.text(1.012, 1.0 + 0.5 * STRIP, "diverged", transform=axes.transAxes, size=12, color=GREY, va="center")
+    methods = _methods(chart)
+    ends = []
+    for line in (each for each in chart.lines if each.kind in FORMS):
+        values = np.maximum(getattr(line, what), LEAST_DRAWN)
+        shown = np.where(np.isfinite(values), values, np.nan)
+        look = _look(chart, line.method) | FORMS[line.kind]
+        axes.plot(line.relative, shown, **look, markevery=_every(line, methods))
+        _strip(axes, line, ~np.isfinite(values), methods, look)
+        if line.kind == "limited" or not any(each.kind == "limited" for each in chart.lines):
+            known = np.flatnonzero(np.isfinite(shown))
+            ends += [(float(gains[-1]), float(shown[i]), line.method.title, str(look["color"])) for i in known[-1:]]
     axes.minorticks_off()
-    # Walls at the edges: what is outside has no gain.
-    for edge in (0.04, 0.92):
-        axes.plot([edge, edge], [0.0, 1.0], color="#bbbbbb", linewidth=0.8, transform=axes.transAxes)
+    at_ends(axes, ends, 12.0, ROOM)
 
 
-def _every(line: Held, chart: ControlSweep) -> tuple[int, int]:
+def _every(line: Held, methods: list[Method]) -> tuple[int, int]:
     """Markers on every third point, those of each method at others."""
-    names = list(dict.fromkeys(each.method.name for each in chart.lines))
     step = max(1, len(line.relative) // 8)
-    return names.index(line.method.name) % step, step
+    return methods.index(line.method) % step, step
 
 
-def _strip(axes: Axes, line: Held, lost: Any, chart: ControlSweep) -> None:
+def _strip(axes: Axes, line: Held, lost: Any, methods: list[Method], look: dict[str, Any]) -> None:
     """Markers above the frame, a row for each method, where runs were lost."""
     if not lost.any():
         return
-    names = list(dict.fromkeys(each.method.name for each in chart.lines))
-    height = 1.0 + FIRST + ROW * names.index(line.method.name)
-    style = _look(chart, line.method) | FORMS[line.kind] | {"linestyle": "none", "clip_on": False}
+    height = 1.0 + STRIP * (methods.index(line.method) + 0.5) / len(methods)
+    style = look | {"linestyle": "none", "clip_on": False, "markersize": 4.0}
     axes.plot(line.relative[lost], np.full(lost.sum(), height), transform=axes.get_xaxis_transform(), **style)
-
-
-def _legend(figure: Figure, chart: ControlSweep, methods: list[Any]) -> None:
-    """What markers and lines mean."""
-    from matplotlib.lines import Line2D
-
-    handles: list[Any] = []
-    labels = []
-    for method in methods:
-        handles.append(Line2D([], [], **(_look(chart, method) | {"linestyle": "none"})))
-        dt = next(line.dt for line in chart.lines if line.method == method)
-        labels.append(f"{method.title}, h = {dt:.4g}")
-    texts = {"limited": "limited form", "printed": "printed form"}
-    for form, style in FORMS.items():
-        if any(line.kind == form for line in chart.lines):
-            handles.append(Line2D([], [], color="#000000", marker="o", **style))
-            labels.append(texts[form])
-    edges = {"none": "no control", "scaling": "velocities scaled", "nacozy": "Nacozy's projection"}
-    fills: dict[str, Any] = {"none": "full", "scaling": "full", "nacozy": "none"}
-    for kind, text in edges.items():
-        if any(line.kind == kind for line in chart.lines):
-            side = "left" if kind == "none" else "right"
-            handles.append(Line2D([], [], color=GREY, marker="s", markersize=9, linewidth=2.2, fillstyle=fills[kind]))
-            labels.append(f"{text} ({side} edge)")
-    figure.legend(handles, labels, frameon=False, loc="lower left", bbox_to_anchor=(0.005, 0.055), ncols=4)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, engine
 from .. import control as controls
 from .._checks import Array
 from .._value import Value
@@ -108,7 +108,7 @@ class Runs:
 
     def line(self, method: Method, kind: str, gains: Array, evaluations: int) -> Held:
         """Run a method under one kind of control, all gains at once, with so many function evaluations."""
-        steps = max(1, round(evaluations / method.evaluations))
+        steps = max(1, round(evaluations / engine.evaluations(method, self.system)))
         dt = self.horizon / steps
         relative = np.array([np.nan])
         held: controls.AnyControl | None = None

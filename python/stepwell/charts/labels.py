@@ -90,6 +90,27 @@ def beside(axes: Axes, labels: Sequence[Label], keep_off: Sequence[tuple[float, 
     return left
 
 
+def at_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]], size: float, room: float) -> None:
+    """The names of curves at their right ends, given as x, y, name and colour; those nearer than ``room`` are moved apart.
+
+    ``room`` is a share of the height of the axes, which must have their final limits. The names begin a little to the right of
+    the ends, and may leave the axes there.
+    """
+    axes.get_ylim()  # a scale that is still free is found now
+    to_axes = axes.transData + axes.transAxes.inverted()
+    placed = sorted((float(to_axes.transform((x, y))[1]), float(to_axes.transform((x, y))[0]), name, c) for x, y, name, c in ends)
+    heights: list[float] = []
+    for height, *_ in placed:
+        heights.append(max([height, *(each + room for each in heights[-1:])]))
+    # What was moved past the top is moved down again, and what is below it with it.
+    top = 1.0 - 0.5 * room
+    for i in reversed(range(len(heights))):
+        heights[i] = min(heights[i], top)
+        top = heights[i] - room
+    for height, (_, x, name, colour) in zip(heights, placed, strict=True):
+        axes.text(x + 0.012, height, name, transform=axes.transAxes, color=colour, size=size, weight="bold", va="center")
+
+
 def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
     """A bold title at that place of the page, smaller where it would leave it."""
     drawn = figure.text(x, y, text, size=size, weight="bold")
@@ -97,7 +118,7 @@ def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
     box = drawn.get_window_extent(canvas.get_renderer())
     room = figure.bbox.width * (1.0 - x) - 10.0
     if box.width > room:
-        drawn.set_fontsize(size * room / box.width)
+        drawn.set_fontsize(0.98 * size * room / box.width)  # letters do not shrink quite in proportion
 
 
 def _pixels(axes: Axes, points: Array) -> Array:

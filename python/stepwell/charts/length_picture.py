@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..methods import Method
 from .control import ControlSweep
 from .control_runs import Held
-from .style import FONT, GREY, look, new_figure
+from .style import FONT, GREY, apart, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +23,8 @@ LEAST_DRAWN = 1e-17
 CONTROL: dict[str, Any] = {"linestyle": "-", "linewidth": 2.0, "markersize": 6.0}
 RESETTING: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.6, "marker": ""}
 
-#: Height of the row of a method in the strip of diverged runs, and the first above the frame, as shares of the frame's height.
-ROW, FIRST = 0.038, 0.03
+#: Height of the strip of diverged runs, as a share of that of the panel below it.
+STRIP = 0.1
 
 #: Letters of a line of the title, its height, where what is below it begins, and the height of the name of a column.
 LINE, LINE_HEIGHT, HEAD, COLUMN_TITLE = 112, 0.036, 0.93, 0.035
@@ -40,7 +41,7 @@ def draw(chart: ControlSweep) -> Figure:
 
     with rc_context(FONT):
         head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
-        strip = FIRST + ROW * len(_firsts(chart))
+        strip = STRIP
         gap = strip + 0.02
         # Two frames, each with its strip above, below the title and the name of the column.
         share = strip / (2.0 + gap)
@@ -65,33 +66,42 @@ def draw(chart: ControlSweep) -> Figure:
 
 def _column(panels: Any, chart: ControlSweep, evaluations: int, strip: float) -> None:
     """One number of evaluations: the state's error above, that of the lengths below."""
+    from matplotlib.patches import Rectangle
+
     above, below = panels
     methods = list(dict.fromkeys(line.method.name for line in chart.lines))
     for axes, what in ((above, "state_error" if chart.exact else "energy_error"), (below, "length_error")):
         axes.set(xscale="log", yscale="log")
         axes.grid(which="major", color="#dddddd", linewidth=0.8)
         axes.minorticks_off()
+        grey: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
+        axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **grey))
         for row, name in enumerate(methods):
             kinds = {line.kind: chart.line(name, line.kind, evaluations) for line in chart.lines if line.method.name == name}
             if (held := kinds.get("control")) is not None:
-                _curve(axes, held, getattr(held, what), row, len(methods))
+                _curve(axes, chart, held, getattr(held, what), row, len(methods))
             reset = kinds.get("length")
             if reset is not None and what != "length_error" and np.isfinite(getattr(reset, what)[0]):
-                axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(look(reset.method) | RESETTING))
+                axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(_look(chart, reset.method) | RESETTING))
     above.text(0.0, 1.0 + strip, f"{evaluations} function evaluations", size=13.5, transform=above.transAxes)
     below.set_xlabel("gain c of the control")
 
 
-def _curve(axes: Axes, line: Held, values: Any, row: int, rows: int) -> None:
+def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
+    """Each method has a colour of its own."""
+    return apart([line.method for line in _firsts(chart)], method)
+
+
+def _curve(axes: Axes, chart: ControlSweep, line: Held, values: Any, row: int, rows: int) -> None:
     """The errors of a method over c, and marks above the frame where its runs diverged."""
-    style = look(line.method) | CONTROL
+    style = _look(chart, line.method) | CONTROL
     fine = np.isfinite(values)
     axes.plot(line.relative, np.where(fine, np.maximum(values, LEAST_DRAWN), np.nan), **style, markevery=(row, rows))
     if not fine.all():
-        height = 1.0 + FIRST + ROW * row
+        height = 1.0 + STRIP * (row + 0.5) / rows
         above: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False}
         axes.plot(
-            line.relative[~fine], np.full((~fine).sum(), height), **(style | {"linestyle": "none", "markersize": 5.0}), **above
+            line.relative[~fine], np.full((~fine).sum(), height), **(style | {"linestyle": "none", "markersize": 4.0}), **above
         )
 
 
@@ -108,13 +118,13 @@ def _legend(figure: Figure, chart: ControlSweep) -> None:
     """What markers and lines mean."""
     from matplotlib.lines import Line2D
 
-    handles: list[Any] = [Line2D([], [], **(look(line.method) | CONTROL)) for line in _firsts(chart)]
+    handles: list[Any] = [Line2D([], [], **(_look(chart, line.method) | CONTROL)) for line in _firsts(chart)]
     labels = [line.method.title for line in _firsts(chart)]
     handles += [Line2D([], [], color=GREY, **CONTROL), Line2D([], [], color=GREY, **RESETTING)]
     labels += ["under control", "lengths reset after every step"]
     figure.legend(handles, labels, frameon=False, loc="lower left", bbox_to_anchor=(0.005, 0.042), ncols=LEGEND_COLUMNS)
     note = (
-        "Where a solid line is below the dashed one of its colour, control is better. Marks above a frame: the run diverged. "
+        "Where a solid line is below the dashed one of its colour, control is better. Marks in the grey strip: the run diverged. "
         "Reset lengths are exact to rounding, and not drawn."
     )
     figure.text(0.012, 0.02, note, size=12, color=GREY)

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
+from ..stability import stability_limit
+from ..systems import Oscillator
+from .labels import title
 from .maps import StabilityMap
 from .style import FONT, GREY, new_figure
 
@@ -17,8 +20,9 @@ if TYPE_CHECKING:
 #: Contour lines, besides that of 1.
 LEVELS = (0.5, 0.8, 0.9, 1.1, 1.5, 2.0)
 
-#: The colours end here: what grows more is as dark. Of the colours only the middle part is used, on which lines are seen.
-RADIUS_LIMIT, COLOURS = 2.0, (0.13, 0.87)
+#: The colours end here: what grows more is as dark. Of the colours only the middle part is used, on which lines are seen, in so
+#: many shades.
+RADIUS_LIMIT, COLOURS, SHADES = 2.0, (0.13, 0.87), 64
 
 #: A number stands on its line where the other lines are this far away, as a share of the picture; where none is, there is none.
 LABEL_DISTANCE = 0.03
@@ -35,7 +39,7 @@ def draw(chart: StabilityMap) -> Figure:
         bar = figure.add_axes((0.905, 0.175, 0.022, 0.665))
         x, y, shown = chart.phi, chart.damping, _decided(chart)
         extent = (float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
-        colours = ListedColormap(colormaps["PuOr_r"](np.linspace(*COLOURS, 256)))
+        colours = ListedColormap(colormaps["PuOr_r"](np.linspace(*COLOURS, SHADES)))
         image = axes.imshow(
             shown, norm=TwoSlopeNorm(1.0, 0.0, RADIUS_LIMIT), cmap=colours, extent=extent, origin="lower", aspect="auto"
         )
@@ -52,12 +56,25 @@ def draw(chart: StabilityMap) -> Figure:
         scale = figure.colorbar(image, cax=bar, extend="max")
         scale.set_ticks([0.0, *LEVELS, 1.0])
         scale.set_label("radius r₁: factor of the amplitude in a step", labelpad=8)
-        figure.text(0.012, 0.945, f"Where {chart.method.title} is stable ({chart.method.section})", size=18, weight="bold")
-        below = "Damped oscillator (§3): the largest eigenvalue of a step, over its length and the damping."
+        title(figure, 0.012, 0.945, finding(chart), 18)
+        below = (
+            f"{chart.method.section}. Damped oscillator (§3): the largest eigenvalue of a step, over its length and the damping."
+        )
         figure.text(0.012, 0.895, below, size=12.5, color=GREY)
         notes = "Thick line: r₁ = 1. Hatched: growing samples. The exact solution decays wherever D > 0."
         figure.text(0.012, 0.025, notes, size=12, color=GREY)
     return figure
+
+
+def finding(chart: StabilityMap) -> str:
+    """Up to which angle the method is stable: with the least damping, and with D = 1 or what is nearest to it."""
+    least, most = float(chart.damping[0]), float(chart.damping[-1])
+    said = []
+    for ratio in sorted({least, min(max(1.0, least), most)}):
+        limit = float(stability_limit(Oscillator(damping=ratio), chart.method))
+        where = "undamped" if ratio == 0.0 else f"at D = {ratio:g}"
+        said.append(f"stable to Φ = {limit:.3g} {where}" if limit else f"never stable {where}")
+    return f"{chart.method.title}: {', '.join(said)}"
 
 
 def _decided(chart: StabilityMap) -> Array:

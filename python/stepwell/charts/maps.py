@@ -20,13 +20,19 @@ from ..methods import method as find_method
 from ..stability import analyse
 from ..systems import Oscillator
 from .files import write_csv, write_json
-from .zplane import largest, within
+from .zplane import within
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Points of a map over each of its axes, by default.
 SIZE = 512
+
+#: A map ends where the last of its rows has left the stable range, and this factor beyond; of how many points that is found.
+BEYOND, COARSE = 1.25, (200, 33)
+
+#: The end of a map on which nothing is stable, and of the search for the end of the others, in radians.
+NOWHERE, FARTHEST = 4.0, 12.0
 
 #: Rounding of a step, in parts of the state.
 ROUNDING = 1000.0 * 2.0**-53
@@ -217,7 +223,7 @@ def stability_map(
     Args:
         method: its name, or what ``stepwell.method`` returns.
         phi: the range (lower, upper) of Φ = ω₀·dt in radians, within 0 … 100; the first point is one spacing above the lower end.
-            If None, from 0 to 4, or past the method's limit.
+            If None, from 0 to a quarter past the largest angle to which any of the damping ratios is stable.
         damping: the range (lower, upper) of the damping ratio D, dimensionless, both ends included; None for the undamped
             oscillator over Φ alone, which every method can step.
         size: number of points over each axis, or a pair: over Φ, over D.
@@ -235,7 +241,7 @@ def stability_map(
         'rk4'
     """
     how = find_method(method)
-    low, high = _ends("phi", (0.0, max(4.0, largest([how.limit]))) if phi is None else phi, "rad")
+    low, high = (0.0, NOWHERE) if phi is None else _ends("phi", phi, "rad")
     if low < 0.0:
         raise ArgumentError(f"phi: expected angles of 0 rad or more, got {low:g}")
     within("phi", high)
@@ -249,6 +255,8 @@ def stability_map(
     fits_together(Oscillator(damping=None if damping is None else most), how)
     _checks.fits("size: the matrices", 48, (rows, columns), "ask for fewer points")
 
+    if phi is None:
+        high = _fitted(how, None if damping is None else (least, most))
     angles = low + (high - low) * np.arange(1, columns + 1) / columns
     ratios = np.linspace(least, most, rows)
     found = analyse(Oscillator(angles, None if damping is None else ratios[:, np.newaxis]), how, dt=1.0)
@@ -265,6 +273,17 @@ def stability_map(
         imaginary=np.abs(z.imag).reshape(shape),
         damped=damping is not None,
     )
+
+
+def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
+    """Where a map of that method ends: a little past the largest angle up to which a row is stable from its beginning."""
+    columns, rows = COARSE
+    angles = np.arange(1, columns + 1) * (FARTHEST / columns)
+    ratios = None if damping is None else np.linspace(*damping, rows)[:, np.newaxis]
+    stable = np.atleast_2d(analyse(Oscillator(angles, ratios), method, dt=1.0).stable)
+    reached = np.where(stable.all(axis=1), columns, np.argmin(stable, axis=1)).max()
+    # Rounded up, so that the axis ends at a round number.
+    return math.ceil(20.0 * BEYOND * angles[reached - 1]) / 20.0 if reached else NOWHERE
 
 
 def _ends(argument: str, value: Any, unit: str) -> tuple[float, float]:

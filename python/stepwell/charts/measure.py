@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import engine
 from .._checks import Array
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
 from ..integrate import fits_together, integrate
@@ -69,6 +70,7 @@ def refusal(scene: Scene, method: Method) -> str | None:
     """Why the method cannot do the scene, or None."""
     try:
         fits_together(scene.system, method)
+        engine.evaluations(method, scene.system)
     except UnsupportedError as error:
         return str(error)
     return None
@@ -88,7 +90,7 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
     return Point(
         steps=steps,
         dt=dt,
-        cost=method.evaluations / dt,
+        cost=engine.evaluations(method, scene.system) / dt,
         state_error=state_error,
         energy_error=energy_error,
         unstable=grown and state_error > 1.0,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .labels import title
 from .norm import NormSweep, Settled
 from .style import FONT, GREY, look, new_figure
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 #: The least and largest ratio that is drawn: a thirtieth is as good as none.
 LEAST_RATIO, LARGEST_RATIO = 0.03, 30.0
+
+#: Errors of angles that differ by less than this share are alike: it is what rounding leaves of the smallest.
+ALIKE = 1e-3
 
 #: What is exact has no place on a logarithmic axis.
 LEAST_NORM = 1e-17
@@ -36,7 +40,7 @@ def draw(chart: NormSweep) -> Figure:
         left, right = figure.subplots(1, 2, gridspec_kw=places)
         _ratios(left, chart)
         _norms(right, chart)
-        figure.text(0.012, 0.945, "Quaternion: is control of the norm better than resetting it?", size=20, weight="bold")
+        title(figure, 0.012, 0.945, finding(chart), 20)
         degrees = float(np.degrees(2.0 * chart.phi))
         what = f"A body turns steadily, by {degrees:.3g}° a step (Φ = ½h|ω| = {chart.phi:g}). Control adds k·(1 − q·q)·q to q̇."
         figure.text(0.012, 0.9, what, size=13.5, color=GREY)
@@ -46,6 +50,20 @@ def draw(chart: NormSweep) -> Figure:
         )
         figure.text(0.012, 0.025, note, size=12, color=GREY)
     return figure
+
+
+def finding(chart: NormSweep) -> str:
+    """For which methods control is better than resetting: at every gain, at some, or at none."""
+    told: dict[str, list[str]] = {"at every gain": [], "at some gains": [], "at no gain": []}
+    for line in chart.lines:
+        with np.errstate(all="ignore"):
+            ratio = np.abs(line.angle_error / line.angle_error_reset)
+        better = ratio[np.isfinite(ratio)] < 1.0 - ALIKE
+        if better.size:
+            told["at every gain" if better.all() else "at some gains" if better.any() else "at no gain"].append(line.method.title)
+    parts = [f"{' and '.join(names)} {when}" for when, names in told.items() if names]
+    said = ", ".join(parts)
+    return f"Norm of a quaternion: control beats resetting for {said}" if parts else "Norm of a quaternion under control"
 
 
 def _ratios(axes: Axes, chart: NormSweep) -> None:

@@ -17,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from .. import engine
 from .._checks import Array, count, known, numbers, short
 from .._value import Value
 from ..errors import DTypeError, ShapeError, UnsupportedError
+from ..methods import method
 from ..scenes import Scene
 from ..systems import NBody
 
@@ -167,8 +169,8 @@ class ByScipy(Value):
 def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
     """Taylor series by heyoka, compiled for the scene; bodies, and linear systems without inputs.
 
-    A step with a series of order p is counted as p function evaluations. States between steps are by the series. What is compiled
-    before the run is not timed.
+    A step is counted as one by ``taylor`` of the same order (``Paces.evaluations``), or not at all where that would be too long.
+    States between steps are by the series. What is compiled before the run is not timed.
 
     Raises:
         UnsupportedError: if heyoka is not installed.
@@ -197,7 +199,11 @@ class ByHeyoka(Value):
         begin = time.perf_counter()
         found = series.propagate_grid(np.concatenate([[0.0], times]))
         seconds = time.perf_counter() - begin
-        return Solved(*_blocks(scene, found[-1][1:]), int(found[3]) * series.order, seconds)
+        try:
+            each = engine.evaluations(method("taylor"), scene.system, order=series.order, paced=True)
+        except UnsupportedError:
+            each = None
+        return Solved(*_blocks(scene, found[-1][1:]), None if each is None else int(found[3]) * each, seconds)
 
 
 #: REBOUND's integrators that are offered, and whether a setting is a tolerance.

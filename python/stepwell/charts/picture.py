@@ -237,7 +237,9 @@ def _at_edge(curve: Curve, cost: str) -> float:
     """The cost of the largest stable step."""
     if cost == "evaluations":
         assert isinstance(curve.method, Method)
-        return curve.method.evaluations / curve.largest_stable_step
+        point = curve.points[0]
+        assert point.dt is not None
+        return round(point.cost * point.dt) / curve.largest_stable_step
     return (curve.step_time if cost == "batch" else curve.single_time).median / curve.largest_stable_step
 
 

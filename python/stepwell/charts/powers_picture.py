@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .labels import title as put_title
 from .powers import Powers
-from .style import FONT, GREY, new_figure
+from .style import FAMILIES, FONT, GREY, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINE_STYLES: dict[str, Any] = {
-    "direct": {"color": "#000000", "marker": "o", "linestyle": "-", "label": "direct: the method's own steps"},
-    "matrix": {"color": "#0072b2", "marker": "s", "linestyle": (0, (5, 2)), "label": "matrix: s ← P·s, step by step"},
-    "power": {"color": "#d55e00", "marker": "D", "linestyle": (0, (1, 1.2)), "label": "power: Pⁿ by squaring"},
+    "direct": {"color": FAMILIES["Dormand-Prince"], "marker": "o", "linestyle": "-", "label": "direct: the method's own steps"},
+    "matrix": {"color": FAMILIES["leapfrog"], "marker": "s", "linestyle": (0, (5, 2)), "label": "matrix: s ← P·s, step by step"},
+    "power": {"color": FAMILIES["Heun"], "marker": "D", "linestyle": (0, (1, 1.2)), "label": "power: Pⁿ by squaring"},
 }
 
 
@@ -43,8 +44,7 @@ def draw(chart: Powers) -> Figure:
         middle = int(chart.steps[len(chart.steps) // 2])
         error.annotate("n·2⁻⁵³", (middle, middle * 2.0**-53), (-58, 4), textcoords="offset points", color=GREY)
         time.legend(frameon=False, loc="upper left")
-        title = f"{chart.method.title}: n steps, made one by one and at once"
-        figure.text(0.012, 0.925, title, size=20, weight="bold")
+        put_title(figure, 0.012, 0.925, finding(chart), 20)
         what = f"{chart.system!r}, dt = {chart.dt:g}; one member, {chart.isa}"
         figure.text(0.012, 0.865, textwrap.shorten(what, 140), size=13.5, color=GREY)
         note = (
@@ -52,3 +52,14 @@ def draw(chart: Powers) -> Figure:
         )
         figure.text(0.012, 0.03, note, size=12, color=GREY)
     return figure
+
+
+def finding(chart: Powers) -> str:
+    """From how many steps on the power is faster than stepping, and how much larger its error is at the end."""
+    faster = np.asarray(chart.seconds["power"]) < np.asarray(chart.seconds["direct"])
+    slow = np.flatnonzero(~faster)
+    first = int(slow[-1]) + 1 if slow.size else 0
+    what = f"{chart.method.title}: Pⁿ is computed at once"
+    if first >= len(chart.steps):
+        return f"{what}, and is never faster than {int(chart.steps[-1]):,} steps".replace(",", " ").replace("once ", "once, ", 1)
+    return f"{what}, faster than n steps from n = {int(chart.steps[first]):,} on".replace(",", " ").replace("once ", "once, ", 1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array
-from ..systems import Chain
+from ..systems import Chain, NBody
 from .runs import RunPicture
 from .style import FAMILIES, FONT, GREY, new_figure
 
@@ -28,6 +28,12 @@ EXACT: dict[str, Any] = {"color": "#d4d4d4", "linewidth": 5.0, "zorder": 1, "sol
 
 #: A curve of more states than this is drawn thin and without dashes, and as pixels in files of lines.
 LONG_CURVE = 3000
+
+#: Paths longer than so many sides of the picture are drawn thin.
+CROWDED = 20.0
+
+#: Curves nearer to each other than this share of their size are one.
+ONE_CURVE = 0.01
 
 #: The view ends at this many times the size of the exact motion; without one, at this many times that of the start.
 VIEW_FACTOR, VIEW_FACTOR_FROM_START = 4.0, 30.0
@@ -66,8 +72,13 @@ def draw(chart: RunPicture) -> Figure:
             panels = curves(figure, chart, notes)
             left = 0.66
             panels[-1].set_xlabel("time")
-        energy = figure.add_axes((left, 0.545, RIGHT - left, TOP - 0.545))
-        state = figure.add_axes((left, BOTTOM, RIGHT - left, 0.455 - BOTTOM))
+        if chart.kind == "orbits" and turning(chart):
+            radii(figure.add_axes((left, 0.68, RIGHT - left, TOP - 0.68)), chart)
+            energy = figure.add_axes((left, 0.4225, RIGHT - left, 0.145))
+            state = figure.add_axes((left, BOTTOM, RIGHT - left, 0.145))
+        else:
+            energy = figure.add_axes((left, 0.545, RIGHT - left, TOP - 0.545))
+            state = figure.add_axes((left, BOTTOM, RIGHT - left, 0.455 - BOTTOM))
         errors(energy, state, chart)
         state.set_xlabel("time")
         text(figure, chart, notes)
@@ -82,13 +93,78 @@ def _orbits(figure: Figure, chart: RunPicture, notes: list[str]) -> None:
     planes = ((0, 1),) if chart.places.shape[2] == 2 else ((0, 1), (0, 2))
     views = [view(chart, plane) for plane in planes]
     size = max(half for _, half in views)
-    side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.295, 0.055, 0.05)
+    side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.29, 0.06, 0.058)
     for i, (plane, (centre, _)) in enumerate(zip(planes, views, strict=True)):
         axes = figure.add_axes((left + i * (side + gap), BOTTOM, side, TOP - BOTTOM))
         square(axes, centre, size, plane, chart.places.shape[2])
         _paths(axes, chart, plane, legend=i == 0)
     if left_picture(chart, views, size):
         notes.append("A body leaves the picture.")
+    if one_curve(chart):
+        notes.append("Broad: where each body went last.")
+
+
+def _angles(places: Array) -> Array:
+    """The angle of each point about the origin, without jumps, shape (saved, points)."""
+    return np.asarray(np.unwrap(np.arctan2(places[..., 1], places[..., 0]), axis=0))
+
+
+def _turns(places: Array, exact: Array) -> Array:
+    """The angles of points in turns, counted the way in which the exact motion goes, the first between 0 and 1."""
+    way = np.sign(_angles(exact)[-1] - _angles(exact)[0])
+    found = way * _angles(places) / (2.0 * np.pi)
+    return np.asarray(found - np.floor(way * _angles(exact[:1])[0] / (2.0 * np.pi)))
+
+
+def turning(chart: RunPicture) -> bool:
+    """Whether bodies in a plane go round their centre one way, so that their distance from it is a function of the angle."""
+    exact = chart.exact_places
+    if exact is None or not isinstance(chart.run.system, NBody) or exact.shape[2] != 2:
+        return False
+    turned = np.diff(_angles(exact), axis=0)
+    return bool(((turned > 0.0).all(axis=0) | (turned < 0.0).all(axis=0)).all())
+
+
+def radii(axes: Axes, chart: RunPicture) -> None:
+    """The distance of each body from the centre over the angle that it has turned: orbits that lie on each other, spread out."""
+    y = np.clip(chart.places[chart.finite], -1e9, 1e9)
+    exact = chart.exact_places
+    assert exact is not None
+    angles, true = _turns(y, exact), _turns(exact, exact)
+    last, r = float(angles.max()), np.hypot(*exact.transpose(2, 0, 1))
+    for i in range(y.shape[1]):
+        known = true[:, i]
+        turn = known[-1] - known[0]
+        for k in range(int((last - known[0]) / turn) + 1 if turn > 0.5 else 1):
+            axes.plot(known + k * turn, np.hypot(*exact[:, i].T), **EXACT)
+    for i in range(y.shape[1]):
+        look = body(chart, i)
+        axes.plot(angles[:, i], np.hypot(*y[:, i].T), color=look["color"], linestyle=look["linestyle"], linewidth=1.4, zorder=3)
+    axes.set_title("distance from the centre r(θ) over turns θ/2π", loc="left", size=13.5)
+    shown = np.clip(np.hypot(*y.transpose(2, 0, 1)), 0.0, 1.6 * r.max())
+    low, high = min(float(shown.min()), float(r.min())), max(float(shown.max()), float(r.max()))
+    room = max(0.12 * (high - low), 1e-9 * high)
+    axes.set(xlim=(0.0, last), ylim=(low - room, high + room))
+    axes.grid(color="#e6e6e6", linewidth=0.8)
+    axes.set_axisbelow(True)
+
+
+def one_curve(chart: RunPicture) -> bool:
+    """Whether several bodies run after each other on one curve, where the last one drawn would hide the others."""
+    exact = chart.exact_places
+    if exact is None or chart.scene.period is None or not 1 < exact.shape[1] <= len(BODIES):
+        return False
+    some = exact[:: max(1, len(exact) // 200)]
+    far = [np.hypot(*(some[:, np.newaxis, i] - exact[np.newaxis, ::10, 0]).transpose(2, 0, 1)).min(axis=1).max() for i in (1, -1)]
+    return bool(max(far) < ONE_CURVE * np.abs(exact).max())
+
+
+def crowded(chart: RunPicture, size: float) -> bool:
+    """Whether the paths are so long, beside the side of the picture, that they must be thin."""
+    y = np.clip(chart.places[chart.finite], -1e9, 1e9)
+    with np.errstate(all="ignore"):
+        way = float(np.linalg.norm(np.diff(y, axis=0), axis=2).sum(axis=0).max())
+    return bool(len(y) > LONG_CURVE and way > CROWDED * size)
 
 
 def view(chart: RunPicture, plane: tuple[int, int]) -> tuple[Array, float]:
@@ -168,7 +244,9 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
 
         for state, colour in ((y[0], "#b0b0b0"), (y[-1], "#000000")):
             axes.add_collection(LineCollection(state[joined], colors=colour, linewidths=1.0, zorder=3))
-    long, many = len(y) > LONG_CURVE, bodies > len(BODIES)
+    low, high = axes.get_xlim()
+    long, many = crowded(chart, high - low), bodies > len(BODIES)
+    shared = one_curve(chart)
     if chart.exact_places is not None:
         for i in range(bodies):
             exact(axes, chart.exact_places[:, i, plane].T, above=long)
@@ -178,7 +256,12 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
         width = 0.5 if many else 0.35 if long else 1.4
         if many and joined.size:
             continue  # the springs show where particles are, and their paths would hide them
-        axes.plot(*y[:, i].T, linewidth=width, alpha=0.45 if many else 1.0, zorder=2, rasterized=long, **line)
+        pale = 0.25 if shared else 0.45 if many else 1.0
+        axes.plot(*y[:, i].T, linewidth=width, alpha=pale, zorder=2, rasterized=long, **line)
+        if shared and chart.scene.period is not None:
+            t = chart.run.t[chart.finite]
+            arc = y[t >= t[-1] - chart.scene.period / bodies, i]  # where it went last, up to where the next one began
+            axes.plot(*arc.T, color=look["color"], linewidth=3.0, zorder=3, solid_capstyle="butt")
         mark: dict[str, Any] = {"marker": look["marker"], "linestyle": "", "markersize": 4.0 if many else 10.0, "zorder": 4}
         start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 0.7 if many else 1.6}
         end: dict[str, Any] = {
@@ -206,10 +289,17 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
         net = {"color": "#b0b0b0" if label == "start" else "#000000", "linewidth": 1.6}
         handles.append(Line2D([], [], **(net if many and joined.size else mark)))
         labels.append(label)
-    # Above the panel, where no orbit can be.
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(handles)}
+    # Where no orbit can be: above the panel, or below it where its title is above.
+    above = dict[str, Any](loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    place = above if plane_is_all(chart) else dict[str, Any](loc="upper left", bbox_to_anchor=(-0.05, -0.13))
+    place["ncols"] = len(handles)
     spacing: dict[str, Any] = {"handlelength": 1.8, "columnspacing": 1.0, "handletextpad": 0.4, "borderpad": 0.1}
     axes.legend(handles, labels, frameon=False, **place, **spacing)
+
+
+def plane_is_all(chart: RunPicture) -> bool:
+    """Whether one panel shows all, without a title."""
+    return bool(chart.places.shape[2] == 2)
 
 
 # ---- curves over time

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,7 +105,16 @@ def new_figure(width: float, height: float) -> Figure:
         raise UnsupportedError("plot: a picture needs matplotlib; pip install 'stepwell[chart]'") from None
     figure = Figure(figsize=(width, height), dpi=100)
     FigureCanvasAgg(figure)
+    # A notebook knows how to show matplotlib's figures only after pyplot was imported.
+    vars(figure)["_repr_png_"] = partial(png, figure)
     return figure
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the bytes of a .png file."""
+    written = BytesIO()
+    figure.savefig(written, format="png", facecolor="white")
+    return written.getvalue()
 
 
 def drawn(path: str | Path | None, draw: Callable[[], Figure]) -> Figure:

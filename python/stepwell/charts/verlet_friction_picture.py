@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import FONT, GREY, new_figure
+from .style import FAMILIES, FONT, GREY, new_figure
 from .verlet_friction import VerletFriction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: dict[str, Any] = {
-    "exact": {"color": "#8c8c8c", "linewidth": 4.0, "label": "exact"},
-    "false_euler": {"color": "#000000", "linewidth": 1.3, "linestyle": (0, (5, 2)), "label": "False Euler"},
-    "verlet": {"color": "#d55e00", "linewidth": 1.3, "label": "Verlet, v = (y − y_prev)/h"},
+    "exact": {"color": "#c4c4c4", "linewidth": 4.0, "label": "exact"},
+    "false_euler": {"color": FAMILIES["Euler"], "linewidth": 2.2, "linestyle": (0, (5, 2)), "label": "False Euler"},
+    "verlet": {"color": FAMILIES["leapfrog"], "linewidth": 1.8, "label": "Verlet, v = (y − y_prev)/h"},
 }
 
 #: What is shown of each block: the end of its way.
@@ -40,14 +40,16 @@ def draw(chart: VerletFriction) -> Figure:
         limits.axhline(2.0, color=GREY, linewidth=0.9)
         limits.annotate("without drag: 2", (chart.damping[-1], 2.0), (-4, 5), textcoords="offset points", ha="right", color=GREY)
         known = 2.0 * (np.sqrt(1.0 + chart.damping**2) - chart.damping)
-        limits.plot(chart.damping, known, color="#8c8c8c", linewidth=4.0, label="2(√(1 + D²) − D)")
-        limits.plot(chart.damping, chart.limits, color="#d55e00", marker="o", markersize=4.5, linestyle="", label="of the step")
+        limits.plot(chart.damping, known, color="#c4c4c4", linewidth=4.0, label="2(√(1 + D²) − D)")
+        limits.plot(
+            chart.damping, chart.limits, color=FAMILIES["leapfrog"], marker="o", markersize=4.5, linestyle="", label="of the step"
+        )
         limits.set(xlabel="damping ratio D", ylim=(0.0, 2.3), xlim=(-0.02, 1.02 * float(chart.damping[-1])))
         limits.set_title("Limit of Φ = ω₀h with drag by the secant", loc="left", size=13.5, weight="bold")
         limits.legend(frameon=False, loc="lower left")
         for axes in (*panels, limits):
             axes.grid(which="major", color="#dddddd", linewidth=0.8)
-        figure.text(0.008, 0.915, "Not to be done: Verlet with friction by its secant (§8)", size=20, weight="bold")
+        figure.text(0.008, 0.915, "Friction by the secant lets Verlet creep and takes its stability (§8)", size=20, weight="bold")
         text = (
             f"The secant is the velocity of half a step ago: the blocks never rest, and drag makes large steps unstable. "
             f"h = {chart.dt:.4g}"

@@ -11,6 +11,7 @@ from typing import Any
 
 from .. import isa
 from ..charts.measure import REPEATS, members_of, refusal, step_times
+from ..engine import evaluations
 from ..errors import UnsupportedError
 from ..methods import Method, method, methods
 from ..scenes import Scene, scene
@@ -83,7 +84,7 @@ def rows(one: Scene, chosen: list[Method], members: int, fused: bool) -> list[di
             "ns_per_step": times[each.name].low,
             "median_ns_per_step": times[each.name].median,
             "error": times[each.name].median / times[each.name].low - 1.0,
-            "ns_per_evaluation": times[each.name].low / each.evaluations,
+            "ns_per_evaluation": times[each.name].low / evaluations(each, one.system),
             "times_the_least": times[each.name].low / least,
             "share": times[each.name].low / whole,
             "steps_per_second": 1e9 / times[each.name].low,

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks import Shape
 from ..errors import TraceError
+from ..reference.series import among
 from ..reference.types import Array as Numbers
 from .arrays import QUICK_SINES
 from .namespace import rebound
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from .definition import Definition
     from .invariants import Invariant, Traced
+    from .series import Rates
 
 #: The most lines of a traceback that are searched for the user's own.
 MOST_FRAMES = 200
@@ -44,6 +46,7 @@ class Equations:
     kept: str | None = None
     limited = False
     pushed = False
+    _series: Rates | None = None
 
     def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
         self.definition = definition
@@ -81,7 +84,7 @@ class Equations:
         return kept
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_invariants": {}}
+        return {**vars(self), "_invariants": {}, "_series": None}
 
     @property
     def name(self) -> str:
@@ -107,27 +110,37 @@ class Equations:
 
     def rates(self, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> tuple[Numbers, Numbers]:
         """v̇ and ẏ: symbols from symbols, arrays over all members from numbers. Where ẏ is v, it is not computed."""
+        if among((t, v, y)):
+            return self._of_series(given)(t, v, y, given)
         batch = np.broadcast_shapes(np.shape(v)[len(self.v_shape) :], np.shape(y)[len(self.y_shape) :], np.shape(t))
         with np.errstate(all="ignore"):
             parameters = {name: self._parameter(name, value, t, batch) for name, value in given.items()}
-            state = [_scalars(y, len(self.y_shape))]
+            state = [scalars(y, len(self.y_shape))]
             if self.definition.has_v:
-                state.insert(0, _scalars(v, len(self.v_shape)))
+                state.insert(0, scalars(v, len(self.v_shape)))
             made = self._called(Scalar(t), state, parameters)
         dv, dy = self._checked(made)
         v_dot = np.empty((*self.v_shape, *batch)) if dv is None else _numbers(dv, self.v_shape, batch)
         return v_dot, v if dy is None else _numbers(dy, self.y_shape, batch)
 
+    def _of_series(self, given: dict[str, Any]) -> Rates:
+        """The rates of series, traced when they are first asked for."""
+        from .series import Rates
+
+        if self._series is None:
+            self._series = Rates(self, given)
+        return self._series
+
     def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""
-        state = [_scalars(y, len(self.y_shape))]
+        state = [scalars(y, len(self.y_shape))]
         if self.definition.has_v:
-            state.insert(0, _scalars(v, len(self.v_shape)))
-        parameters = {name: _scalars(value, self.own_axes(name)) for name, value in given.items()}
+            state.insert(0, scalars(v, len(self.v_shape)))
+        parameters = {name: scalars(value, self.own_axes(name)) for name, value in given.items()}
         name = f"{self.name}: {invariant.name}"
         made = objects(self._run(rebound(invariant.function), name, *state, **parameters))
         if made.ndim or not isinstance(made[()], Scalar):
-            got = f"an array of shape {made.shape}" if made.ndim else _kind(made[()])
+            got = f"an array of shape {made.shape}" if made.ndim else kind_of(made[()])
             raise TraceError(f"{name}: expected one number of a state, got {got}")
         return made[()].value
 
@@ -136,34 +149,19 @@ class Equations:
             return self._run(rebound(value), f"{self.name}: {name}", Scalar(t))
         if hasattr(value, "at"):
             return Scalar(value.at(t))
-        return _scalars(value, self.own_axes(name))
+        return scalars(value, self.own_axes(name))
 
     def _called(self, t: Scalar, state: list[Any], parameters: dict[str, Any]) -> Any:
         return self._run(rebound(self.definition.function), self.name, t, *state, **parameters)
 
     def _run(self, function: Callable[..., Any], name: str, *given: Any, **named: Any) -> Any:
-        before = QUICK_SINES.set(self.definition.quick_sines)
-        try:
-            return function(*given, **named)
-        except RecursionError:
-            raise
-        except Exception as error:
-            line = _line_of(error, getattr(function, "__code__", None))
-            known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
-            said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
-            told = TraceError(f"{name}{line}: {said}")
-            told.of_shape = (
-                known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
-            )
-            raise told from error
-        finally:
-            QUICK_SINES.reset(before)
+        return run_by(function, name, self.definition.quick_sines, *given, **named)
 
     def _checked(self, made: Any) -> tuple[Any, Any]:
         """The rates of v and of y as objects; None for one that the function does not return."""
         if self.definition.blocks == 2:
             if not isinstance(made, (tuple, list)) or len(made) != 2:
-                raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {_kind(made)}")
+                raise TraceError(f"{self.name}: expected a pair (v̇, ẏ), since blocks=2, got {kind_of(made)}")
             return self._block("v̇", made[0], self.v_shape), self._block("ẏ", made[1], self.y_shape)
         if self.definition.order == 2:
             return self._block("v̇", made, self.v_shape), None
@@ -173,17 +171,38 @@ class Equations:
         try:
             items = array(made).items
         except TraceError as error:
-            raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {_kind(made)} ({error})") from None
+            raise TraceError(f"{self.name}: expected {what} of shape {shape}, got {kind_of(made)} ({error})") from None
         if items.shape != shape:
             raise of_shape(f"{self.name}: expected {what} of shape {shape}, that of its block, got shape {items.shape}")
         return items
 
 
-def _kind(made: Any) -> str:
+def run_by(function: Callable[..., Any], name: str, quick_sines: bool, *given: Any, **named: Any) -> Any:
+    """Call a user's function; what it raises is told with its name and the line."""
+    before = QUICK_SINES.set(quick_sines)
+    try:
+        return function(*given, **named)
+    except RecursionError:
+        raise
+    except Exception as error:
+        line = _line_of(error, getattr(function, "__code__", None))
+        known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
+        said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
+        told = TraceError(f"{name}{line}: {said}")
+        told.of_shape = (
+            known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+        )
+        raise told from error
+    finally:
+        QUICK_SINES.reset(before)
+
+
+def kind_of(made: Any) -> str:
+    """What a function returned, in a word or two."""
     return "nothing: is there a return?" if made is None else f"{type(made).__name__}"
 
 
-def _scalars(numbers: Any, axes: int) -> Any:
+def scalars(numbers: Any, axes: int) -> Any:
     """Numbers, or symbols, as scalars: the first axes are those of the array, the others those of a batch."""
     numbers = np.asarray(numbers)
     if axes == 0:

@@ -22,12 +22,12 @@ from ..systems import System
 from ..systems.base import a_system
 from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape, matrix_of, written
-from .result import Explanation, MachineCode
+from .result import Explanation, MachineCode, Packing
 
 if TYPE_CHECKING:
     from .._words import StepForm
 
-__all__ = ["Explanation", "Line", "MachineCode", "Section", "explain"]
+__all__ = ["Explanation", "Line", "MachineCode", "Packing", "Section", "explain"]
 
 
 def explain(
@@ -131,7 +131,10 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
     code = why = None
     if told["interpreted"] is None:
         names = {"vectors": "block_vectors", "turns": "blocks"} | {each: each for each in ("width", "resident", "registers")}
-        code = MachineCode(size=told["bytes"], spills=told["spills"], **{name: told[key] for name, key in names.items()})
+        packing = None if told["packing"] is None else Packing(**told["packing"])
+        code = MachineCode(
+            size=told["bytes"], spills=told["spills"], packing=packing, **{name: told[key] for name, key in names.items()}
+        )
     else:
         why = _why(told["interpreted"])
     return Explanation(

@@ -107,11 +107,11 @@ class Named(Tracer):
         s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
         return s
 
-    def attempt(self, method: Any) -> list[Any]:
+    def attempt(self, method: Any, order: int = 0) -> list[Any]:
         """The state and the pace after an attempt, whose increments are as long as its step."""
         _, _, more = self.state()
         self._length = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields)).outlook(self.tape.budget()).step
-        return super().attempt(method)
+        return super().attempt(method, order)
 
     def _note(self, name: str, block: Any) -> None:
         block = np.asarray(block, dtype=object)
@@ -182,6 +182,15 @@ def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
     beside = adaptive.Pace._fields if attempts else () if plan.system.control is None else ("work",)
     return names + [name + mark for name in beside]
+
+
+def coefficients(plan: Plan) -> list[str]:
+    """What the coefficients are called that an attempt by a series returns behind the state: ``y_3[0]`` is of order 3."""
+    if not plan.method.has_series or plan.fused:
+        return []
+    blocks = [("v", plan.system.v_shape), ("y", plan.system.y_shape)]
+    orders = range(1, (plan.order or plan.method.order) + 1)
+    return [indexed(f"{name}_{k}", index) for k in orders for name, shape in blocks for index in np.ndindex(shape)]
 
 
 # ---- values on a tape
@@ -255,7 +264,8 @@ def _leaf(tape: Any, name: str, given: int) -> Any:
 def increments_last(tracer: Named, roots: Sequence[Any]) -> tuple[Any, dict[int, str], dict[int, str]]:
     """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
     listed, places = tracer.tape.operations([*roots, *(symbol for symbol, _ in tracer.called)])
-    lines = [Operation(name, tuple(of), given) for name, of, given in listed]
+    lines, place = increments.negated_sums([Operation(name, tuple(of), given) for name, of, given in listed])
+    places = [place[each] for each in places]
     order = in_order(lines, places[: len(roots)])
     kept, moved = needed(lines, places[: len(roots)])
     work = increments.Rewriting(kept, moved)
@@ -471,6 +481,7 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
             case _:
                 return entry(i)
 
+    next_state += coefficients(plan) if attempts else []
     body, _ = writer.section("member step", split["body"], hot, 4, "a", next_state)
     return run, member, step, body
 

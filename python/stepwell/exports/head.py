@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .. import _core
+from .. import _core, engine
 from .._checks import Shape, short
 from .language import indented
 from .written import Written
@@ -22,7 +22,8 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
     plan, language = w.traced.plan, w.language
     method, system = plan.method, plan.system
     limit = f"undamped oscillators for omega*dt < {method.limit:.10g}" if method.limit else "no undamped oscillator, whatever dt"
-    evaluations = f"{method.evaluations} rate evaluation{'s' * (method.evaluations > 1)} per step"
+    count = engine.evaluations(method, system)
+    evaluations = f"{count} rate evaluation{'s' * (count > 1)} per step"
     blocks = [("v", system.v_shape), ("y", system.y_shape)]
     layout = "; ".join(_layout(name if name == "y" else w.slot, shape) for name, shape in blocks)
     return [

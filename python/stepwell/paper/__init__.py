@@ -1,7 +1,7 @@
 """The document (Hoffmann 2002), section by section: where each of its statements is in stepwell, and the statement run.
 
 A section is a module here. Each of its functions is one statement: an algorithm, a formula, a program, a figure, a piece of
-advice. It is run, and what it finds is compared with what the document says. ``docs/paper.md`` and the command
+advice. It is run, and what it finds is compared with what the document says. ``docs/theory/paper.md`` and the command
 ``stepwell paper`` are made from these entries, and the tests run them all.
 """
 

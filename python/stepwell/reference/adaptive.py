@@ -347,6 +347,11 @@ def over(error: Blocks, weights: Sequence[Any], block_axes: tuple[int, int]) -> 
 def length2(block: Array, axes: int) -> Array:
     """The square of a block's length, number after number."""
     block = np.asarray(block)
+    if block.ndim == axes and block.dtype == np.float64:  # of one member: the same sum in floats, ten times as fast
+        squares = 0.0
+        for number in block.ravel().tolist():
+            squares += number * number
+        return np.asarray(squares)
     total: Array = np.zeros(block.shape[axes:])
     for number in block.reshape((-1, *block.shape[axes:])):
         total = total + number * number

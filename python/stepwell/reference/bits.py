@@ -69,6 +69,11 @@ def add_bits(x: Any, whole: int) -> Any:
     return _asked("add_bits", x, whole) if _objects(x) else _number(_bits(x) + np.uint64(whole))
 
 
+def shift_up(x: Any, places: int) -> Any:
+    """The bits of x, moved up."""
+    return _asked("shift_up", x, places) if _objects(x) else _number(_bits(x) << np.uint64(places))
+
+
 def shift_down(x: Any, places: int) -> Any:
     """The bits of x, moved down."""
     return _asked("shift_down", x, places) if _objects(x) else _number(_bits(x) >> np.uint64(places))

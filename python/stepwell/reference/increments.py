@@ -139,6 +139,31 @@ class Rewriting:
             self.values.append(self.value(line))
 
 
+def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]:
+    """The same tape with −(x + y) in place of (−x) − y, and the place of each line.
+
+    Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first. What is made of it must not depend on that.
+    """
+    made: list[Operation] = []
+    known: dict[Operation, int] = {}
+    place: list[int] = []
+
+    def write(name: str, of: tuple[int, ...], given: int = 0) -> int:
+        operation = Operation(name, tuple(sorted(of)) if name in ("add", "multiply") else of, given)
+        if operation not in known:
+            known[operation] = len(made)
+            made.append(operation)
+        return known[operation]
+
+    for name, of, given in tape:
+        if name == "subtract" and tape[of[0]].name == "negate":
+            x, y = place[tape[of[0]].of[0]], place[of[1]]
+            place.append(write("negate", (write("add", (x, y)),)))
+        else:
+            place.append(write(name, tuple(place[line] for line in of), given))
+    return made, place
+
+
 def increments_last(
     tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False
 ) -> tuple[list[Operation], list[int]]:
@@ -151,6 +176,8 @@ def increments_last(
     sum of two increments of one factor is one too. Everything else takes the product (c·factor)·x, whose first half is computed
     before the steps.
     """
+    tape, place = negated_sums(tape)
+    tape, roots = needed(tape, [place[root] for root in roots])
     work = Rewriting(tape, roots, single)
     work.run()
     places = [work.plain(root) for root in roots]

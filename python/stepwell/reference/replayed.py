@@ -46,6 +46,14 @@ class Operations:
 
     def __init__(self, operations: Sequence[tuple[str, Sequence[int], int]], places: Sequence[int]) -> None:
         self.lines, self.places = list(operations), list(places)
+        #: For each line the lines that no later one reads: their memory is used again, which is still in the cache.
+        self._done: list[list[int]] = [[] for _ in self.lines]
+        seen = set(self.places)
+        for line in range(len(self.lines) - 1, -1, -1):
+            for each in self.lines[line][1]:
+                if each not in seen:
+                    seen.add(each)
+                    self._done[line].append(each)
 
     def __call__(self, state: Sequence[Any], numbers: Sequence[Any]) -> list[Any]:
         """The values, for these numbers of the state and of the parameters: arrays that broadcast, or symbols."""
@@ -58,6 +66,8 @@ class Operations:
                 made[line] = MEANING[name](*(made[each] for each in of), given)
             else:
                 made[line] = self._symbol(line, made, symbol)
+            for each in self._done[line]:
+                made[each] = None
         return [made[place] for place in self.places]
 
     def _symbol(self, line: int, made: list[Any], symbol: Any) -> Any:

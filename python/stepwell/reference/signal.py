@@ -51,7 +51,9 @@ class Held:
 
     def at(self, t: float) -> Array:
         """The value at time t."""
-        sample = self.sample(t)
+        from .series import at_start  # which importing the package does not need
+
+        sample = self.sample(at_start(t))
         return sample if self.factor is None else np.asarray(self.factor * sample)
 
     def sample(self, t: float) -> Array:

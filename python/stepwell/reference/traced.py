@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .._value import changed
-from . import adaptive, contact
+from . import adaptive, contact, series_pace
 from .around import surrounded
 from .run import linear_step
 from .signal import Constant, Held, Sine
@@ -113,8 +113,8 @@ class Tracer:
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
 
-    def attempt(self, method: Any) -> list[Any]:
-        """The state and the pace after an attempt at an adaptive step."""
+    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+        """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
         system = adaptive.Attempted(self.system.reference(1.0, **given), self._control())
@@ -122,8 +122,10 @@ class Tracer:
         pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
         axes = len(self.system.v_shape), len(self.system.y_shape)
         steps: Any = method.steps
-        assert method.error_order is not None
-        following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
+        if method.has_series:
+            following, v, y = series_pace.attempt(order or steps.ORDER, system, axes, pace, self.tape.budget(), v, y)
+        else:
+            following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following)
 
     def record(self, names: Sequence[str]) -> list[Any]:

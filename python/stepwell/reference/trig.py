@@ -1,4 +1,4 @@
-"""Sine, the same to the last bit as the core's: see ``functions.rs`` for its error. The core needs no cosine.
+"""Sine, the same to the last bit as the core's: see ``functions.rs`` for its error.
 
 Stability analysis steps the reference on numbers that the core never sees, and these have a sine here as well: complex ones whose
 imaginary part is infinitesimal, and ones that count what is done to them.
@@ -40,6 +40,8 @@ def sin(x: Array) -> Array:
 @differentiable("cos", general=False)
 def cos(x: Array) -> Array:
     """Cos x, which is the sine a quarter of a turn further."""
+    if np.iscomplexobj(x):
+        return cos(x.real) - 1j * (x.imag * sin(x.real))
     if bits.is_single(x):
         return _single(x, 0.5)
     y = (x * PER_HALF_TURN + 0.5) + MAGIC

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import NamedTuple
 
 from .. import _core
-from ..engine import Plan
+from ..engine import Plan, evaluations
 from ..errors import ShapeError
 from ..explanation.listing import written
 from ..integrate import fits_together
@@ -24,7 +24,7 @@ class Operations(NamedTuple):
         multiplications: products.
         divisions: quotients.
         square_roots: square roots.
-        rate_evaluations: evaluations of the rate of v.
+        rate_evaluations: evaluations of the rate of v; of a series, to how many its coefficients are equal by their operations.
         rate_evaluations_y: evaluations of the rate of y, which cost little where ẏ is v times a number.
     """
 
@@ -61,5 +61,6 @@ def operations(method: str | Method, system: System | None = None) -> Operations
         raise ShapeError(f"system: expected one member to count the operations of, got a batch of shape {system.batch}")
     counted = written(Plan(system, how, (), 1.0))
     kinds = Counter(name for name, _, _ in _core.program(how.name)[0])
+    of_v, of_y = [evaluations(how, system)] * 2 if how.has_series else [kinds["dv"], kinds["dy"]]
     arithmetic = {kind: counted[kind] for kind in Operations._fields[:4]}
-    return Operations(**arithmetic, rate_evaluations=kinds["dv"], rate_evaluations_y=kinds["dy"])
+    return Operations(**arithmetic, rate_evaluations=of_v, rate_evaluations_y=of_y)

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..reference.series import Series
+
 
 def exact(value: float | Fraction) -> Fraction:
     """The fraction that a float stands for: a simple one that rounds to it if there is one (1/6), else the float's own value."""
@@ -42,13 +44,13 @@ class Polynomial:
         return self.coefficients[power] if power < len(self.coefficients) else Fraction(0)
 
     def __add__(self, other: Any) -> Any:
-        if isinstance(other, np.ndarray):
+        if isinstance(other, (np.ndarray, Series)):
             return NotImplemented
         other = _polynomial(other)
         return Polynomial(*(self[k] + other[k] for k in range(max(len(self.coefficients), len(other.coefficients)))))
 
     def __mul__(self, other: Any) -> Any:
-        if isinstance(other, np.ndarray):
+        if isinstance(other, (np.ndarray, Series)):
             return NotImplemented
         other = _polynomial(other)
         product = [Fraction(0)] * max(0, len(self.coefficients) + len(other.coefficients) - 1)
@@ -58,7 +60,7 @@ class Polynomial:
         return Polynomial(*product)
 
     def __truediv__(self, other: Any) -> Any:
-        if isinstance(other, np.ndarray):
+        if isinstance(other, (np.ndarray, Series)):
             return NotImplemented
         return self * (1 / exact(other))
 
@@ -66,7 +68,7 @@ class Polynomial:
         return Polynomial(*(-c for c in self.coefficients))
 
     def __sub__(self, other: Any) -> Any:
-        return self + (-other)
+        return NotImplemented if isinstance(other, Series) else self + (-other)
 
     def __rsub__(self, other: Any) -> Any:
         return -self + other

@@ -176,10 +176,16 @@ class System(Fixed, Value, ABC):
             given |= self.given_around()
         return given
 
-    def parameters(self, batch: Shape, *, single: bool = False) -> Given:
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        return False
+
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
         """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes.
 
-        ``single`` is whether steps are computed in float32; the parameters are the same, operations among them are not.
+        A system of own equations tells more of them to a method that needs the ``series`` of a solution. ``single`` is whether
+        steps are computed in float32; the parameters are the same, operations among them are not.
         """
         return flat(self.all_given(batch), batch)
 
@@ -285,7 +291,7 @@ class System(Fixed, Value, ABC):
 
     def stepped_by(self, method: Method) -> Self:
         """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
-        between = method.needs_acceleration
+        between = method.needs_acceleration or method.has_series
         if getattr(self.control, "between", between) == between or self.control is None:
             return self
         return changed(self, control=changed(self.control, between=between))

@@ -95,8 +95,8 @@ class Oscillator(System):
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """Form, parameters, inputs."""
-        inputs = {"x": signal(self.x), "a": signal(self.a)}
-        return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag} | inputs
+        terms = {"omega": self.omega, "damping": self.damping, "drag": self.drag, "x": signal(self.x), "a": signal(self.a)}
+        return {"form": self.form, **terms}
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from .._checks import Array, Shape
 from .._value import changed, complete
 from ..control import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
+from ..equations.series import derivatives_of_functions
 from ..equations.trace import Equations
 from ..errors import ShapeError, TraceError, UnsupportedError
+from ..reference.marks import Marks, recording
 from ..reference.systems.equations import Equations as Reference
 from ..reference.traced import Tracer
 from .base import TINY, Given, System, aligned, flat, shown
@@ -23,7 +26,7 @@ from .inputs import Input, Sampled, Sinusoid
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_single", "_bounds", "_met")
+FOUND_LATER = ("_core", "_single", "_with_functions", "_bounds", "_met")
 #: Of how many shapes of states it is remembered what they are of.
 MOST_MET = 256
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
@@ -63,6 +66,8 @@ class OwnSystem(System):
         #: The operations of the function, and those in float32.
         self._core: Any = None
         self._single: Any = None
+        #: The same rates as ``_core``, and what series must know of the functions in them.
+        self._with_functions: tuple[Any, Any] | None = None
         #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
         self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
         self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
@@ -89,7 +94,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_single": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
@@ -173,6 +178,11 @@ class OwnSystem(System):
 
     def _trace(self) -> None:
         """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
+        self._core = self._rates()
+        complete(self, velocity_term="forces that do" if self._core.reads_v else None)
+
+    def _rates(self, marks: Marks | None = None) -> Any:
+        """The rates as operations; with marks also the derivatives of the functions among them."""
         equations, definition = self.equations, self.definition
         assert equations is not None
         plain = changed(self, control=None)  # a projection comes after the step, and is the core's
@@ -181,8 +191,9 @@ class OwnSystem(System):
         for _ in range(2):
             tracer = Tracer(plain, tape)
             v, y, _more = tracer.state()
-            s = tracer.scaled(tape.step())
-            dv, dy = s.rates(tape.time(), v, y)
+            with nullcontext() if marks is None else recording(marks):
+                s = tracer.scaled(tape.step())
+                dv, dy = s.rates(tape.time(), v, y)
             traced.append((tracer.flat(dv), tracer.flat(dy)))
         if [each.id for block in traced[0] for each in block] != [each.id for block in traced[1] for each in block]:
             raise TraceError(
@@ -196,10 +207,9 @@ class OwnSystem(System):
             value = equations.invariants[equations.kept].value(v, y, s.given)
             along_v, along_y, square = s.gradient(v, y)
             kept = (*tracer.flat(value), tracer.flat(along_v), tracer.flat(along_y), *tracer.flat(square))
-        self._core = tape.equations(
-            dv if equations.v_shape != (0,) else [], None if equations.second_order else dy, quantities, kept
-        )
-        complete(self, velocity_term="forces that do" if self._core.reads_v else None)
+        own_dv, own_dy = dv if equations.v_shape != (0,) else [], None if equations.second_order else dy
+        functions = [] if marks is None else derivatives_of_functions(tape, marks)
+        return tape.equations(own_dv, own_dy, quantities, kept, functions)
 
     def _known(self) -> OwnSystem:
         """The same system with known shapes of its blocks."""
@@ -220,12 +230,12 @@ class OwnSystem(System):
                 made[name] = value
         return made if self.push is None else made | self.push.given()
 
-    def parameters(self, batch: Shape, *, single: bool = False) -> Given:
-        """The operations of the function, and parameters by name, as the core takes them."""
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
+        """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
-        core = bound._in_single() if single else bound._core
+        rates = bound._in_single() if single else bound._series_rates() if series else bound._core
         given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
-        return [(RATES, core), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+        return [(RATES, rates), *flat(given | ({} if self.control is None else self.control.given()), batch)]
 
     def _in_single(self) -> Any:
         """The operations of the function in float32. Invariants are not among them."""
@@ -238,6 +248,17 @@ class OwnSystem(System):
             dv, dy = (tracer.flat(rate) for rate in tracer.scaled(tape.step()).rates(tape.time(), v, y))
             self._single = tape.equations(dv if equations.v_shape != (0,) else [], None if equations.second_order else dy)
         return self._single
+
+    @property
+    def chooses(self) -> bool:
+        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        return bool(self._retraced()._series_rates().chooses)
+
+    def _series_rates(self) -> Any:
+        """The rates as operations, with the derivatives of the functions among them."""
+        if self._with_functions is None or self._with_functions[0] is not self._core:
+            self._with_functions = self._core, self._rates({})
+        return self._with_functions[1]
 
     def _retraced(self) -> OwnSystem:
         """With its operations, which an unpickled copy lacks."""

@@ -1,4 +1,4 @@
-//! Functions of one number, the same to the last bit in Rust and in the reference: sine and natural logarithm.
+//! Functions of one number, the same to the last bit in Rust and in the reference: sine, cosine and natural logarithm.
 //!
 //! **Sine.** That of libm differs between machines. This one reduces by π in two parts (Cody and Waite) to [−π/2, π/2], where one odd
 //! polynomial suffices. Up to 10⁶ rad the error is within 1 ulp of 1; beyond, it stays below the effect of rounding the argument.
@@ -10,7 +10,7 @@
 
 #![allow(clippy::excessive_precision, reason = "the coefficients as fdlibm prints them")]
 
-use crate::number::Number;
+use crate::number::{Function, Number};
 
 /// 1/π
 const PER_HALF_TURN: f64 = std::f64::consts::FRAC_1_PI;
@@ -37,10 +37,26 @@ pub fn sin<N: Number>(x: N) -> N {
     if N::is_single() {
         return single_sin(x);
     }
-    let s = |i: usize| N::of(S[i]);
     let y = x * N::of(PER_HALF_TURN) + N::of(MAGIC);
     let n = y - N::of(MAGIC);
-    let r = (x - n * N::of(PI[0])) - n * N::of(PI[1]);
+    half_turn((x - n * N::of(PI[0])) - n * N::of(PI[1]), y).marked(Function::Sin, x)
+}
+
+/// cos x, which is the sine a quarter of a turn further. Series of sines need it.
+#[inline(always)]
+pub fn cos<N: Number>(x: N) -> N {
+    if N::is_single() {
+        return single_cos(x);
+    }
+    let y = (x * N::of(PER_HALF_TURN) + N::of(0.5)) + N::of(MAGIC);
+    let n = (y - N::of(MAGIC)) - N::of(0.5);
+    half_turn((x - n * N::of(PI[0])) - n * N::of(PI[1]), y).marked(Function::Cos, x)
+}
+
+/// sin r on [−π/2, π/2]; its sign turns if the integer in the low bits of y is odd: sin(r + nπ) = (−1)ⁿ·sin r.
+#[inline(always)]
+fn half_turn<N: Number>(r: N, y: N) -> N {
+    let s = |i: usize| N::of(S[i]);
     let z = r * r;
     let w = z * z;
     // Separate sums of odd and even powers have half the latency of one chain. The largest term is added last; otherwise the error
@@ -48,7 +64,17 @@ pub fn sin<N: Number>(x: N) -> N {
     let odd = s(1) + w * (s(3) + w * (s(5) + w * s(7)));
     let even = s(2) + w * (s(4) + w * s(6));
     let sine = r + (r * z) * (s(0) + z * (odd + z * even));
-    sine.xor_bits(y.shift_up(63)) // sin(r + nπ) = (−1)ⁿ·sin r
+    sine.xor_bits(y.shift_up(63))
+}
+
+/// exp x to eight digits, which is enough for the length of a step: 2ᵏ·exp(r), |r| ≤ ½·ln 2.
+#[inline(always)]
+pub fn rough_exp<N: Number>(x: N) -> N {
+    let magic = x * N::of(std::f64::consts::LOG2_E) + N::of(MAGIC);
+    let r = x - (magic - N::of(MAGIC)) * N::of(std::f64::consts::LN_2);
+    let one = N::of(1.0);
+    let value = (1..=7).rev().fold(one, |value, k| one + (r * N::of(1.0 / f64::from(k))) * value);
+    value * magic.shift_up(52).add_bits(1023 << 52)
 }
 
 /// ln 2 in two parts; the first has 33 bits, so that its product with k is exact.
@@ -84,7 +110,7 @@ pub fn log<N: Number>(x: N) -> N {
     let z = s * s;
     let r = z * (l(0) + z * (l(1) + z * (l(2) + z * (l(3) + z * (l(4) + z * (l(5) + z * l(6)))))));
     let half = N::of(0.5) * f * f;
-    k * N::of(LN2[0]) - ((half - (s * (half + r) + k * N::of(LN2[1]))) - f)
+    (k * N::of(LN2[0]) - ((half - (s * (half + r) + k * N::of(LN2[1]))) - f)).marked(Function::Log, x)
 }
 
 // ---- numbers of 32 bits: the same ways, with shorter polynomials
@@ -96,10 +122,21 @@ const SINGLE_PI: [f64; 3] = [3.1416015625, -8.909031748771667e-06, 1.21542012565
 /// As `S`; the error is 5e-9 at most.
 const SINGLE_S: [f64; 4] = [-0.16666656732559204, 0.008333008736371994, -0.00019806012278422713, 2.5987430944951484e-06];
 
+/// sin x
 fn single_sin<N: Number>(x: N) -> N {
-    let s = |i: usize| N::of(SINGLE_S[i]);
     let y = x * N::of(PER_HALF_TURN) + N::of(SINGLE_MAGIC);
-    let n = y - N::of(SINGLE_MAGIC);
+    single_half_turn(x, y, y - N::of(SINGLE_MAGIC))
+}
+
+/// cos x
+fn single_cos<N: Number>(x: N) -> N {
+    let y = (x * N::of(PER_HALF_TURN) + N::of(0.5)) + N::of(SINGLE_MAGIC);
+    single_half_turn(x, y, (y - N::of(SINGLE_MAGIC)) - N::of(0.5))
+}
+
+/// sin(x − nπ); its sign turns if the integer in the low bits of y is odd.
+fn single_half_turn<N: Number>(x: N, y: N, n: N) -> N {
+    let s = |i: usize| N::of(SINGLE_S[i]);
     let r = ((x - n * N::of(SINGLE_PI[0])) - n * N::of(SINGLE_PI[1])) - n * N::of(SINGLE_PI[2]);
     let z = r * r;
     let sine = r + (r * z) * (s(0) + z * (s(1) + z * (s(2) + z * s(3))));

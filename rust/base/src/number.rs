@@ -8,6 +8,17 @@ use std::{
     ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
 };
 
+/// A function of one number that is made of roundings and operations on bits, which have no derivative: a series must know its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Function {
+    /// sin x
+    Sin,
+    /// cos x
+    Cos,
+    /// ln x
+    Log,
+}
+
 /// A number, or a symbol for one.
 ///
 /// A step can use only these operations: no `if` on a number, no operation that two machines might round differently.
@@ -63,6 +74,19 @@ pub trait Number:
     /// Its bits, moved down.
     #[must_use]
     fn shift_down(self, places: u32) -> Self;
+
+    /// The same number; a symbol notes that it is this function of another.
+    #[must_use]
+    fn marked(self, _function: Function, _of: Self) -> Self {
+        self
+    }
+
+    /// The Taylor coefficients, from the first to the one of that order, of a solution that starts so and whose rates a function makes
+    /// of the start and of the time. The time is its value and its first coefficient. Only symbols have a record of how rates were made,
+    /// so of numbers there is no series.
+    fn series(_order: u32, _start: &[Self], _time: [Self; 2], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Vec<Vec<Self>>> {
+        None
+    }
 
     /// The larger of two; the second of a NaN.
     #[must_use]

@@ -48,6 +48,16 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A system whose series has too many operations.
+    #[error(
+        "method: the series of this system has about {operations} operations a step, and may have {most}; take dop853 for a large system"
+    )]
+    TooLongForSeries {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// A step that is too long for one tape, which numbers of 32 bits need.
     #[error("dtype: a step of about {operations} operations is too long; float32 goes with steps of up to {most}")]
     TooLongForSingle {

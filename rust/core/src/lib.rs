@@ -25,12 +25,15 @@ pub mod pace;
 pub mod program;
 pub mod real;
 pub mod run;
+pub mod series;
+pub mod series_pace;
 pub mod signal;
 pub mod spec;
 pub mod system;
 pub mod tableau;
 pub mod tape;
 pub mod trace;
+pub mod watch;
 
 /// The methods, one file each; `build.rs` lists the folder.
 #[allow(missing_docs, reason = "each file documents its method in the record")]

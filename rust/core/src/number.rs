@@ -7,10 +7,11 @@ use std::{
     ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
 };
 
-pub use stepwell_base::number::Number;
+pub use stepwell_base::number::{Function, Number};
 
 use crate::{
     real::Precision,
+    series,
     tape::{Id, Op, Tape},
 };
 
@@ -108,6 +109,16 @@ impl Not for SymbolTruth {
     }
 }
 
+/// What a function makes of the tape of this thread.
+pub(crate) fn on_tape<T>(f: impl FnOnce(&mut Tape) -> T) -> T {
+    TAPE.with_borrow_mut(f)
+}
+
+/// The operation of a value on the tape of this thread.
+pub(crate) fn operation(id: Id) -> Op {
+    TAPE.with_borrow(|tape| tape.op(id))
+}
+
 /// A constant of bits, as [`Precision::pattern`] has it.
 fn bits(bits: u64) -> Id {
     TAPE.with_borrow_mut(|tape| tape.bits_of(bits))
@@ -154,5 +165,17 @@ impl Number for Symbol {
     }
     fn shift_down(self, places: u32) -> Symbol {
         Symbol::new(Op::ShiftDown(self.0, places))
+    }
+    fn marked(self, function: Function, of: Symbol) -> Symbol {
+        series::mark(self, series::Mark::Of(function, of));
+        self
+    }
+    fn series(
+        order: u32,
+        start: &[Symbol],
+        time: [Symbol; 2],
+        rates: &mut dyn FnMut() -> Vec<Symbol>,
+    ) -> Option<Vec<Vec<Symbol>>> {
+        Some(series::of_solution(order, start, time, rates))
     }
 }

@@ -90,6 +90,20 @@ impl Pace<f64> {
         self.outlook(budget).runs
     }
 
+    /// The same of many members, from rows of their numbers: without moving what is not needed, for this is asked after every attempt.
+    pub fn find_running<'a>(row: impl Fn(usize) -> &'a [f64], budget: f64, runs: &mut [bool]) {
+        let places = Pace::of(std::array::from_fn(|i| i as f64));
+        let row = |place: f64| row(place as usize);
+        let (t, h, target, held) = (row(places.t), row(places.h), row(places.target), row(places.held));
+        let (extra, accepted, rejected) = (row(places.extra), row(places.accepted), row(places.rejected));
+        let times = t.iter().zip(h).zip(target);
+        let counts = held.iter().zip(extra).zip(accepted.iter().zip(rejected));
+        for (runs, (((t, h), target), ((held, extra), (accepted, rejected)))) in runs.iter_mut().zip(times.zip(counts)) {
+            let moves = (*t < *target) & (*t < *t + *h);
+            *runs = moves & (*accepted + *rejected < budget) & (*held <= 0.0) & (*extra <= 0.0);
+        }
+    }
+
     /// Whether the next output time is within the held step.
     pub fn holds(&self) -> bool {
         self.held > 0.0 && self.target < self.t + self.h
@@ -240,11 +254,20 @@ pub fn judge<N: Number>(pace: &Pace<N>, order: u32, old: [N; 2], made: &[N], out
     pace.decided(order > LOW, r2, new, outlook)
 }
 
+/// An error over what is tolerated. A block that is zero, as it has always been, tolerates no error and has none.
+pub(crate) fn share<N: Number>(error: N, tolerated: N) -> N {
+    let zero = N::of(0.0);
+    N::choose(error.at_most(zero), zero, error / tolerated)
+}
+
+/// The larger of two lengths.
+pub(crate) fn longer<N: Number>(a: N, b: N) -> N {
+    N::choose(a.below(b), b, a)
+}
+
 /// The square of the error over what is tolerated, from squares of lengths of one or two estimates of both blocks.
 fn over_tolerance<N: Number>(estimates: &[N], tolerated: [N; 2]) -> N {
     let zero = N::of(0.0);
-    // A block that is zero, as it has always been, tolerates no error and has none.
-    let share = |error: N, tolerated: N| N::choose(error.at_most(zero), zero, error / tolerated);
     let over = |estimate: &[N]| share(estimate[0], tolerated[0]) + share(estimate[1], tolerated[1]);
     let r2 = over(&estimates[..2]);
     if estimates.len() < 4 {
@@ -258,7 +281,6 @@ impl<N: Number> Pace<N> {
     /// Squares of the errors that are tolerated in both blocks, from squares of their lengths before and after a step.
     fn tolerated(&self, step: N, old: [N; 2], new: [N; 2]) -> [N; 2] {
         let zero = N::of(0.0);
-        let longer = |a: N, b: N| N::choose(a.below(b), b, a);
         // A block at zero so far on which a force sets in counts as long as that force would have made it in a part of the time since.
         let since = N::of(PUSHED) * ((self.t + step - self.begin) / step);
         let since2 = longer(N::of(1.0), since * since);

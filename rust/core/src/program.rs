@@ -78,6 +78,10 @@ pub enum Entry {
     Sub(Block, Block),
     /// c·a
     Scale(f64, Block),
+    /// The Taylor coefficient of that order of v, in powers of the share of the step, around the start of the step at a state.
+    SeriesV(u32, Block, Block),
+    /// Likewise of y.
+    SeriesY(u32, Block, Block),
 }
 
 impl Entry {
@@ -87,6 +91,7 @@ impl Entry {
             Entry::V | Entry::Y => vec![],
             Entry::Velocity(a) | Entry::Scale(_, a) => vec![a],
             Entry::Dv(_, a, b) | Entry::Dy(_, a, b) | Entry::Add(a, b) | Entry::Sub(a, b) => vec![a, b],
+            Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
         }
     }
 
@@ -100,6 +105,8 @@ impl Entry {
             Entry::Add(a, b) => Entry::Add(to(a), to(b)),
             Entry::Sub(a, b) => Entry::Sub(to(a), to(b)),
             Entry::Scale(c, a) => Entry::Scale(c, to(a)),
+            Entry::SeriesV(k, a, b) => Entry::SeriesV(k, to(a), to(b)),
+            Entry::SeriesY(k, a, b) => Entry::SeriesY(k, to(a), to(b)),
         }
     }
 
@@ -114,6 +121,8 @@ impl Entry {
             Entry::Add(a, b) => (5, 0, a.0, b.0),
             Entry::Sub(a, b) => (6, 0, a.0, b.0),
             Entry::Scale(c, a) => (7, c.to_bits(), a.0, 0),
+            Entry::SeriesV(k, a, b) => (8, u64::from(k), a.0, b.0),
+            Entry::SeriesY(k, a, b) => (9, u64::from(k), a.0, b.0),
         }
     }
 }
@@ -174,6 +183,12 @@ impl Rates {
         write(Entry::Dy(t, v, y))
     }
 
+    /// The Taylor coefficients of v and y around the start of the step, from the first to that order; the increment of the step is
+    /// their sum.
+    pub fn series(self, order: u32, v: Block, y: Block) -> Vec<(Block, Block)> {
+        (1..=order).map(|k| (write(Entry::SeriesV(k, v, y)), write(Entry::SeriesY(k, v, y)))).collect()
+    }
+
     /// The velocity whose increment of y is d, in a second-order system.
     pub fn velocity(self, d: Block) -> Block {
         write(Entry::Velocity(d))
@@ -221,9 +236,15 @@ impl Program {
         Program { entries, results: self.results.into_iter().map(|result| place[result.index()]).collect() }
     }
 
-    /// Number of evaluations of the rate of v.
+    /// Number of evaluations of the rate of v. Each order of a series counts as one.
     pub fn evaluations(&self) -> usize {
-        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..))).count()
+        self.entries.iter().filter(|entry| matches!(entry, Entry::Dv(..) | Entry::SeriesV(..))).count()
+    }
+
+    /// The highest order of a series; 0 without one.
+    pub fn series_order(&self) -> u32 {
+        let order = |entry: &Entry| if let Entry::SeriesV(k, ..) | Entry::SeriesY(k, ..) = entry { *k } else { 0 };
+        self.entries.iter().map(order).max().unwrap_or(0)
     }
 
     /// Times within a step at which the rates are evaluated, as fractions of the step, ascending.
@@ -235,6 +256,7 @@ impl Program {
             match entry {
                 Entry::Dv(t, ..) => nodes.push(t.0),
                 Entry::Dy(t, ..) if of_y => nodes.push(t.0),
+                Entry::SeriesV(..) | Entry::SeriesY(..) => nodes.push(0.0),
                 _ => {}
             }
         }
@@ -246,6 +268,7 @@ impl Program {
     /// Executes the program over vectors of numbers, and returns its results.
     pub fn run<N: Number>(&self, s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Vec<DVector<N>> {
         let mut blocks: Vec<DVector<N>> = Vec::with_capacity(self.entries.len());
+        let mut series: Option<Vec<(DVector<N>, DVector<N>)>> = None;
         for entry in &self.entries {
             let of = |block: Block| &blocks[block.0 as usize];
             let made = match *entry {
@@ -257,11 +280,34 @@ impl Program {
                 Entry::Add(a, b) => of(a).zip_map(of(b), |a, b| a + b),
                 Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
                 Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),
+                Entry::SeriesV(k, v, y) | Entry::SeriesY(k, v, y) => {
+                    let made = series.get_or_insert_with(|| coefficients(s, self.series_order(), [t, h], of(v), of(y)));
+                    let (v, y) = &made[k as usize - 1];
+                    if matches!(entry, Entry::SeriesV(..)) { v.clone() } else { y.clone() }
+                }
             };
             blocks.push(made);
         }
         self.results.iter().map(|block| blocks[block.0 as usize].clone()).collect()
     }
+}
+
+/// The Taylor coefficients of v and y around a state, from the first on; NaN of numbers, which have none.
+pub(crate) fn coefficients<N: Number>(
+    s: &dyn System<N>,
+    order: u32,
+    [t, h]: [N; 2],
+    v: &DVector<N>,
+    y: &DVector<N>,
+) -> Vec<(DVector<N>, DVector<N>)> {
+    let start: Vec<N> = v.iter().chain(y).copied().collect();
+    let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();
+    let Some(made) = N::series(order, &start, [t, h], &mut rates) else {
+        let unknown = N::of(f64::NAN);
+        return (1..=order).map(|_| (v.map(|_| unknown), y.map(|_| unknown))).collect();
+    };
+    let block = |numbers: &[N]| DVector::from_column_slice(numbers);
+    made.iter().map(|numbers| (block(&numbers[..v.len()]), block(&numbers[v.len()..]))).collect()
 }
 
 impl Block {

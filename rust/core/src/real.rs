@@ -27,7 +27,7 @@ impl Precision {
     pub fn bits_of(self, x: f64) -> u64 {
         match self {
             Precision::Double => x.to_bits(),
-            Precision::Single => (x as f32).to_bits().into(),
+            Precision::Single => rounded(x),
         }
     }
 
@@ -35,7 +35,7 @@ impl Precision {
     pub fn number(self, bits: u64) -> f64 {
         match self {
             Precision::Double => f64::from_bits(bits),
-            Precision::Single => f32::from_bits(bits as u32).into(),
+            Precision::Single => widened(bits),
         }
     }
 
@@ -73,6 +73,19 @@ impl Precision {
             Precision::Single => eval::apply_single(op, a as u32, b as u32, c as u32).into(),
         }
     }
+}
+
+// Not inlined, else the compiler converts before it asks for the precision: a constant of 64 bits beyond the range of 32 would then raise
+// the flag of an overflow, which NumPy reads after it has called symbols.
+
+#[inline(never)]
+fn rounded(x: f64) -> u64 {
+    (x as f32).to_bits().into()
+}
+
+#[inline(never)]
+fn widened(bits: u64) -> f64 {
+    f32::from_bits(bits as u32).into()
 }
 
 /// A number of one of them.

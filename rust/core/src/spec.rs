@@ -62,6 +62,8 @@ pub struct Given {
     pub tables: Vec<(String, bool)>,
     /// The rates of a user's own system, whose parameters and inputs these are.
     pub equations: Option<Arc<Equations>>,
+    /// Quantities whose changes of sign are noticed, each with its direction as its name.
+    pub watched: Option<Arc<Equations>>,
 }
 
 fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {

@@ -18,10 +18,12 @@ use crate::{
     program::Program,
     real::{Precision, Real},
     run::stage::Stage,
+    series_pace,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
     systems::linear::products,
     tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
+    watch,
 };
 
 /// The kind of step.
@@ -38,6 +40,8 @@ pub enum How {
     Attempts {
         /// The method's name.
         name: String,
+        /// The order of its series, if it is one; 0 for that of a step of fixed length.
+        order: u32,
     },
     /// The transition-matrix form (Appendix B): s ← P·s + Σ Q·u, with the inputs at these nodes, by the bits of each.
     Matrix {
@@ -63,8 +67,11 @@ pub struct Scene {
 
 /// The tapes of a scene.
 pub struct Tapes<T: Real = f64> {
-    /// One step, or one attempt, of the whole state.
+    /// One step, or one attempt, of the whole state. Attempts by a series return its coefficients behind the state.
     pub step: Stage<T>,
+    /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not where
+    /// operations are fused, for the attempt may fuse what made the coefficients.
+    pub by_terms: Option<Stage<T>>,
     /// Turns velocities into what the method carries.
     pub start: Option<Stage<T>>,
     /// Turns what the method carries into velocities.
@@ -76,6 +83,8 @@ pub struct Tapes<T: Real = f64> {
     pub record: Option<Stage<T>>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
+    /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
+    pub series_evaluations: usize,
 }
 
 /// The properties and tapes of a scene. Expensive ones are found on first use.
@@ -83,12 +92,14 @@ pub struct Traced {
     scene: Scene,
     /// How large the blocks are.
     pub shape: Shape,
-    /// Whether the system has a tally, a sum over the steps in a number of the state behind v and y.
-    pub tally: bool,
+    /// How many numbers of the state stand behind v and y: a sum over the steps, the tally, if the system has one; what is watched.
+    pub tally: usize,
     /// How many numbers are recorded.
     pub recorded: usize,
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
+    /// Whether steps are made by a series, which is one tape however long.
+    pub series: bool,
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
@@ -109,6 +120,8 @@ pub struct Steps {
     pub shape: Shape,
     /// Whether a tally stands behind them.
     pub tally: bool,
+    /// The coefficients of a series, of adaptive steps.
+    pub terms: Vec<Id>,
 }
 
 /// The leaves of a tape: parameters, sampled inputs, the step.
@@ -146,7 +159,7 @@ pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
             let (n, v) = (given.whole("n"), given.whole("n_v").min(given.whole("n")));
             Ok(Shape { v, y: n - v })
         }
-        How::Method { name, .. } | How::Attempts { name } => kind(given)?.fit(given, method(name)?),
+        How::Method { name, .. } | How::Attempts { name, .. } => kind(given)?.fit(given, method(name)?),
     }
 }
 
@@ -173,22 +186,34 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
     match how {
         How::Matrix { nodes } => {
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
-            Ok(Steps { tape, next, shape, tally: false })
+            Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
         }
         How::Method { name, choice } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
-            Ok(Steps { tape, next, shape, tally })
+            Ok(Steps { tape, next, shape, tally, terms: Vec::new() })
         }
-        How::Attempts { name } => {
+        How::Attempts { name, order } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
             if contact::is_given(given) {
                 return Err(given.unknown("contact_0"));
             }
-            let (tape, next) = record(tape, || attempts(kind, given, shape, &program, estimate.order));
-            Ok(Steps { tape, next, shape, tally: false })
+            let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
+                Some(order) => series_attempts(kind, given, shape, order),
+                None => (attempts(kind, given, shape, &program, estimate.order), Vec::new()),
+            });
+            Ok(Steps { tape, next, shape, tally: false, terms })
         }
+    }
+}
+
+/// The order of the series of attempts, if the method has one: the one that was asked for, or that of steps of fixed length.
+fn series_order(program: &Program, asked: u32) -> Option<u32> {
+    match program.series_order() {
+        0 => None,
+        own if asked == 0 => Some(own),
+        _ => Some(asked),
     }
 }
 
@@ -212,6 +237,8 @@ fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize
     let mut next = ids([&v, &y]);
     let tally = s.tally();
     next.extend(tally.map(|tally| tally.0));
+    let first = next.len();
+    next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
     (next, tally.is_some())
 }
 
@@ -229,12 +256,50 @@ fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: 
     let one = parameters(given, Symbol::of(1.0));
     let projected = if controls::pushes(given) { plain } else { controls::wrap(&one, plain, Symbol::of(0.0)) };
     let system = Attempted { rates: &rates, projected: projected.as_ref() };
-    let numbers: [Symbol; Pace::<f64>::NUMBERS] = std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32)));
     let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = attempt(program, &system, order, Pace::of(numbers), budget, &v, &y);
+    let (pace, v, y) = attempt(program, &system, order, pace(shape), budget, &v, &y);
     let mut next = ids([&v, &y]);
     next.extend(pace.numbers().map(|symbol| symbol.0));
     next
+}
+
+/// The pace as a part of the state, behind v and y.
+fn pace(shape: Shape) -> Pace<Symbol> {
+    Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32))))
+}
+
+/// Steps by a series of that order, and its coefficients.
+fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let system = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
+    let terms = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
+    let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
+    (attempt_by(kind, given, shape, &terms), numbers)
+}
+
+/// One attempt by coefficients of a series.
+fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
+    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+    let one = parameters(given, Symbol::of(1.0));
+    let projected = controls::wrap(&one, (kind.symbols)(&one), Symbol::of(0.0));
+    let budget = Symbol::new(Op::Param(BUDGET));
+    let (pace, v, y) = series_pace::attempt(terms, projected.as_ref(), pace(shape), budget, &v, &y);
+    let mut next = ids([&v, &y]);
+    next.extend(pace.numbers().map(|symbol| symbol.0));
+    next
+}
+
+/// Traces an attempt by coefficients that stand behind the state and the pace, where they stay.
+fn trace_by_terms(tape: Tape, given: &Given, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
+    let kind = kind(given)?;
+    Ok(record(tape, || {
+        let (state, first) = (shape.v + shape.y, shape.v + shape.y + Pace::<Symbol>::NUMBERS);
+        let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
+        let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let mut next = attempt_by(kind, given, shape, &terms);
+        next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
+        next
+    }))
 }
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
@@ -255,6 +320,11 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     made.into_iter().map(|symbol| symbol.0).collect()
 }
 
+/// A system with surfaces and the force from outside: what a method's start and finish see.
+pub(crate) fn around(kind: &Kind, p: &Parameters<Symbol>) -> Box<dyn System<Symbol>> {
+    controls::force::wrap(p, contact::wrap(p, (kind.symbols)(p)))
+}
+
 /// Traces a program that changes the block v alone.
 fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(given)?;
@@ -263,8 +333,7 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
-        let s = controls::force::wrap(&p, contact::wrap(&p, (kind.symbols)(&p)));
-        let mut made = program.run(s.as_ref(), t, h, &v, &y).into_iter();
+        let mut made = program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter();
         ids([&made.next().unwrap_or(v), &y])
     }))
 }
@@ -291,13 +360,13 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
     let unknown = || Error::Options { system: given.system.clone(), options: format!("trace {what} {which}") };
     let name = match how {
-        How::Method { name, .. } | How::Attempts { name } => name.as_str(),
+        How::Method { name, .. } | How::Attempts { name, .. } => name.as_str(),
         How::Matrix { .. } => "",
     };
     let choice = which.parse().unwrap_or(0);
     match what {
         "step" => trace_step(tape, given, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
-        "attempt" => trace_step(tape, given, &How::Attempts { name: name.to_owned() }).map(|steps| (steps.tape, steps.next)),
+        "attempt" if matches!(how, How::Attempts { .. }) => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
@@ -326,18 +395,35 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let products = n * (n + given.whole("inputs") * nodes.len());
             (2 * products, 2 * products)
         }
-        How::Method { name, .. } | How::Attempts { name } => {
+        How::Method { name, .. } | How::Attempts { name, .. } => {
             let rates = (kind(given)?.operations)(given);
             let method = method(name)?;
             let attempt = if matches!(how, How::Attempts { .. }) { method.attempt() } else { None };
             // Potentials take as long as forces, and are found at the end of a step, too, where a projection asks for them.
             let controls = if controls::is_given(given) { 2 } else { 1 };
             let contacts = contact::operations(given, shape);
-            let evaluations = attempt.unwrap_or_else(|| method.program()).evaluations();
+            let program = attempt.unwrap_or_else(|| method.program());
+            // The coefficient k of a product is a sum of k + 1 products.
+            let order = match how {
+                How::Attempts { order, .. } if *order > 0 && program.series_order() > 0 => *order as usize,
+                _ => program.series_order() as usize,
+            };
+            let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
             (controls * rates, controls * rates * evaluations + contacts)
         }
     })
 }
+
+/// Whether steps are made by a series of the solution.
+fn has_series(how: &How) -> Result<bool, Error> {
+    Ok(match how {
+        How::Method { name, .. } | How::Attempts { name, .. } => method(name)?.program().series_order() > 0,
+        How::Matrix { .. } => false,
+    })
+}
+
+/// The most operations, approximately, of a step by a series: it is one tape in any case, and takes some ten nanoseconds a byte to compile.
+const MAX_SERIES_OPERATIONS: usize = 100_000;
 
 impl Scene {
     /// What is known of it, or was found before.
@@ -346,17 +432,23 @@ impl Scene {
         Cache::find(CACHE.get_or_init(Mutex::default), self, || {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
-            if self.fused && operations.1 > MAX_TAPE_OPERATIONS {
+            let series = has_series(&self.how)?;
+            if series && operations.1 > MAX_SERIES_OPERATIONS {
+                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_SERIES_OPERATIONS });
+            }
+            if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             if self.precision == Precision::Single {
                 self.fits_single(operations.1)?;
             }
-            let (mut tally, mut carries) = (false, false);
+            let (mut tally, mut carries) = (0, false);
             if let How::Method { name, .. } = &self.how {
-                (tally, carries) = (controls::is_given(&self.given), method(name)?.carry.is_some());
+                watch::check(&self.given, shape)?;
+                tally = usize::from(controls::is_given(&self.given)) + watch::numbers(&self.given);
+                carries = method(name)?.carry.is_some();
             }
-            if let How::Attempts { name } = &self.how {
+            if let How::Attempts { name, .. } = &self.how {
                 controls::only_fixed(&self.given)?;
                 method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?;
             }
@@ -364,6 +456,7 @@ impl Scene {
                 shape,
                 tally,
                 carries,
+                series,
                 recorded: recorded(&self.given, &self.record)?,
                 operations,
                 tapes: OnceLock::new(),
@@ -371,7 +464,8 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            Ok((traced, operations.1.min(4 * MAX_TAPE_OPERATIONS)))
+            let most = if series { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            Ok((traced, operations.1.min(most)))
         })
     }
 }
@@ -466,6 +560,8 @@ impl Scene {
             (How::Attempts { .. }, _) => "adaptive steps",
             (How::Matrix { .. }, _) => "the matrix form",
             (_, Some(_)) => "sampled inputs",
+            _ if self.given.watched.is_some() => "events",
+            _ if has_series(&self.how)? => "the series of a solution",
             _ => return Ok(()),
         };
         Err(Error::NotSingle { of })
@@ -492,7 +588,13 @@ impl Scene {
             quantities = Some(cut(&self.given, &trace_record(new(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
-        let step = fused(steps.tape, steps.next);
+        let series_evaluations = steps.tape.series_evaluations();
+        let (mut next, mut by_terms) = (steps.next, None);
+        if !steps.terms.is_empty() && !self.fused {
+            by_terms = Some(cut(&self.given, &trace_by_terms(new(), &self.given, steps.shape, steps.terms.len())?));
+            next.extend(steps.terms);
+        }
+        let step = fused(steps.tape, next);
         let shown = finish.as_ref().map(|(tape, velocities): &(Tape, Vec<Id>)| {
             let (mut both, mut next) = step.clone();
             let place = both.take_over(tape);
@@ -501,7 +603,7 @@ impl Scene {
         });
         let [start, finish, shown] = [start, finish, shown].map(|made| made.map(|made| cut(&self.given, &made)));
         let step = cut(&self.given, &step);
-        Ok(Tapes { step, start, finish, shown, record: quantities, written })
+        Ok(Tapes { step, by_terms, start, finish, shown, record: quantities, written, series_evaluations })
     }
 }
 

@@ -58,6 +58,7 @@ fn asked() -> Vec<(&'static str, usize, Vec<f64>)> {
         ("semi_false_heun", 2, vec![0.0, 1.0]),
         ("standard_euler", 1, vec![0.0]),
         ("standard_heun", 2, vec![0.0, 1.0]),
+        ("taylor", 8, vec![0.0]),
         ("verlet", 1, vec![0.0]),
     ]
 }
@@ -107,6 +108,7 @@ fn given(system: &str, words: &[(&str, &str)], wholes: &[(&str, usize)], rows: &
         rows: rows.iter().map(|(name, count)| (name.to_string(), vec![true; *count])).collect(),
         tables: tables.iter().map(|name| (name.to_string(), true)).collect(),
         equations: None,
+        watched: None,
     }
 }
 
@@ -314,7 +316,7 @@ fn a_tape_makes_what_the_step_makes() {
     for given in systems() {
         let kind = system::kind(&given.system).unwrap();
         let parameters = numbers(given.parameters(), 1);
-        for method in RECORDS {
+        for method in RECORDS.iter().filter(|method| method.program().series_order() == 0) {
             let shape = match kind.fit(&given, method) {
                 Ok(shape) => shape,
                 Err(Error::VelocityDependent { .. }) => continue,

@@ -5,8 +5,8 @@ mod tape;
 mod world;
 
 use numpy::{
-    Element, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2, PyReadwriteArrayDyn,
-    ndarray::Dimension,
+    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
+    PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
@@ -52,6 +52,21 @@ fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
 #[pyfunction]
 fn catalogue(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     steppers::RECORDS.iter().map(|r| describe(py, r)).collect()
+}
+
+/// Whether something is an array of floats that can be used as it is: contiguous, aligned, and finite or above zero where that is
+/// asked. What is wrong with any other is for others to say; this is asked of every array of every call.
+#[pyfunction]
+fn sound(value: &Bound<'_, PyAny>, finite: bool, positive: bool) -> bool {
+    let Ok(array) = value.cast::<PyArrayDyn<f64>>() else { return false };
+    let Ok(array) = array.try_readonly() else { return false };
+    if !array.data().is_aligned() {
+        return false;
+    }
+    let Ok(numbers) = array.as_slice() else { return false };
+    // Over all numbers, without an early end: so the loop is over vectors.
+    let finite = !finite || numbers.iter().fold(true, |all, x| all & x.is_finite());
+    finite && (!positive || numbers.iter().fold(true, |all, x| all & (*x > 0.0)))
 }
 
 /// The names of all systems that the core has.
@@ -303,6 +318,8 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
             Entry::Add(..) => ("add", 0.0),
             Entry::Sub(..) => ("subtract", 0.0),
             Entry::Scale(by, _) => ("scale", by),
+            Entry::SeriesV(order, ..) => ("series of v", f64::from(order)),
+            Entry::SeriesY(order, ..) => ("series of y", f64::from(order)),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)
     };
@@ -314,6 +331,16 @@ fn program(method: &str, attempts: bool) -> PyResult<(Vec<BlockOperation>, Vec<u
 fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
+}
+
+/// To how many function evaluations a step with a series is equal: see `_core.pyi`.
+#[pyfunction]
+#[pyo3(signature = (model, *, attempts=false))]
+fn series_evaluations(py: Python<'_>, model: &ModelSpec, attempts: bool) -> PyResult<usize> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let how = if attempts { model.attempts() } else { model.started(0) };
+    let tapes = model.model(how, &rows, &tables)?.traced().and_then(|traced| traced.tapes()).map_err(core_error)?;
+    Ok(tapes.series_evaluations)
 }
 
 /// The tape and machine code of a step, made anew for so many members: see `_core.pyi`.
@@ -354,6 +381,18 @@ fn compiled<'py>(
     d.set_item("lanes", made.lanes)?;
     d.set_item("bytes", made.bytes)?;
     d.set_item("spills", made.spills)?;
+    let packing = made.packing.map(|(is_packed, verdict)| {
+        let d = PyDict::new(py);
+        d.set_item("used", is_packed)?;
+        d.set_item("cycles", verdict.packed)?;
+        d.set_item("single_cycles", verdict.single)?;
+        d.set_item("chain_cycles", verdict.chain)?;
+        d.set_item("operations", verdict.operations)?;
+        d.set_item("vectors", verdict.vectors)?;
+        d.set_item("moves", verdict.moves)?;
+        PyResult::Ok(d)
+    });
+    d.set_item("packing", packing.transpose()?)?;
     d.set_item("trace", made.trace.as_secs_f64())?;
     d.set_item("compile", made.compile.as_secs_f64())?;
     Ok(Some(d))
@@ -379,6 +418,7 @@ fn in_parts(
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_function(wrap_pyfunction!(catalogue, m)?)?;
+    m.add_function(wrap_pyfunction!(sound, m)?)?;
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
@@ -389,6 +429,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
+    m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
     m.add_class::<ModelSpec>()?;
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;

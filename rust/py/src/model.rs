@@ -17,6 +17,9 @@ use stepwell_core::{
     trace::{How, Scene},
 };
 
+/// The name of quantities whose changes of sign are noticed.
+const WATCHED: &str = "watched()";
+
 /// A message as an argument error of the package.
 pub fn argument_error(message: String) -> PyErr {
     error_of("ArgumentError", message)
@@ -33,7 +36,12 @@ pub fn error_of(name: &str, message: String) -> PyErr {
 
 /// The core's words as a Python error; Python has checked nearly everything before.
 pub fn core_error(error: Error) -> PyErr {
-    error_of(if matches!(error, Error::Memory { .. }) { "TooLargeError" } else { "ArgumentError" }, error.to_string())
+    let name = match error {
+        Error::Memory { .. } => "TooLargeError",
+        Error::TooLongForSeries { .. } => "UnsupportedError",
+        _ => "ArgumentError",
+    };
+    error_of(name, error.to_string())
 }
 
 /// That of 32 bits, or that of 64.
@@ -51,6 +59,12 @@ impl Equations {
     #[getter]
     fn reads_v(&self) -> bool {
         self.0.reads_v()
+    }
+
+    /// Whether the rates are made of pieces, one of which is chosen by the state or the time.
+    #[getter]
+    fn chooses(&self) -> bool {
+        self.0.chooses()
     }
 }
 
@@ -96,6 +110,7 @@ pub struct ModelSpec {
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
     record: Vec<String>,
     fused: bool,
+    order: u32,
     pub precision: Precision,
 }
 
@@ -123,9 +138,10 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 #[pymethods]
 impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
-    /// in its v slot, if it is asked for; `single` is whether steps are computed with numbers of 32 bits.
+    /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether steps are computed with
+    /// numbers of 32 bits.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, single=false))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false))]
     #[allow(clippy::too_many_arguments, reason = "Python gives them by name")]
     fn new(
         py: Python<'_>,
@@ -135,6 +151,7 @@ impl ModelSpec {
         matrix: Option<(Vec<f64>, usize)>,
         record: Vec<String>,
         fused: bool,
+        order: u32,
         single: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
@@ -150,6 +167,7 @@ impl ModelSpec {
                     names.rows.push((name.clone(), vec![members == 1 && name != force::NAME; count]));
                     rows.push(array);
                 }
+                Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).readonly().as_array().ncols() == 1;
@@ -162,7 +180,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record, fused, precision: precision(single) }
+        ModelSpec { given: names, how, rows, tables, record, fused, order, precision: precision(single) }
     }
 }
 
@@ -188,7 +206,7 @@ impl ModelSpec {
     /// Adaptive steps.
     pub fn attempts(&self) -> How {
         match &self.how {
-            How::Method { name, .. } => How::Attempts { name: name.clone() },
+            How::Method { name, .. } => How::Attempts { name: name.clone(), order: self.order },
             other => other.clone(),
         }
     }

@@ -53,6 +53,9 @@ pub struct Symbol {
 /// An invariant: its value, its derivatives by v and by y, and the square of their length.
 type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Symbol>>, PyRef<'py, Symbol>);
 
+/// A value that is a function of others: with each of these its derivative by it.
+type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>);
+
 /// A symbol, or a number that becomes one.
 enum Value<'py> {
     Symbol(PyRef<'py, Symbol>),
@@ -263,10 +266,20 @@ impl Tape {
         Ok(self.leaf(Op::Sample(table, t)))
     }
 
+    /// The value that the operation of that number makes.
+    fn value(&self, id: Id) -> PyResult<Symbol> {
+        let there = (id as usize) < lock(&self.0).ops().len();
+        if !there {
+            return Err(PyIndexError::new_err("there is no such operation on the tape"));
+        }
+        Ok(Symbol { tape: Arc::clone(&self.0), id })
+    }
+
     /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, or of a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
-        let traced = trace::trace(before.clone(), &model.given, &model.how, what);
+        let how = if what == "attempt" { model.attempts() } else { model.how.clone() };
+        let traced = trace::trace(before.clone(), &model.given, &how, what);
         let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
         *lock(&self.0) = tape;
         Ok(next.into_iter().map(|id| Symbol { tape: Arc::clone(&self.0), id }).collect())
@@ -299,13 +312,15 @@ impl Tape {
 
     /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the invariant that
     /// a projection keeps its value, its derivatives by v and by y, and the square of their length.
-    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None))]
+    /// `functions` are values with, for each that they depend on, the derivative by it.
+    #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new()))]
     fn equations(
         &self,
         dv: Vec<PyRef<'_, Symbol>>,
         dy: Option<Vec<PyRef<'_, Symbol>>>,
         quantities: Vec<(String, PyRef<'_, Symbol>)>,
         kept: Option<Kept<'_>>,
+        functions: Vec<Function<'_>>,
     ) -> PyResult<Equations> {
         let tape = lock(&self.0);
         let known = |symbol: &PyRef<'_, Symbol>| -> PyResult<Id> {
@@ -321,6 +336,11 @@ impl Tape {
             Ok(Invariant { value: known(&value)?, along_v: all(&along_v)?, along_y: all(&along_y)?, square: known(&square)? })
         });
         let made = equations::Equations::new(tape.ops().to_vec(), dv, dy, quantities, kept.transpose()?);
+        let functions = functions.into_iter().map(|(value, by)| {
+            let by = by.iter().map(|(of, factor)| Ok((known(of)?, known(factor)?))).collect::<PyResult<Vec<_>>>()?;
+            Ok((known(&value)?, by))
+        });
+        let made = made.with_functions(functions.collect::<PyResult<Vec<_>>>()?);
         Ok(Equations(Arc::new(made.without_the_rest())))
     }
 

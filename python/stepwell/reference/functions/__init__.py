@@ -2,7 +2,7 @@
 
 Each takes numbers, arrays of float64, symbols of a tape, and arrays of symbols, mixed, and broadcasts as NumPy does. What it
 makes of a symbol is a straight line of additions, multiplications, divisions, square roots, comparisons and operations on bits,
-which are exact or correctly rounded everywhere. ``docs/functions.md`` says how accurate each is and what it costs.
+which are exact or correctly rounded everywhere. ``docs/theory/functions.md`` says how accurate each is and what it costs.
 """
 
 from .comparisons import equal, greater, greater_equal, less, less_equal, not_equal

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..._checks import numbers
 from ...errors import ShapeError
+from .. import series
 from ..marks import mark
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -78,6 +79,8 @@ def elementary(f: F) -> F:
     def of_anything(*given: Any, **named: Any) -> Any:
         if named or len(given) != len(names):
             given = signature.bind(*given, **named).args
+        if series.among(given):
+            return series.function(NAMES.get(f.__name__, f.__name__), of_anything, of_anything, given)
         given = tuple(map(as_array, names, given))
         shape = shape_of(names, given)
         if one_by_one(given):

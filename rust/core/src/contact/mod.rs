@@ -2,7 +2,7 @@
 //!
 //! The rows of the blocks are points. A surface of the way `spring` adds a force to the rates; the others act after the step, on the state
 //! that the method made, knowing the one before. What is computed, and why no energy is added, is in `reference/contact.py` and
-//! docs/contact.md.
+//! docs/howto/contact.md.
 //!
 //! Given: the list `fixed` (maybe), points that no surface acts on; the whole number `contacts`; for surface i, with `contact_i` before each name, a word, `plane` or `sphere`, the word `_way`, and
 //! `_restitution`, `_friction` (maybe), `_omega` (of a spring); of a plane the vector `_normal` and `_offset`; of a sphere the word

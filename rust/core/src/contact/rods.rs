@@ -1,6 +1,6 @@
 //! Contact of points that are joined by rods: impulses of surfaces and pulls of rods are found together.
 //!
-//! What is computed, and why, is in `reference/rod_contact.py` and docs/contact.md.
+//! What is computed, and why, is in `reference/rod_contact.py` and docs/howto/contact.md.
 
 use super::{
     joined::{Column, Joined, add},

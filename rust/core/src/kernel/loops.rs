@@ -1,7 +1,7 @@
 //! The whole function: what is kept in registers, and the loops over steps and blocks around one step.
 
 use super::{
-    machine::{Base, Counter, Machine},
+    machine::{Base, Counter, Machine, Place},
     plan::{Plan, Source},
     registers::{Registers, Uses},
     shape::Shape,
@@ -21,6 +21,9 @@ pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape) -> Opt
     writer.code.leave();
     Some((writer.code.take_bytes(), writer.slots as usize))
 }
+
+/// The register through which numbers are copied before the first step and after the last: no value is in any then.
+const FREE_BETWEEN_STEPS: u8 = 0;
 
 /// What stays in a register for the whole of the inner loop.
 #[derive(Debug, Default)]
@@ -56,6 +59,7 @@ impl<'a, M: Machine> Writer<'a, M> {
         Writer {
             plan,
             shape,
+            width: shape.width,
             order,
             code,
             registers: Registers::new(shape.registers() as u8, values),
@@ -169,6 +173,7 @@ impl<'a, M: Machine> Writer<'a, M> {
     fn steps_inside(&mut self, pinned: &Pinned) -> Option<()> {
         let next_block = self.blocks();
         self.code.rewind();
+        self.bring();
         for &(s, vector, register) in &pinned.state {
             if let Some(old) = self.plan.old[s as usize] {
                 let value = self.value(old, vector);
@@ -187,9 +192,36 @@ impl<'a, M: Machine> Writer<'a, M> {
                 self.store(s, value, register);
             }
         }
+        self.take_back();
         self.move_on(1);
         self.end_of_blocks(next_block);
         Some(())
+    }
+
+    /// Numbers of one member that are lanes of vectors: each to its lane, before the first step.
+    fn bring(&mut self) {
+        let Some(packing) = &self.plan.packing else { return };
+        self.code.of_width(1);
+        for (from, to) in &packing.brought {
+            let from = match *from {
+                Source::State(s) => Place::new(Base::State, 8 * s as i32),
+                Source::Row(i) => Place::new(Base::Rows, 8 * i as i32),
+                Source::Pool(i) => Place::new(Base::Pool, (8 * self.shape.pool_copies()) as i32 * i as i32),
+                _ => continue,
+            };
+            self.code.load(FREE_BETWEEN_STEPS, from);
+            self.code.store(FREE_BETWEEN_STEPS, Place::new(Base::Scratch, 8 * *to as i32));
+        }
+    }
+
+    /// The same back to the rows of the state, after the last step.
+    fn take_back(&mut self) {
+        let Some(packing) = &self.plan.packing else { return };
+        self.code.of_width(1);
+        for (from, s) in &packing.returned {
+            self.code.load(FREE_BETWEEN_STEPS, Place::new(Base::Scratch, 8 * *from as i32));
+            self.code.store(FREE_BETWEEN_STEPS, Place::new(Base::State, 8 * *s as i32));
+        }
     }
 
     /// Step after step, each over all blocks: the state passes through registers.

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use super::{
+    pack::Move,
     plan::Step,
     shape::Shape,
     write::{Value, Writer},
@@ -60,6 +61,9 @@ pub trait Machine: Sized {
     /// The most operations of a kernel over all vectors of a block, so that its jumps reach.
     const MOST_OPERATIONS: usize;
 
+    /// Whether the numbers of one member may be lanes of vectors.
+    const PACKS: bool = false;
+
     /// Nothing written yet, room for about so many instructions.
     fn new(shape: Shape, instructions: usize) -> Self;
 
@@ -74,6 +78,14 @@ pub trait Machine: Sized {
 
     /// A comparison of the first two that chooses of the third and the fourth; None where that takes two instructions anyway.
     fn pick(&self, comparison: Op) -> Option<Self::Doing>;
+
+    /// What moves numbers of one member between lanes. Asked for only if it [packs](Machine::PACKS).
+    fn moving(&self, _to: Move) -> Self::Doing {
+        self.doing(Op::Copy(0))
+    }
+
+    /// What is written from here on is of vectors of so many numbers. Called only where numbers are moved between lanes.
+    fn of_width(&mut self, _width: usize) {}
 
     /// Writes an operation for one vector, and returns where its result is. None if there are too few registers.
     fn make(writer: &mut Writer<Self>, step: &Step<Self::Doing>, vector: usize, of: &[Value]) -> Option<u8>;

@@ -9,6 +9,7 @@ mod frame;
 pub mod interpret;
 mod loops;
 mod machine;
+pub mod pack;
 mod pages;
 mod plan;
 mod registers;
@@ -24,7 +25,7 @@ pub mod writer {
         choose::{choose, choose_long, choose_trail},
         frame::Frame,
         shape::Shape,
-        written::{Assembled, Written, allowed, assemble, write},
+        written::{Assembled, Written, allowed, assemble, write, write_if_it_gains, write_packed},
     };
 }
 
@@ -86,6 +87,11 @@ pub trait Kernel<T: Real = f64>: Send + Sync {
     /// The most values that are spilled at once because there are not enough registers.
     fn spills(&self) -> usize {
         0
+    }
+
+    /// Where the operations of one member are lanes of vectors: what that gains.
+    fn packing(&self) -> Option<pack::Verdict> {
+        None
     }
 }
 

@@ -43,6 +43,13 @@ pub struct Step<D> {
 }
 
 impl<D> Step<D> {
+    /// Of at most four operands.
+    pub fn new(doing: D, id: Id, operands: &[Id]) -> Step<D> {
+        let mut of = [0; 4];
+        of[..operands.len()].copy_from_slice(operands);
+        Step { doing, id, of, n: operands.len() as u8 }
+    }
+
     /// What it reads.
     pub fn of(&self) -> &[Id] {
         &self.of[..self.n as usize]
@@ -62,6 +69,22 @@ pub struct Plan<D> {
     /// The bits of the constants, the first numbers of the pool. The uniforms follow.
     pub constants: Vec<u64>,
     pub per_step: usize,
+    /// Where the numbers of one member are lanes of vectors: how.
+    pub packing: Option<Packing>,
+}
+
+/// How the numbers of one member are kept where they are lanes of vectors of their own widths. What stays over all steps and what the step
+/// replaces is in homes: the first places of the scratch, each as long as the longest vector. A source's number is then that of its home.
+#[derive(Debug, Default)]
+pub struct Packing {
+    /// Of each value how many numbers it has.
+    pub widths: Vec<u8>,
+    /// How many homes there are, of the state first.
+    pub homes: usize,
+    /// Before the first step: what is copied to which number of the homes.
+    pub brought: Vec<(Source, usize)>,
+    /// After the last step: which number of the homes is which of the state.
+    pub returned: Vec<(usize, u32)>,
 }
 
 impl<D: Copy> Plan<D> {
@@ -77,6 +100,7 @@ impl<D: Copy> Plan<D> {
             old: vec![None; body.next.len()],
             constants: Vec::new(),
             per_step: body.per_step,
+            packing: None,
         };
         plan.next = (0..body.next.len()).map(|s| (!body.keeps(s)).then_some(body.next[s])).collect();
         // A leaf that occurs twice is one value.
@@ -141,7 +165,7 @@ impl<D: Copy> Plan<D> {
     }
 
     /// A constant of the pool; until it is known how many there are, they are numbered behind the uniforms.
-    fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
+    pub fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
         let at = self.constants.iter().position(|known| *known == bits).unwrap_or_else(|| {
             self.constants.push(bits);
             self.constants.len() - 1
@@ -162,7 +186,7 @@ fn has_more_products(body: &Body) -> bool {
 }
 
 /// Whether it is what a [`Body`] says it is, and of operations that are known here.
-fn is_sound(body: &Body) -> bool {
+pub fn is_sound(body: &Body) -> bool {
     let is_known = |(id, op): (usize, &Op)| {
         let (operands, n) = op.operands();
         let is_in_range = match *op {
@@ -186,7 +210,7 @@ fn is_sound(body: &Body) -> bool {
 }
 
 /// Of each value whether all bits of a number are surely the same.
-fn masks(body: &Body) -> Vec<bool> {
+pub fn masks(body: &Body) -> Vec<bool> {
     let mut masks = Vec::with_capacity(body.ops.len());
     for op in &body.ops {
         let is = |id: Id| masks[id as usize];

@@ -15,6 +15,9 @@ use crate::{isa::Level, real::Real, tape::split::Body};
 /// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an operation
 /// takes about as long.
 const INTERPRETATIONS_PER_WRITE: u64 = 4000;
+/// After so many steps of a single member it is tried whether equal operations can be lanes of one vector: that takes about as long as
+/// these steps.
+const STEPS_PER_PACKING: u64 = 30_000;
 /// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
 const LANES_PER_DISPATCH: usize = 10;
 
@@ -36,6 +39,17 @@ fn interpreted_lanes(body: &Body, members: usize) -> usize {
     members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
 }
 
+/// What makes steps. What each wants of the numbers that are the same for all ([`Kernel::pool`]) is its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// The interpreter.
+    Interpreter,
+    /// Machine code, a member in each lane.
+    Lanes,
+    /// Machine code for one member, whose equal operations are lanes of one vector.
+    Packed,
+}
+
 /// A body, over tiles of one length.
 pub struct Runner<T: Real = f64> {
     body: Body,
@@ -44,8 +58,11 @@ pub struct Runner<T: Real = f64> {
     /// The shape of its machine code; none where there is no machine code.
     shape: Option<Shape>,
     written: OnceLock<Option<Box<dyn Kernel<T>>>>,
+    packed: OnceLock<Option<Box<dyn Kernel<T>>>>,
     /// The work interpreted so far, as [`INTERPRETATIONS_PER_WRITE`] counts it.
     done: AtomicU64,
+    /// The steps made by machine code before packing was tried.
+    steps: AtomicU64,
 }
 
 impl<T: Real> Runner<T> {
@@ -64,7 +81,20 @@ impl<T: Real> Runner<T> {
     /// With a shape that was chosen before; interpreted if there is none.
     pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner<T> {
         let interpreter = Interpreter::new(body, lanes, level.of_loops());
-        Runner { body: body.clone(), lanes, interpreter, shape, written: OnceLock::new(), done: AtomicU64::new(0) }
+        let packed = OnceLock::new();
+        if !shape.is_some_and(|shape: Shape| shape.packs()) {
+            let _ = packed.set(None);
+        }
+        Runner {
+            body: body.clone(),
+            lanes,
+            interpreter,
+            shape,
+            written: OnceLock::new(),
+            packed,
+            done: AtomicU64::new(0),
+            steps: AtomicU64::new(0),
+        }
     }
 
     /// How long rows are.
@@ -77,31 +107,54 @@ impl<T: Real> Runner<T> {
         self.shape.as_ref().map(Shape::layout)
     }
 
+    /// Whether its machine code may have the numbers of one member in the lanes of vectors.
+    pub fn packs(&self) -> bool {
+        self.shape.is_some_and(|shape| shape.packs())
+    }
+
     /// What it makes steps of.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
-    /// What makes so many more steps, and whether that is machine code.
-    pub fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, bool) {
+    /// What makes so many more steps.
+    pub fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, By) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {
-            return (written.as_ref(), true);
+            let packed = match self.packed.get() {
+                Some(packed) => packed.as_deref(),
+                None if self.steps.fetch_add(steps as u64, Relaxed) < STEPS_PER_PACKING => None,
+                None => self.pack(),
+            };
+            return packed.map_or((written.as_ref(), By::Lanes), |packed| (packed, By::Packed));
         }
         let coming = (steps * (self.lanes + LANES_PER_DISPATCH)) as u64;
         let pays = self.shape.is_some() && self.done.fetch_add(coming, Relaxed) + coming >= INTERPRETATIONS_PER_WRITE;
-        match pays.then(|| self.write()).flatten() {
-            Some(written) => (written, true),
-            None => (&self.interpreter, false),
+        match pays.then(|| self.write_lanes()).flatten() {
+            Some(written) => (written, By::Lanes),
+            None => (&self.interpreter, By::Interpreter),
         }
     }
 
-    /// The machine code, written now if it was not before; none where none can be.
+    /// The fastest machine code, written now if it was not before; none where none can be.
     pub fn write(&self) -> Option<&dyn Kernel<T>> {
+        let written = self.write_lanes()?;
+        Some(self.pack().unwrap_or(written))
+    }
+
+    fn write_lanes(&self) -> Option<&dyn Kernel<T>> {
         let write = || {
             let written = writer::write(&self.body, self.shape?)?;
             Some(Box::new(written) as Box<dyn Kernel<T>>)
         };
         self.written.get_or_init(write).as_deref()
+    }
+
+    fn pack(&self) -> Option<&dyn Kernel<T>> {
+        let write = || {
+            let written = writer::write_if_it_gains(&self.body, self.shape?)?;
+            Some(Box::new(written) as Box<dyn Kernel<T>>)
+        };
+        self.packed.get_or_init(write).as_deref()
     }
 }

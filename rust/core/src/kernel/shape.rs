@@ -35,6 +35,12 @@ impl Shape {
         Layout { width, block_vectors, blocks, resident, registers: self.registers() }
     }
 
+    /// Whether the numbers of one member may be lanes of vectors: there is one member, numbers have 64 bits, and the CPU has a writer for
+    /// it.
+    pub fn packs(&self) -> bool {
+        self.lanes() == 1 && self.bytes == 8 && self.resident && matches!(self.level, Level::Avx2 | Level::Avx512)
+    }
+
     /// How many vector registers there are.
     pub(super) fn registers(&self) -> usize {
         if self.level == Level::Avx2 { 16 } else { 32 }

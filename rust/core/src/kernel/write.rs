@@ -6,6 +6,7 @@
 
 use super::{
     machine::{Base, Machine, Place},
+    pack::MOST_LANES,
     plan::{Plan, Source, Step},
     registers::{NONE, Registers, Uses},
     shape::Shape,
@@ -31,6 +32,8 @@ pub type Value = u32;
 pub struct Writer<'a, M: Machine> {
     pub plan: &'a Plan<M::Doing>,
     pub shape: Shape,
+    /// Numbers in the vectors of the operation that is written.
+    pub width: usize,
     /// The operations, each for a vector, in the order in which they are made.
     pub order: Vec<(&'a Step<M::Doing>, usize)>,
     pub code: M,
@@ -65,6 +68,18 @@ impl<M: Machine> Writer<'_, M> {
         (self.shape.bytes * self.shape.width) as i32
     }
 
+    /// Writes code for vectors as long as a value is.
+    fn as_wide_as(&mut self, value: Value, write: impl FnOnce(&mut M)) {
+        match &self.plan.packing {
+            None => write(&mut self.code),
+            Some(packing) => {
+                self.code.of_width(packing.widths[value as usize] as usize);
+                write(&mut self.code);
+                self.code.of_width(self.width);
+            }
+        }
+    }
+
     fn in_row(&self, base: Base, row: u32, value: Value) -> Place {
         let vector = value as usize % self.shape.block_vectors;
         Place::new(base, (row as usize * self.shape.lanes() * self.shape.bytes) as i32 + vector as i32 * self.bytes())
@@ -72,6 +87,14 @@ impl<M: Machine> Writer<'_, M> {
 
     /// Where a value is in memory.
     pub fn place(&self, value: Value) -> Place {
+        if let Some(packing) = &self.plan.packing {
+            let home = |home: usize| Place::new(Base::Scratch, (8 * MOST_LANES * home) as i32);
+            match (self.memory[value as usize], self.source(value)) {
+                (Where::Slot(slot), _) => return home(packing.homes + slot as usize),
+                (Where::State(s), _) | (_, Source::State(s) | Source::Row(s)) => return home(s as usize),
+                _ => {}
+            }
+        }
         match (self.memory[value as usize], self.source(value)) {
             (Where::Slot(slot), _) => Place::new(Base::Scratch, slot as i32 * self.bytes()),
             (Where::State(s), _) | (_, Source::State(s) | Source::Kept(s)) => self.in_row(Base::State, s, value),
@@ -89,14 +112,17 @@ impl<M: Machine> Writer<'_, M> {
     /// Loads a value.
     pub fn load(&mut self, value: Value, register: u8) {
         let place = self.place(value);
-        self.code.load(register, place);
+        self.as_wide_as(value, |code| code.load(register, place));
         self.registers.put(value, register);
     }
 
     /// Stores to the row of a number of the state.
     pub fn store(&mut self, s: u32, value: Value, register: u8) {
-        let row = self.in_row(Base::State, s, value);
-        self.code.store(register, row);
+        let row = match self.plan.packing {
+            None => self.in_row(Base::State, s, value),
+            Some(_) => Place::new(Base::Scratch, 8 * (MOST_LANES as u32 * s) as i32),
+        };
+        self.as_wide_as(value, |code| code.store(register, row));
     }
 
     /// The cost of keeping a value in its register: how many operations until it is needed, twice as many if memory holds it too.
@@ -120,7 +146,7 @@ impl<M: Machine> Writer<'_, M> {
             });
             self.memory[victim as usize] = Where::Slot(slot);
             let place = self.place(victim);
-            self.code.store(register, place);
+            self.as_wide_as(victim, |code| code.store(register, place));
         }
         self.registers.release(victim);
         Some(register)
@@ -201,6 +227,10 @@ impl<M: Machine> Writer<'_, M> {
             *value = self.value(*id, vector);
         }
         let of = &of[..step.of().len()];
+        if let Some(packing) = &self.plan.packing {
+            self.width = packing.widths[step.id as usize] as usize;
+            self.code.of_width(self.width);
+        }
         for value in of {
             if let Some(register) = self.registers.of(*value) {
                 self.registers.lock(register);
@@ -255,7 +285,7 @@ impl<M: Machine> Writer<'_, M> {
             (Some(home), None) => self.load(value, home),
             (Some(home), Some(register)) => {
                 if home != register {
-                    self.code.copy(home, register);
+                    self.as_wide_as(value, |code| code.copy(home, register));
                 }
                 self.registers.put(value, home);
             }

@@ -1,6 +1,16 @@
 //! From a body to machine code, for any CPU, and to a kernel, for this one.
 
-use super::{Kernel, Tile, aarch64, frame::Frame, loops, machine::Machine, pages::Pages, plan::Plan, shape::Shape, x86};
+use super::{
+    Kernel, Tile, aarch64,
+    frame::Frame,
+    loops,
+    machine::Machine,
+    pack::{self, MOST_LANES, Packed, Verdict},
+    pages::Pages,
+    plan::{Plan, is_sound},
+    shape::Shape,
+    x86,
+};
 use crate::{isa::Level, real::Real, tape::split::Body};
 
 /// Machine code for a CPU that this machine may not have.
@@ -14,6 +24,8 @@ pub struct Assembled {
     pub shape: Shape,
     /// The most values that are spilled at once.
     pub spills: usize,
+    /// Where the operations of one member are lanes of vectors: what that gains.
+    pub packing: Option<Verdict>,
     /// The bits of each.
     constants: Vec<u64>,
 }
@@ -37,19 +49,27 @@ pub fn assemble(body: &Body, shape: Shape) -> Option<Assembled> {
 }
 
 fn assemble_for<M: Machine>(body: &Body, shape: Shape) -> Option<Assembled> {
+    assemble_plan::<M>(body, None, shape)
+}
+
+fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape) -> Option<Assembled> {
     if !shape.is_possible(body, M::MOST_OPERATIONS) {
         return None;
     }
     let machine = M::new(shape, body.ops.len() * shape.block_vectors);
-    let plan = Plan::new(body, &machine)?;
+    let plan = match packed {
+        None => Plan::new(body, &machine)?,
+        Some(packed) => Plan::packed(body, packed, &machine)?,
+    };
     let (code, spills) = loops::function(&plan, machine, shape)?;
+    let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));
     let frame = Frame {
         pool: (plan.constants.len() + body.uniforms) * shape.pool_copies(),
-        scratch: (spills * shape.width).next_multiple_of(64 / shape.bytes),
+        scratch: ((homes + spills) * slot).next_multiple_of(64 / shape.bytes),
         aligned_pool: shape.pool_copies() > 1,
         ..Frame::new(body, shape.lanes())
     };
-    Some(Assembled { code, frame, shape, spills, constants: plan.constants })
+    Some(Assembled { code, frame, shape, spills, packing: None, constants: plan.constants })
 }
 
 /// A kernel as machine code of this machine.
@@ -64,7 +84,31 @@ pub fn write(body: &Body, shape: Shape) -> Option<Written> {
     if !shape.level.here() {
         return None;
     }
-    let assembled = assemble(body, shape)?;
+    execute(assemble(body, shape)?)
+}
+
+/// Writes a kernel for a single member, whose equal operations are lanes of one vector, if that gains. None as above, or if it does not.
+pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
+    if !shape.packs() || !is_sound(body) {
+        return None;
+    }
+    let (verdict, packed) = pack::best(body)?;
+    let packed = packed.filter(|_| verdict.gains())?;
+    let written = write_packed(body, shape.level, &packed)?;
+    Some(Written { assembled: Assembled { packing: Some(verdict), ..written.assembled }, ..written })
+}
+
+/// Writes a kernel for a single member, whose numbers are lanes of these vectors. None as above, or if they are no such vectors.
+pub fn write_packed(body: &Body, level: Level, packed: &Packed) -> Option<Written> {
+    let shape =
+        Shape { level, bytes: body.precision.bytes(), width: 1, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
+    if !level.here() || !shape.packs() || !is_sound(body) || !packed.is_sound(body) {
+        return None;
+    }
+    execute(assemble_plan::<x86::encode::Code>(body, Some(packed), shape)?)
+}
+
+fn execute(assembled: Assembled) -> Option<Written> {
     let pages = Pages::new(&assembled.code, assembled.frame.clone())?;
     Some(Written { pages, assembled: Assembled { code: Vec::new(), ..assembled } })
 }
@@ -110,5 +154,9 @@ impl<T: Real> Kernel<T> for Written {
 
     fn spills(&self) -> usize {
         self.assembled.spills
+    }
+
+    fn packing(&self) -> Option<Verdict> {
+        self.assembled.packing
     }
 }

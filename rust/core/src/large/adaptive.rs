@@ -42,7 +42,7 @@ impl LargeAdaptive {
         level: Level,
         budget: f64,
     ) -> Result<LargeAdaptive, Error> {
-        let How::Attempts { name } = &traced.scene().how else { return Err(Error::NoEstimate) };
+        let How::Attempts { name, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
         let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
         let blocks = Blocks::new(courses, rates, traced.shape);
         let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);

@@ -152,6 +152,9 @@ impl Plan {
                 Entry::Add(a, b) => (Node::Add(of(a), of(b)), made[a.index()].1),
                 Entry::Sub(a, b) => (Node::Sub(of(a), of(b)), made[a.index()].1),
                 Entry::Scale(c, a) => (Node::Scale(c, of(a)), made[a.index()].1),
+                // Steps with a series are refused where they are too long for one tape (`trace.rs`), so this is never executed.
+                Entry::SeriesV(_, v, y) => (Node::Ask(Rate::Dv, Time::START, of(v), of(y)), true),
+                Entry::SeriesY(_, v, y) => (Node::Ask(Rate::Dy, Time::START, of(v), of(y)), false),
             };
             let mut push = |node| {
                 nodes.push(node);

@@ -38,7 +38,7 @@ impl Courses {
     pub fn new(how: &How, facts: Facts, shape: Shape) -> Result<Courses, Error> {
         let (name, choice) = match how {
             How::Method { name, choice } => (name.as_str(), Some(*choice)),
-            How::Attempts { name } => (name.as_str(), None),
+            How::Attempts { name, .. } => (name.as_str(), None),
             How::Matrix { .. } => ("", None), // it has no method, which the next line says
         };
         let method = method(name)?;

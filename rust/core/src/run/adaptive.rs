@@ -38,6 +38,19 @@ pub trait AdaptiveBatch: Send {
     /// So many attempts of every lane that runs.
     fn attempt(&mut self, attempts: usize);
 
+    /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_by_terms`] needs no others.
+    fn has_terms(&self) -> bool {
+        false
+    }
+
+    /// Writes whether each lane has a step of the run to try.
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        runs.iter_mut().enumerate().for_each(|(lane, runs)| *runs = self.pace(lane).runs(budget));
+    }
+
+    /// One attempt of one lane, at the start of a step whose coefficients are known.
+    fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+
     /// Sets the flag at which an attempt that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}
 }
@@ -48,8 +61,18 @@ pub struct AdaptiveLanes {
     /// Numbers of v and y.
     numbers: usize,
     step: PreparedStage,
-    /// Rows of v, of y and of the paces.
+    /// Rows of v, of y, of the paces and, of a series, of its coefficients.
     state: Aligned,
+    by_terms: Option<ByTerms>,
+}
+
+/// What makes an attempt of one lane by coefficients that are known.
+struct ByTerms {
+    step: PreparedStage,
+    /// The member whose parameters it has.
+    member: Option<usize>,
+    /// The numbers of the lane.
+    numbers: Aligned,
 }
 
 /// Every lane has its own time, so no step has one.
@@ -61,8 +84,14 @@ impl AdaptiveLanes {
         let tapes = traced.tapes()?;
         let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
         let numbers = traced.shape.v + traced.shape.y;
-        let state = Aligned::new((numbers + Pace::<f64>::NUMBERS) * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, tapes })
+        let all = tapes.step.split.body.next.len();
+        let by_terms = tapes.by_terms.as_ref().map(|stage| ByTerms {
+            step: PreparedStage::new(stage, spec, level, 1, &NO_CLOCK, budget),
+            member: None,
+            numbers: Aligned::new(all),
+        });
+        let state = Aligned::new(all * step.lanes());
+        Ok(AdaptiveLanes { state, step, numbers, by_terms, tapes })
     }
 }
 
@@ -101,5 +130,31 @@ impl AdaptiveBatch for AdaptiveLanes {
 
     fn attempt(&mut self, attempts: usize) {
         self.step.advance(&self.tapes.step, &NO_CLOCK, 0, attempts, &mut self.state);
+    }
+
+    fn has_terms(&self) -> bool {
+        self.by_terms.is_some()
+    }
+
+    fn find_running(&self, budget: f64, runs: &mut [bool]) {
+        let lanes = self.step.lanes();
+        Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
+    }
+
+    fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
+        let (Some(stage), Some(by_terms)) = (&self.tapes.by_terms, &mut self.by_terms) else { return };
+        let ByTerms { step, member: known, numbers } = by_terms;
+        if *known != Some(member) {
+            step.prepare_lane(stage, spec, 0, member);
+            *known = Some(member);
+        }
+        let lanes = self.step.lanes();
+        for (number, row) in numbers.iter_mut().zip(self.state.chunks_exact(lanes)) {
+            *number = row[lane];
+        }
+        step.advance(stage, &NO_CLOCK, 0, 1, numbers);
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(numbers.iter()).take(self.numbers + Pace::<f64>::NUMBERS) {
+            row[lane] = *number;
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
-use std::{sync::Arc, thread, time::Instant};
+use std::{sync::Arc, time::Instant};
 
 use super::{
     Machine, Model,
@@ -57,7 +57,7 @@ pub struct Arrays<'a, T = f64> {
     pub saved_y: &'a mut [T],
     /// What is recorded beside each saved state.
     pub recorded: &'a mut [T],
-    /// What the systems added up, one number per member; empty if not asked for.
+    /// What the systems added up, and what is watched, rows of one number per member; empty if not asked for.
     pub tally: &'a mut [T],
     /// The v slot at the end; empty if not asked for.
     pub carry: &'a mut [T],
@@ -76,9 +76,10 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
 }
 
 /// The most steps between two checks of the clock and of whether all states are finite.
-const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 14;
-/// Numbers × steps until the first check, about.
+const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 16;
+/// Numbers × steps until the first check, about, and steps at most: until then it is not known how long steps take.
 const NUMBERS_TO_FIRST_CHECK: i64 = 1 << 19;
+const STEPS_TO_FIRST_CHECK: i64 = 1 << 14;
 /// Numbers × steps between two later checks, at most.
 const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
 /// A group of more numbers than this is first checked after one step, to see how long that takes: the cost of a step of many bodies
@@ -157,7 +158,7 @@ pub fn run<T: Steppable>(plan: &Plan, arrays: Arrays<T>, monitor: &mut dyn FnMut
     expect("saved_y", kept * q * b, arrays.saved_y.len())?;
     expect("recorded", kept * traced.recorded * b, arrays.recorded.len())?;
     if !arrays.tally.is_empty() {
-        expect("tally", b, arrays.tally.len())?;
+        expect("tally", traced.tally * b, arrays.tally.len())?;
     }
     if !arrays.carry.is_empty() {
         expect("carry", p * b, arrays.carry.len())?;
@@ -175,12 +176,7 @@ pub fn run<T: Steppable>(plan: &Plan, arrays: Arrays<T>, monitor: &mut dyn FnMut
     let lanes = plan.model.lanes::<T>(&traced, plan.machine, b, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
-    let threads = match plan.machine.threads {
-        0 if work < MIN_NUMBER_STEPS_FOR_THREADS => 1,
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        n => n,
-    };
-    let threads = threads.min(groups).max(1);
+    let threads = plan.machine.threads_for(groups, work >= MIN_NUMBER_STEPS_FOR_THREADS);
     plan.model.room(traced.shape, threads)?;
     // A single group may use all threads; it decides whether they are worthwhile.
     let machine = Machine { threads: if groups == 1 { plan.machine.threads } else { 1 }, ..plan.machine };
@@ -348,11 +344,8 @@ impl<T: Real> Job<'_, '_, T> {
 
         let mut k = plan.first;
         let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
-        let first = if numbers > LARGE_MEMBER_NUMBERS {
-            1
-        } else {
-            (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL)
-        };
+        let first =
+            if numbers > LARGE_MEMBER_NUMBERS { 1 } else { (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, STEPS_TO_FIRST_CHECK) };
         let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;

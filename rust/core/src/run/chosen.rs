@@ -1,6 +1,6 @@
 //! The driver of adaptive steps: every member has its own time and step, and when one is done its lane takes the next.
 
-use std::{ops::Range, sync::Arc, thread};
+use std::{ops::Range, sync::Arc};
 
 use super::{
     Machine, Model,
@@ -103,12 +103,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let worker = || Worker::new(plan, &traced, &stop);
     let mine = worker()?;
     let lanes = mine.group.lanes();
-    let threads = match plan.machine.threads {
-        0 if lanes > 1 && b < MIN_MEMBERS_FOR_THREADS => 1,
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        n => n,
-    };
-    let threads = threads.min(b.div_ceil(lanes)).max(1);
+    let threads = plan.machine.threads_for(b.div_ceil(lanes), lanes == 1 || b >= MIN_MEMBERS_FOR_THREADS);
     plan.model.room(traced.shape, threads)?;
     // Few shares, since lanes run empty at the end of each; but several, so that the others do not wait long for a slow one.
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
@@ -135,6 +130,8 @@ struct Assignment {
     next: usize,
     /// While an extra step is made: the state that it starts from, which has to be put back.
     origin: Option<Vec<f64>>,
+    /// A run that goes on is held, and the coefficients of its series have to be found first.
+    held_before: bool,
 }
 
 struct Worker<'a> {
@@ -161,13 +158,27 @@ impl<'a> Worker<'a> {
             self.group.set_pace(lane, pace.idle());
             *assigned = waiting.next().map(|member| self.assign_member(&part, lane, member));
         }
+        // Of a series: which lanes have a step to try, and how many calls were made.
+        let (mut runs, mut calls) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
+                if runs[lane] {
+                    continue;
+                }
                 if let Some(taken) = assigned.take() {
                     *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
             let numbers = self.plan.v.len() + self.plan.y.len();
+            if self.group.has_terms() {
+                self.group.attempt(self.attempts_by_series(&assignments));
+                self.group.find_running(self.plan.budget as f64, &mut runs);
+                calls += 1;
+                if calls % ATTEMPTS_BETWEEN_CHECKS == 0 && !go_on(0) {
+                    return Err(Error::Interrupted);
+                }
+                continue;
+            }
             // A member that makes an extra step makes only that before the next check.
             let (taken, extra) =
                 assignments.iter().flatten().fold((0, 0), |(n, m), assigned| (n + 1, m + usize::from(assigned.origin.is_some())));
@@ -186,6 +197,17 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
+    /// How many attempts are made before the next check. A step by a series is long work: none shall be made in vain. Of many lanes
+    /// one comes to its end at nearly any time; a single one may make half as many as are left by the present step.
+    fn attempts_by_series(&self, assignments: &[Option<Assignment>]) -> usize {
+        if assignments.len() > 1 {
+            return 1;
+        }
+        let Pace { t, h, target, held, .. } = self.group.pace(0);
+        let left = if held > 0.0 { 0.0 } else { (target - t) / (2.0 * h) };
+        (left as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
+    }
+
     /// Puts a member into a lane, at its start.
     fn assign_member(&mut self, part: &Part, lane: usize, member: usize) -> Assignment {
         let (plan, at) = (self.plan, part.first + member);
@@ -194,7 +216,7 @@ impl<'a> Worker<'a> {
         self.group.set_state(lane, &state);
         let pace = Pace::of(std::array::from_fn(|i| plan.paces[i].at(at)));
         self.group.set_pace(lane, Pace { target: pace.t, ..pace });
-        Assignment { member, next: 0, origin: None }
+        Assignment { member, next: 0, origin: None, held_before: pace.held > 0.0 }
     }
 
     /// Brings a lane to its next attempt: saves the states that it has reached and sets its next time, or ends its member and assigns
@@ -223,6 +245,14 @@ impl<'a> Worker<'a> {
                 self.save(part, lane, &assigned);
                 assigned.next += 1;
             }
+            if assigned.next < plan.at.len() && self.group.has_terms() && pace.held > 0.0 {
+                if std::mem::take(&mut assigned.held_before) {
+                    self.group.set_pace(lane, pace);
+                    return Ok(Some(assigned));
+                }
+                self.go_by_terms(part, lane, &mut assigned, pace);
+                continue;
+            }
             if assigned.next < plan.at.len() {
                 if pace.holds() {
                     pace.extra = pace.target - pace.t;
@@ -245,6 +275,23 @@ impl<'a> Worker<'a> {
             };
             assigned = self.assign_member(part, lane, member);
         }
+    }
+
+    /// Of a step that is held and whose coefficients are known: saves the state at the next time within it, or takes it.
+    fn go_by_terms(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, mut pace: Pace<f64>) {
+        let (spec, member) = (&self.plan.model.spec, part.first + assigned.member);
+        if !pace.holds() {
+            self.group.set_pace(lane, Pace { held: 0.0, ..pace });
+            self.group.attempt_by_terms(spec, lane, member);
+            return;
+        }
+        pace.extra = pace.target - pace.t;
+        let origin = self.group.state(lane);
+        self.group.set_pace(lane, pace);
+        self.group.attempt_by_terms(spec, lane, member);
+        self.save(part, lane, assigned);
+        assigned.next += 1;
+        self.group.set_state(lane, &origin);
     }
 
     /// Notes how a member ended.

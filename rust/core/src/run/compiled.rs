@@ -5,7 +5,11 @@ use std::time::{Duration, Instant};
 use super::{Machine, Model, Way};
 use crate::{
     error::Error,
-    kernel::{Layout, writer},
+    kernel::{
+        Layout,
+        pack::{self, Verdict},
+        writer,
+    },
     real::{Precision, Real},
     tape::{
         Counts,
@@ -33,6 +37,9 @@ pub struct Compiled {
     pub bytes: usize,
     /// The most values that are spilled at once because there are not enough registers.
     pub spills: usize,
+    /// Of a single member's machine code: whether equal operations are lanes of one vector, and what the model says of that; none where it
+    /// was not considered.
+    pub packing: Option<(bool, Verdict)>,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
     /// How long writing the code took, with choosing its shape, and preparing what is interpreted before it.
@@ -97,6 +104,9 @@ impl Model<'_> {
             (Some(_), None) => Err(Interpreted::Writer),
         };
         let compile = began.elapsed();
+        let is_packed = written.is_some_and(|kernel| kernel.packing().is_some());
+        let packing =
+            written.filter(|_| runner.packs()).and_then(|_| pack::best(&split.body)).map(|(verdict, _)| (is_packed, verdict));
         Ok(Some(Compiled {
             written: tapes.written,
             computed: counts(&split.body),
@@ -106,6 +116,7 @@ impl Model<'_> {
             lanes: runner.lanes(),
             bytes,
             spills,
+            packing,
             trace,
             compile,
         }))

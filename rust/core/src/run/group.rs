@@ -69,7 +69,7 @@ pub trait Group<T: Real = f64>: Send + Sync {
     /// Records the present state, whose v slot is finished: rows of lanes.
     fn record(&mut self, rows: &mut [T]);
 
-    /// The sums over the steps, such as the work of a control: a row of lanes, or nothing.
+    /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
     fn tally(&self) -> &[T];
 
     /// The same sums, to write.
@@ -125,7 +125,7 @@ impl<T: Traceable> Lanes<T> {
         let tapes = traced.tapes_of::<T>()?;
         let step = PreparedStage::with(&tapes.step, kit, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
-        let numbers = traced.shape.v + traced.shape.y + usize::from(traced.tally);
+        let numbers = traced.shape.v + traced.shape.y + traced.tally;
         let side = |stage: &Option<Stage<T>>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
         Ok(Lanes {
             state: Aligned::new(numbers * lanes),

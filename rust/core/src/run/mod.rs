@@ -11,7 +11,10 @@ pub mod stage;
 pub mod workers;
 pub mod world;
 
-use std::sync::Arc;
+use std::{
+    sync::{Arc, OnceLock},
+    thread,
+};
 
 use self::{
     adaptive::{AdaptiveBatch, AdaptiveLanes, NO_CLOCK},
@@ -53,6 +56,20 @@ pub struct Machine {
     pub threads: usize,
 }
 
+impl Machine {
+    /// How many threads to use for work that can be divided into so many parts, if more than one are worthwhile.
+    pub fn threads_for(self, parts: usize, worthwhile: bool) -> usize {
+        /// The operating system reads files to tell it, which takes as long as a short run, so it is asked once.
+        static AVAILABLE: OnceLock<usize> = OnceLock::new();
+        let threads = match self.threads {
+            0 if !worthwhile || parts <= 1 => 1,
+            0 => *AVAILABLE.get_or_init(|| thread::available_parallelism().map_or(1, usize::from)),
+            given => given,
+        };
+        threads.min(parts).max(1)
+    }
+}
+
 impl Model<'_> {
     /// An error if there is no memory for what so many threads keep of a system beside the results. This is checked before the run,
     /// because an allocation that fails in the middle would abort the process.
@@ -75,7 +92,7 @@ impl Model<'_> {
         let single = members == 1;
         // Operations are fused on the tape of the whole step, and friction needs the state at its start.
         let is_single = self.scene.precision == Precision::Single;
-        if is_single || self.scene.fused || controls::friction::is_given(&self.scene.given) {
+        if is_single || self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {

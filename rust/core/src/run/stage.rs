@@ -5,7 +5,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::aligned::Aligned;
 use crate::{
     isa::Level,
-    kernel::{Kernel, Tile, interpret::Interpreter, runner::Runner, writer},
+    kernel::{
+        Kernel, Tile,
+        interpret::Interpreter,
+        runner::{By, Runner},
+        writer,
+    },
     real::Real,
     spec::Spec,
     tape::split::{Body, Entry, Given, Split},
@@ -185,12 +190,12 @@ pub struct PreparedStage<T: Real = f64> {
     given: Vec<T>,
     /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
     given_pool: Vec<T>,
-    given_for: Option<bool>,
+    given_for: Option<By>,
     /// The uniforms of the hot loop.
     uniforms: Vec<T>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
     pool: Aligned<T>,
-    pool_for: Option<bool>,
+    pool_for: Option<By>,
     rows: Aligned<T>,
     held: Aligned<T>,
     /// Where in `held` the samples of each input begin.
@@ -212,7 +217,7 @@ pub struct PreparedStage<T: Real = f64> {
     /// A state with a trail of states behind it, and the pool of its kernel.
     trail: Aligned<T>,
     trail_pool: Aligned<T>,
-    trail_pool_for: Option<bool>,
+    trail_pool_for: Option<By>,
 }
 
 impl<T: Real> PreparedStage<T> {
@@ -386,10 +391,10 @@ impl<T: Real> PreparedStage<T> {
             table = std::mem::take(&mut self.tables[at].1);
             from = (at, (k - first) as usize * entries);
         }
-        let (kernel, written) = trail.runner.kernel(1);
-        if self.trail_pool_for != Some(written) {
+        let (kernel, by) = trail.runner.kernel(1);
+        if self.trail_pool_for != Some(by) {
             self.trail_pool = Aligned::from(&kernel.pool(&self.uniforms));
-            self.trail_pool_for = Some(written);
+            self.trail_pool_for = Some(by);
         }
         self.trail[..numbers].copy_from_slice(state);
         let (rows, pool, held) = (&self.rows, &self.trail_pool, &self.held);
@@ -418,10 +423,10 @@ impl<T: Real> PreparedStage<T> {
 
     #[inline]
     fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [T]) {
-        let (kernel, written) = self.kit.runner.kernel(steps);
-        if self.pool_for != Some(written) {
+        let (kernel, by) = self.kit.runner.kernel(steps);
+        if self.pool_for != Some(by) {
             self.pool = Aligned::from(&kernel.pool(&self.uniforms));
-            self.pool_for = Some(written);
+            self.pool_for = Some(by);
         }
         let tile = &mut Tile { state, rows: &self.rows, pool: &self.pool, steps, per_step, held: &self.held };
         kernel.run(tile, &mut self.scratch);
@@ -453,10 +458,10 @@ impl<T: Real> PreparedStage<T> {
     /// The entries of steps at these times, as many as the interpreter has lanes.
     fn fill(&mut self, stage: &Stage<T>, step: &Runner<T>, times: &[T], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
-        self.values.resize(entries.len() * steps, T::default()); // all of them are written anew
-        let (kernel, written) = step.kernel(1);
-        if self.given_for != Some(written) {
-            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(written));
+        self.values.resize(entries.len() * steps, T::default()); // all of them are by anew
+        let (kernel, by) = step.kernel(1);
+        if self.given_for != Some(by) {
+            (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(by));
         }
         let (values, pool) = (&mut self.values, &self.given_pool);
         let tile = &mut Tile { state: values, rows: times, pool, steps: 1, per_step: &[], held: &[] };

@@ -2,11 +2,15 @@
 //!
 //! They come from a function that was run once with symbols. Evaluated over any kind of number, they are a system like others.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::{
+    collections::HashMap,
+    hash::{DefaultHasher, Hash, Hasher},
+};
 
 use crate::{
     error::Error,
     number::{Number, Symbol},
+    series,
     spec::{Given, Parameters},
     system::{Block, Energies, Gradient, Kind, Shape, System},
     tape::{Id, Op, eval},
@@ -18,7 +22,7 @@ pub const KIND: Kind = Kind {
     shape,
     velocity_term: |given| given.equations.as_ref().filter(|e| e.reads_v()).map(|_| "a force that depends on v"),
     quantities,
-    operations: |given| given.equations.as_ref().map_or(0, |e| e.ops.len()),
+    operations: |given| given.equations.as_ref().map_or(0, |e| e.operations()),
     long: None,
     numbers: make,
     symbols: make,
@@ -37,6 +41,9 @@ pub struct Invariant {
     pub square: Id,
 }
 
+/// A value that is a function of others: pairs of a value and the derivative by it.
+pub type Marked = (Id, Vec<(Id, Id)>);
+
 /// The rates of a system, as operations.
 #[derive(Clone, Debug)]
 pub struct Equations {
@@ -49,13 +56,15 @@ pub struct Equations {
     quantities: Vec<(String, Id)>,
     /// The invariant that a projection keeps.
     kept: Option<Invariant>,
+    /// Values that are functions of others, whose operations do not tell their derivatives, for series.
+    functions: Vec<Marked>,
     /// A digest that distinguishes it from others, computed once: traced steps are found by it.
     digest: u64,
 }
 
 impl PartialEq for Equations {
     fn eq(&self, other: &Equations) -> bool {
-        let parts = |e: &Equations| (e.dv.clone(), e.dy.clone(), e.quantities.clone(), e.kept.clone());
+        let parts = |e: &Equations| (e.dv.clone(), e.dy.clone(), e.quantities.clone(), e.kept.clone(), e.functions.clone());
         self.digest == other.digest && self.ops == other.ops && parts(self) == parts(other)
     }
 }
@@ -79,13 +88,21 @@ impl Equations {
     ) -> Equations {
         let mut hasher = DefaultHasher::new();
         (&ops, &dv, &dy, &quantities, &kept).hash(&mut hasher);
-        Equations { ops, dv, dy, quantities, kept, digest: hasher.finish() }
+        Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), digest: hasher.finish() }
+    }
+
+    /// The same with values that are known as functions of others, for methods that need the series of a solution.
+    #[must_use]
+    pub fn with_functions(self, functions: Vec<Marked>) -> Equations {
+        let mut hasher = DefaultHasher::new();
+        (self.digest, &functions).hash(&mut hasher);
+        Equations { functions, digest: hasher.finish(), ..self }
     }
 
     /// The same without operations whose result is not used.
     #[must_use]
     pub fn without_the_rest(self) -> Equations {
-        let needed = self.needed(&self.roots().collect::<Vec<_>>());
+        let needed = self.needed_with_functions(self.roots().collect());
         let mut place = vec![0; self.ops.len()];
         let mut ops = Vec::new();
         for (id, op) in self.ops.iter().enumerate().filter(|(id, _)| needed[*id]) {
@@ -101,7 +118,16 @@ impl Equations {
             square: at(kept.square),
         });
         let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
-        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept)
+        let functions = self.functions.into_iter().filter(|(value, _)| needed[*value as usize]);
+        let functions =
+            functions.map(|(value, by)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect()));
+        let functions = functions.collect();
+        Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions)
+    }
+
+    /// The quantities by name.
+    pub fn quantities(&self) -> &[(String, Id)] {
+        &self.quantities
     }
 
     /// Whether there is an invariant that a projection can keep.
@@ -115,6 +141,14 @@ impl Equations {
         self.dv.iter().chain(self.dy.iter().flatten()).chain(self.quantities.iter().map(|(_, id)| id)).chain(kept).copied()
     }
 
+    /// How many operations the rates, quantities and gradients have.
+    fn operations(&self) -> usize {
+        if self.functions.is_empty() {
+            return self.ops.len();
+        }
+        self.needed(&self.roots().collect::<Vec<_>>()).into_iter().filter(|needed| *needed).count()
+    }
+
     fn shape(&self) -> Shape {
         Shape { v: self.dv.len(), y: self.dy.as_ref().map_or(self.dv.len(), Vec::len) }
     }
@@ -123,6 +157,32 @@ impl Equations {
     pub fn reads_v(&self) -> bool {
         let needed = self.needed(&self.dv);
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
+    }
+
+    /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not count.
+    pub fn chooses(&self) -> bool {
+        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by)| (*value, by)).collect();
+        let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
+        for op in &self.ops {
+            let (operands, n) = op.operands();
+            varies.push(matches!(op, Op::State(_) | Op::Time) || operands[..n].iter().any(|id| varies[*id as usize]));
+        }
+        let mut seen = vec![false; self.ops.len()];
+        let mut open: Vec<Id> = self.dv.iter().chain(self.dy.iter().flatten()).copied().collect();
+        while let Some(id) = open.pop() {
+            if std::mem::replace(&mut seen[id as usize], true) || !varies[id as usize] {
+                continue;
+            }
+            let op = self.ops[id as usize];
+            let (operands, n) = op.operands();
+            match functions.get(&id) {
+                Some(by) if by.is_empty() => return true, // as floor and sign, whose derivative is zero between jumps
+                Some(by) => open.extend(by.iter().flat_map(|(of, factor)| [*of, *factor])),
+                None if matches!(op, Op::Select(truth, ..) if varies[truth as usize]) => return true,
+                None => open.extend(&operands[..n]),
+            }
+        }
+        false
     }
 
     /// Whether a rate depends on the step, as the limited form of a control does.
@@ -144,9 +204,23 @@ impl Equations {
         needed
     }
 
+    /// Likewise, and for functions also what their derivatives depend on.
+    fn needed_with_functions(&self, mut roots: Vec<Id>) -> Vec<bool> {
+        let mut needed = self.needed(&roots);
+        loop {
+            let known = roots.len();
+            for (_, by) in self.functions.iter().filter(|(value, _)| needed[*value as usize]) {
+                roots.extend(by.iter().map(|(_, factor)| *factor).filter(|factor| !needed[*factor as usize]));
+            }
+            if roots.len() == known {
+                return needed;
+            }
+            needed = self.needed(&roots);
+        }
+    }
+
     /// An error unless each operation comes after what it reads and no leaf is beyond what is given.
-    fn check(&self, given: &Given) -> Result<(), Error> {
-        let states = self.shape().v + self.shape().y;
+    pub fn check(&self, given: &Given, states: usize) -> Result<(), Error> {
         let (parameters, tables) = (given.parameters(), given.tables.len());
         let fits = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();
@@ -177,13 +251,21 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     let Some(equations) = &given.equations else {
         return Err(Error::Shape { what: "equations", expected: 1, got: 0 });
     };
-    equations.check(given)?;
+    equations.check(given, equations.shape().v + equations.shape().y)?;
     Ok(equations.shape())
 }
 
 /// A number on which every operation is defined.
 trait Operand: Number {
     fn made(op: Op, operands: [Self; 3]) -> Self;
+
+    /// Whether a series is traced, which must know what is a function of what.
+    fn is_marking() -> bool {
+        false
+    }
+
+    /// Notes the derivatives of a value by others.
+    fn mark(self, _by: Vec<(Self, Self)>) {}
 }
 
 impl Operand for f64 {
@@ -197,6 +279,14 @@ impl Operand for Symbol {
     fn made(op: Op, operands: [Symbol; 3]) -> Symbol {
         let mut operands = operands.into_iter().map(|symbol| symbol.0);
         Symbol::new(op.with(|id| operands.next().unwrap_or(id)))
+    }
+
+    fn is_marking() -> bool {
+        series::is_marking()
+    }
+
+    fn mark(self, by: Vec<(Symbol, Symbol)>) {
+        series::mark(self, series::Mark::Factors(by));
     }
 }
 
@@ -217,6 +307,20 @@ fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
     Box::new(Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations, of_v, of_y })
 }
 
+/// The values of these quantities for a state of any system with these parameters.
+pub fn values_of(
+    equations: &std::sync::Arc<Equations>,
+    p: &Parameters<Symbol>,
+    t: Symbol,
+    v: &Block<Symbol>,
+    y: &Block<Symbol>,
+) -> Vec<Symbol> {
+    let roots: Vec<Id> = equations.quantities.iter().map(|(_, id)| *id).collect();
+    let (of_v, of_y) = (Vec::new(), Vec::new());
+    let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: equations.clone(), of_v, of_y };
+    own.values(&equations.needed(&roots), &roots, t, v, y).iter().copied().collect()
+}
+
 impl<N: Operand> Own<N> {
     /// h times these rates.
     fn rates(&self, needed: &[bool], roots: &[Id], t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
@@ -229,6 +333,8 @@ impl<N: Operand> Own<N> {
     }
 
     fn values(&self, needed: &[bool], roots: &[Id], t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
+        let with_functions = N::is_marking().then(|| self.equations.needed_with_functions(roots.to_vec()));
+        let needed = with_functions.as_deref().unwrap_or(needed);
         let mut made: Vec<N> = Vec::with_capacity(needed.len());
         for (op, needed) in self.equations.ops.iter().zip(needed) {
             let (operands, n) = op.operands();
@@ -248,6 +354,11 @@ impl<N: Operand> Own<N> {
                 }
             };
             made.push(value);
+        }
+        if N::is_marking() {
+            for (value, by) in self.equations.functions.iter().filter(|(value, _)| needed[*value as usize]) {
+                made[*value as usize].mark(by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect());
+            }
         }
         Block::from_iterator(roots.len(), roots.iter().map(|id| made[*id as usize]))
     }

@@ -37,6 +37,7 @@ struct Rewriting<'a> {
 
 /// The same tape, for these values, in which increments are multiplied last; and the values on it.
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
+    let (tape, roots) = &negated_sums(tape, roots);
     let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut work = Rewriting { tape, facts: Facts::new(tape, roots), made, values: Vec::with_capacity(tape.ops().len()) };
     for (id, op) in tape.ops().iter().enumerate() {
@@ -45,6 +46,26 @@ pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     }
     let roots = roots.iter().map(|root| work.plain(*root)).collect();
     (work.made, roots)
+}
+
+/// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first, and what
+/// is made of it must not depend on that.
+fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
+    let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
+    let mut place = Vec::<Id>::with_capacity(tape.ops().len());
+    for op in tape.ops() {
+        let id = match op {
+            Op::Sub(a, b) if let Op::Neg(x) = tape.op(*a) => {
+                let (x, y) = (place[x as usize], place[*b as usize]);
+                let sum = made.keep(Op::Add(x.min(y), x.max(y)));
+                made.keep(Op::Neg(sum))
+            }
+            _ => made.keep(op.with(|id| place[id as usize])),
+        };
+        place.push(id);
+    }
+    let roots = roots.iter().map(|root| place[*root as usize]).collect();
+    (made, roots)
 }
 
 impl Rewriting<'_> {

@@ -13,6 +13,8 @@ pub mod print;
 pub mod quick;
 pub mod split;
 
+use std::collections::BTreeSet;
+
 use self::quick::QuickMap;
 use crate::real::Precision;
 
@@ -190,6 +192,13 @@ impl Counts {
             | Held(_) | Gather(_) => {}
         }
     }
+
+    /// All of them.
+    pub fn sum(&self) -> usize {
+        let kinds =
+            [self.additions, self.multiplications, self.fused, self.divisions, self.square_roots, self.choices, self.bits];
+        kinds.iter().map(|count| *count as usize).sum()
+    }
 }
 
 /// Operations in the order in which they were first requested, each once.
@@ -204,6 +213,8 @@ pub struct Tape {
     of_state: Vec<bool>,
     /// Counts of the requested operations on values that depend on the state, before equal ones were merged.
     written: Counts,
+    /// Of a step with a series: the operations of one evaluation of the rates, and of all coefficients of the rates.
+    series: [usize; 2],
 }
 
 impl Tape {
@@ -242,6 +253,34 @@ impl Tape {
             }
         }
         counts
+    }
+
+    /// How many operations on what changes between steps these values are made of, equal ones once and some of them left out.
+    pub fn changing(&self, roots: impl IntoIterator<Item = Id>, without: &BTreeSet<Id>) -> usize {
+        let mask = self.needed(roots);
+        let mut counts = Counts::default();
+        let mut changes: Vec<bool> = Vec::with_capacity(self.ops.len());
+        for (op, needed) in self.ops.iter().zip(&mask) {
+            let (operands, n) = op.operands();
+            let varies =
+                matches!(op, Op::State(_) | Op::Time | Op::Sample(..)) || operands[..n].iter().any(|id| changes[*id as usize]);
+            changes.push(varies);
+            if *needed && varies {
+                counts.note(*op);
+            }
+        }
+        counts.sum() - without.iter().filter(|id| mask[**id as usize] && changes[**id as usize]).count()
+    }
+
+    /// Notes how many operations one evaluation of the rates takes, and how many all coefficients of their series.
+    pub fn note_series(&mut self, rates: usize, coefficients: usize) {
+        self.series = [rates, coefficients];
+    }
+
+    /// To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series.
+    pub fn series_evaluations(&self) -> usize {
+        let [rates, coefficients] = self.series;
+        coefficients.div_ceil(rates.max(1))
     }
 
     /// Whether a value depends on the state.
@@ -332,11 +371,12 @@ impl Tape {
                         return x;
                     }
                 }
-                if let Neg(x) = self.op(b) {
-                    return self.shorten(Sub(a, x));
-                }
-                if let Neg(x) = self.op(a) {
-                    return self.shorten(Sub(b, x));
+                // −x + −y is −x − y, whichever comes first.
+                match (self.op(a), self.op(b)) {
+                    (Neg(x), Neg(y)) if y < x => return self.shorten(Sub(b, x)),
+                    (_, Neg(y)) => return self.shorten(Sub(a, y)),
+                    (Neg(x), _) => return self.shorten(Sub(b, x)),
+                    _ => {}
                 }
                 // (0 + x) + y: the zero matters only if x is −0, and then y alone decides, unless it is −0 too.
                 for (x, y) in [(a, b), (b, a)] {
@@ -423,6 +463,7 @@ impl Tape {
             of_state,
             written: self.written,
             precision: self.precision,
+            series: self.series,
         }
     }
 

@@ -26,6 +26,7 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
         rows: of.rows.iter().map(|(name, rows)| (name.to_string(), commons(rows))).collect(),
         tables: of.tables.iter().map(|(name, t)| (name.to_string(), t.samples.iter().all(Row::is_common))).collect(),
         equations: None,
+        watched: None,
     };
     let rows = of.rows.iter().flat_map(|(_, rows)| rows.clone()).collect();
     Spec { given, rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }

@@ -3,8 +3,10 @@
 use iced_x86::{Decoder, DecoderOptions, FlowControl, Instruction, Mnemonic, OpAccess, OpKind, Register};
 use stepwell_core::kernel::writer::Written;
 
-/// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some.
-pub fn read(kernel: &Written, is_fused: bool) {
+/// Panics if anything is in the code that should not be. Fused multiply-adds should be if the body has some. Returns how many instructions
+/// move numbers between lanes.
+pub fn read(kernel: &Written, is_fused: bool) -> usize {
+    let mut moves = 0;
     let (code, frame, shape) = (kernel.code(), kernel.frame(), kernel.shape());
     let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);
     let mut starts = Vec::new();
@@ -19,6 +21,15 @@ pub fn read(kernel: &Written, is_fused: bool) {
         starts.push(i.ip());
         let is_single = bytes == 4;
         assert!(is_known(i.mnemonic(), is_single) || is_fused && is_multiply_add(i.mnemonic(), is_single), "{i}");
+        moves += usize::from(matches!(
+            i.mnemonic(),
+            Mnemonic::Vshufpd
+                | Mnemonic::Vinsertf128
+                | Mnemonic::Vinsertf64x2
+                | Mnemonic::Vextractf128
+                | Mnemonic::Vextractf64x2
+                | Mnemonic::Vpermpd
+        ));
         match i.flow_control() {
             FlowControl::Next => {}
             FlowControl::Return => break,
@@ -68,6 +79,7 @@ pub fn read(kernel: &Written, is_fused: bool) {
         }
     }
     assert!(branches <= 2);
+    moves
 }
 
 fn writes(i: &Instruction) -> bool {
@@ -106,6 +118,7 @@ fn is_known(mnemonic: Mnemonic, is_single: bool) -> bool {
         Vaddpd, Vaddsd, Vsubpd, Vsubsd, Vmulpd, Vmulsd, Vdivpd, Vdivsd, Vsqrtpd, Vsqrtsd, Vcmppd, Vcmpsd, Vroundpd, Vroundsd,
         Vrndscalepd, Vrndscalesd, Vandpd, Vandnpd, Vorpd, Vxorpd, Vpaddq, Vpsllq, Vpsrlq, Vblendmpd, Vblendvpd, Vpternlogq, Vpmovm2q,
         Vmovupd, Vmovapd, Vmovsd, Vbroadcastsd,
+        Vshufpd, Vinsertf128, Vinsertf64x2, Vextractf128, Vextractf64x2, Vpermpd,
     ];
     #[rustfmt::skip]
     let single = [

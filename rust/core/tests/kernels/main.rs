@@ -5,6 +5,7 @@
 #[cfg(target_arch = "x86_64")]
 mod code;
 mod inputs;
+mod packed;
 mod process;
 mod random;
 

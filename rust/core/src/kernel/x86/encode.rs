@@ -120,6 +120,15 @@ pub const MOVE: Form = plain(0x28);
 /// One number to all lanes.
 pub const BROADCAST: Form = sized(2, P66, 0x19, 0x18);
 
+/// A vector of two: a number of the first and one of the second, by the byte behind.
+pub const PICK: Form = form(1, P66, 0xC6);
+/// The high half of a vector of four; the operands are the other way round: the second is the result.
+pub const HIGH: Form = form(3, P66, 0x19);
+/// A vector of four: the low half of the first, and the second as the high half.
+pub const JOIN: Form = form(3, P66, 0x18);
+/// Numbers of a vector of four in another order, by the byte behind.
+pub const PERMUTE: Form = Form { wide: true, ..form(3, P66, 0x01) };
+
 /// A general register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum General {

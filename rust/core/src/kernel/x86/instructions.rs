@@ -8,6 +8,7 @@ use crate::{
     kernel::{
         frame::place,
         machine::{Base, Counter, Machine, Place},
+        pack::Move,
         plan::{Source, Step},
         registers::NONE,
         shape::Shape,
@@ -35,6 +36,8 @@ pub enum Doing {
     Pick(u8),
     /// The same.
     Copy,
+    /// Numbers of one member between lanes.
+    Move(Move),
 }
 
 const LESS: u8 = 0x11;
@@ -93,6 +96,8 @@ impl Machine for Code {
     // Jumps fit into 31 bits: an operation takes at most some hundred bytes.
     const MOST_OPERATIONS: usize = 1 << 22;
 
+    const PACKS: bool = true;
+
     fn new(shape: Shape, instructions: usize) -> Code {
         Code {
             bytes: Vec::with_capacity(16 * instructions + 512),
@@ -140,6 +145,14 @@ impl Machine for Code {
         self.evex.then(|| Doing::Pick(predicate(comparison)))
     }
 
+    fn moving(&self, to: Move) -> Doing {
+        Doing::Move(to)
+    }
+
+    fn of_width(&mut self, width: usize) {
+        self.width = width;
+    }
+
     fn make(writer: &mut Writer<Code>, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
         Some(match step.doing {
             Doing::Two(form, commutes) => {
@@ -152,7 +165,7 @@ impl Machine for Code {
             }
             Doing::One(form, byte) => {
                 // Of single numbers such an instruction has two operands: the other lanes are those of the first.
-                let single = writer.shape.width == 1 && form.double.first.is_some();
+                let single = writer.code.width == 1 && form.double.first.is_some();
                 let second = if single { Operand::Register(writer.fetch(of[0])?) } else { writer.operand(of[0], form)? };
                 let first = if let (true, Operand::Register(register)) = (single, second) { register } else { 0 };
                 let to = writer.result(step.id, vector, of)?;
@@ -189,6 +202,7 @@ impl Machine for Code {
                 to
             }
             Doing::Select(is_mask) => writer.select(is_mask, step, vector, of)?,
+            Doing::Move(to) => writer.moved(to, step, vector, of)?,
             Doing::Copy => {
                 let from = writer.operand(of[0], x::LOAD)?;
                 let to = writer.result(step.id, vector, of)?;
@@ -278,12 +292,14 @@ impl Writer<'_, Code> {
     /// The value in memory as an operand, if this instruction can take it from there.
     fn in_place(&self, value: Value, form: Form) -> Option<Memory> {
         let source = self.source(value);
-        let single = self.shape.width == 1;
+        let single = self.code.width == 1;
         let is_whole = single && form.double.first.is_some();
+        let has_home = self.plan.packing.is_some() && !matches!(source, Source::PerStep(_));
         let can = match source {
             // Its address must be loaded first.
             Source::Held(_) => false,
             _ if self.code.evex => true,
+            _ if has_home => true,
             _ if single => is_whole || matches!(source, Source::Pool(_)),
             _ => !matches!(source, Source::PerStep(_)),
         };
@@ -314,6 +330,29 @@ impl Writer<'_, Code> {
             }
         }
         self.fetch(value).map(Operand::Register)
+    }
+
+    /// All operands are fetched: they may be shorter in memory than what an instruction would read there.
+    fn moved(&mut self, how: Move, step: &Step<Doing>, vector: usize, of: &[Value]) -> Option<u8> {
+        let first = self.fetch(of[0])?;
+        let second = match of.get(1) {
+            Some(value) => self.fetch(*value)?,
+            None => first,
+        };
+        let to = self.result(step.id, vector, of)?;
+        let second = Operand::Register(second);
+        let code = &mut self.code;
+        match how {
+            Move::Pick(lanes) => code.vector_and_byte(x::PICK, to, first, second, lanes),
+            Move::Join => code.vector_and_byte(x::JOIN, to, first, second, 1),
+            Move::Permute(lanes) => code.vector_and_byte(x::PERMUTE, to, 0, second, lanes),
+            Move::High => {
+                code.of_width(4);
+                code.vector_and_byte(x::HIGH, first, 0, Operand::Register(to), 1);
+                code.of_width(2);
+            }
+        }
+        Some(to)
     }
 
     /// Two values in the order in which the one in memory, if there is one, comes last; else the one that is needed longer first.

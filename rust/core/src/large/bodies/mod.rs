@@ -3,7 +3,7 @@
 mod quantities;
 mod share;
 
-use std::{sync::atomic::Ordering::Relaxed, thread};
+use std::sync::atomic::Ordering::Relaxed;
 
 use stepwell_base::{
     bodies::{LANES, Law, partners},
@@ -57,12 +57,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
     let ends = |group: Vec<usize>| Some((*group.first()?, *group.last()?));
     let slabs: Vec<Vec<Distances>> = partners(n).into_iter().map(|slab| slab.into_iter().filter_map(ends).collect()).collect();
     let round = Round::new(n, dim);
-    let threads = match machine.threads {
-        _ if n < MIN_BODIES_FOR_THREADS => 1,
-        0 => thread::available_parallelism().map_or(1, usize::from),
-        given => given,
-    };
-    let threads = threads.min(slabs.len());
+    let threads = if n < MIN_BODIES_FOR_THREADS { 1 } else { machine.threads_for(slabs.len(), true) };
     let shares = if threads > 1 { slabs.iter().map(|_| Share::new(n, dim)).collect() } else { Vec::new() };
     Box::new(Bodies {
         n,

@@ -1,0 +1,135 @@
+"""A long run at rounding level: the outer solar system, by the series of stepwell and heyoka and by REBOUND's IAS15.
+
+Where the error of a step is below rounding, that of the energy is a sum of roundings, which grows as the square root of the time
+(Brouwer 1937). Who has a bias of the least kind is worse: it grows as the time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+
+from ..report import Table, number
+from ..workloads import Array
+
+#: The Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto on 5 September 1994, in solar masses, astronomical
+#: units and days: E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration (Springer 2006), section I.2.4.
+G = 2.95912208286e-4
+MASSES = np.array([1.00000597682, 0.000954786104043, 0.000285583733151, 0.0000437273164546, 0.0000517759138449, 1.0 / 1.3e8])
+PLACES = np.array(
+    [
+        [0.0, 0.0, 0.0],
+        [-3.5023653, -3.8169847, -1.5507963],
+        [9.0755314, -3.0458353, -1.6483708],
+        [8.3101420, -16.2901086, -7.2521278],
+        [11.4707666, -25.7294829, -10.8169456],
+        [-15.5387357, -25.2225594, -3.1902382],
+    ]
+)
+VELOCITIES = np.array(
+    [
+        [0.0, 0.0, 0.0],
+        [0.00565429, -0.00412490, -0.00190589],
+        [0.00168318, 0.00483525, 0.00192462],
+        [0.00354178, 0.00137102, 0.00055029],
+        [0.00288930, 0.00114527, 0.00039677],
+        [0.00276725, -0.00170702, -0.00136504],
+    ]
+)
+YEAR = 365.25
+#: Saved states; the error of the energy is the root of the mean square over the last half of them, for a single one may be zero.
+SAVED = 64
+#: A tolerance of a rounding. (REBOUND's epsilon is its default, 1e-9: the size of a term, not an error.)
+ROUNDING = 2.0**-53
+
+Solve = Callable[[Array], tuple[Array, Array]]
+
+
+def at_rest() -> tuple[Array, Array]:
+    """The start, v and y, where the centre of mass rests in the origin."""
+    shares = MASSES / MASSES.sum()
+    return VELOCITIES - shares @ VELOCITIES, PLACES - shares @ PLACES
+
+
+def energy(v: Array, y: Array) -> Array:
+    """Of states (times, bodies, 3), in extended precision: its own roundings must not be those that are looked for."""
+    masses, v, y = (np.asarray(each, dtype=np.longdouble) for each in (MASSES, v, y))
+    total = 0.5 * (masses * (v * v).sum(axis=-1)).sum(axis=-1)
+    for i in range(len(masses)):
+        for j in range(i):
+            total -= G * masses[i] * masses[j] / np.sqrt(((y[:, i] - y[:, j]) ** 2).sum(axis=-1))
+    return np.asarray(total)
+
+
+def contestants() -> Iterator[tuple[str, Solve]]:
+    """Those that are installed: each a function from times to states."""
+    yield "stepwell taylor", ours
+    for name, maker in (("heyoka", heyokas), ("REBOUND IAS15", rebounds)):
+        try:
+            yield name, maker()
+        except ImportError:
+            continue
+
+
+def ours(times: Array) -> tuple[Array, Array]:
+    """By stepwell."""
+    v, y = at_rest()
+    run = sw.integrate(sw.NBody(MASSES, force="newton", G=G), "taylor", v=v, y=y, tolerance=ROUNDING, at=times, threads=1)
+    return run.v, run.y
+
+
+def heyokas() -> Solve:
+    """By heyoka, compiled before."""
+    import heyoka as hy
+
+    series: Any = hy.taylor_adaptive(hy.model.nbody(len(MASSES), masses=MASSES, Gconst=G), np.ones(36), tol=ROUNDING)
+
+    def solve(times: Array) -> tuple[Array, Array]:
+        v, y = at_rest()
+        series.time = 0.0
+        series.state[:] = np.concatenate([y, v], axis=1).ravel()
+        states = series.propagate_grid(np.concatenate([[0.0], times]))[-1][1:].reshape(-1, len(MASSES), 6)
+        return states[..., 3:], states[..., :3]
+
+    return solve
+
+
+def rebounds() -> Solve:
+    """By REBOUND."""
+    import rebound
+
+    def solve(times: Array) -> tuple[Array, Array]:
+        sim = rebound.Simulation()
+        sim.G, sim.integrator = G, "ias15"
+        for mass, v, y in zip(MASSES.tolist(), *(block.tolist() for block in at_rest()), strict=True):
+            sim.add(m=mass, x=y[0], y=y[1], z=y[2], vx=v[0], vy=v[1], vz=v[2])
+        states = np.empty((len(times), len(MASSES), 6))
+        for i, t in enumerate(times.tolist()):
+            sim.integrate(t, exact_finish_time=1)
+            states[i] = [[*p.xyz, *p.vxyz] for p in sim.particles]
+        return states[..., 3:], states[..., :3]
+
+    return solve
+
+
+def table(years: tuple[float, ...]) -> Table:
+    """A column for the error and the time of each length of the run."""
+    lines = []
+    start = energy(*(block[np.newaxis] for block in at_rest()))[0]
+    for name, solve in contestants():
+        solve(YEAR * np.array([100.0]))  # whatever it compiles
+        cells = []
+        for length in years:
+            times = YEAR * length * np.arange(1, SAVED + 1) / SAVED
+            begin = time.perf_counter()
+            v, y = solve(times)
+            seconds = time.perf_counter() - begin
+            off = (energy(v, y)[SAVED // 2 :] - start) / start
+            cells += [f"{float(np.sqrt(np.mean(off * off))):.1e}", number(1e3 * seconds)]
+        lines.append([name, *cells])
+    head = [each for length in years for each in (f"error after {length:,.0f} years", "ms")]
+    return "Chosen steps: the outer solar system at rounding level, relative error of the energy", ["contestant", *head], lines

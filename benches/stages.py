@@ -1,0 +1,87 @@
+"""Where the time of a call goes: ``python -m benches.stages``. Oscillators by False Euler, 1000 steps on one thread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import stepwell as sw
+from stepwell import _core, engine
+
+HEAD = ["stage, µs", "one oscillator", "1000", "100 000"]
+TITLE = "A call by stages: oscillators, False Euler, 1000 steps"
+MEMBERS = (1, 1000, 100_000)
+STEPS = 1000
+#: Each time is the least of so many, each over calls that together last this long, in seconds.
+REPEATS, SAMPLE = 7, 0.01
+
+
+def least(call: Callable[[], Any]) -> float:
+    """The least time of a call, in microseconds."""
+    begin = time.perf_counter()
+    call()
+    calls = max(1, round(SAMPLE / (time.perf_counter() - begin)))
+    taken = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        for _ in range(calls):
+            call()
+        taken.append((time.perf_counter() - begin) / calls)
+    return 1e6 * min(taken)
+
+
+def stages(members: int) -> dict[str, float]:
+    """The times of all stages for so many members."""
+    omega = np.linspace(0.5, 2.0, members) if members > 1 else 1.0
+    v, y = (np.zeros(members), np.ones(members)) if members > 1 else (0.0, 1.0)
+    system, method = sw.Oscillator(omega), sw.method("false_euler")
+    inside: list[float] = []
+    run = _core.run
+
+    def timed(*given: Any) -> bool:
+        begin = time.perf_counter()
+        made = run(*given)
+        inside.append(1e6 * (time.perf_counter() - begin))
+        return made
+
+    def call(steps: int) -> sw.Run:
+        return sw.integrate(system, method, v=v, y=y, dt=0.01, steps=steps, threads=1)
+
+    within: dict[int, float] = {}
+    around = 1e12
+    calls = REPEATS * max(1, round(1e6 * SAMPLE / least(lambda: call(STEPS))))
+    try:
+        engine._core.run = timed
+        for _ in range(calls):  # in turns, so that what disturbs the machine disturbs both
+            for steps in (STEPS, 2 * STEPS):
+                begin = time.perf_counter()
+                call(steps)
+                around = min(around, 1e6 * (time.perf_counter() - begin) - inside[-1])
+                within[steps] = min(within.get(steps, 1e12), inside[-1])
+    finally:
+        engine._core.run = run
+    stepping = within[2 * STEPS] - within[STEPS]
+    plan = engine.Plan(system, method, system.batch, 0.01, steps=STEPS)
+    told = [_core.compiled(engine.model(plan), members) for _ in range(REPEATS)]
+    return {
+        "once for a system and method: tracing the step": 1e6 * min(each["trace"] for each in told if each),
+        "once for a system and method: writing machine code": 1e6 * min(each["compile"] for each in told if each),
+        "making the system: checks of its parameters": least(lambda: sw.Oscillator(omega)),
+        "checks of arguments, plan, result object": around,
+        "gathering parameters and states, storing results, threads": within[STEPS] - stepping,
+        "steps": stepping,
+    }
+
+
+def table() -> tuple[str, list[str], list[list[str]]]:
+    """All of it, a row for each stage."""
+    found = [stages(members) for members in MEMBERS]
+    return TITLE, HEAD, [[name, *(f"{each[name]:.3g}" for each in found)] for name in found[0]]
+
+
+if __name__ == "__main__":
+    from .compare import report
+
+    report.show(*table())

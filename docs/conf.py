@@ -1,0 +1,136 @@
+"""How Sphinx builds the site: ``make docs``. Warnings are errors, and nothing is fetched from a network."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import stepwell
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS))
+# Notebooks choose the way that shows figures below their cells, unless this names another.
+os.environ.pop("MPLBACKEND", None)
+
+project = "stepwell"
+author = "The stepwell developers"
+copyright = "The stepwell developers"
+release = version = stepwell.__version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["gallery/**.ipynb", "gallery/**.py"]
+nitpicky = True
+#: What annotations name outside of the package, or privately in it, has no page here.
+nitpick_ignore_regex = [(r"py:.*", r"(?!stepwell\.[a-z]+$).*")]
+
+# ---- pages
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_execution_timeout = 120
+nb_merge_streams = True
+
+#: Files beside docs/ that the site shows, and the page that includes each or is made from it.
+INCLUDED = {
+    "CHANGELOG.md": "developing/changelog.md",
+    "CONTRIBUTING.md": "developing/contributing.md",
+    "benches/CONTROL.md": "benchmarks/control.md",
+    "benches/RESULTS.md": "benchmarks/results.md",
+    "examples/GALLERY_HEADER.rst": "gallery/index.rst",
+}
+
+# ---- the gallery: scripts of examples/, run and shown
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "subsection_order": ["../examples/motion", "../examples/methods", "../examples/equations"],
+    "within_subsection_order": "FileNameSortKey",
+    "filename_pattern": r"\.py$",
+    # The scripts right in examples/ print; those in its folders draw.
+    "ignore_pattern": f"^({'|'.join(file.name for file in (DOCS.parent / 'examples').glob('*.py'))})$",
+    "reset_argv": "site_parts.folder_for_pictures",
+    "abort_on_example_error": True,
+    "write_computation_times": False,
+    "show_memory": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+    "thumbnail_size": (480, 320),
+    "min_reported_time": 1e9,
+}
+
+# ---- reference
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autosummary_generate = False
+maximum_signature_line_length = 88
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
+
+# ---- look
+
+html_theme = "furo"
+pygments_style = "default"
+pygments_dark_style = "github-dark"
+html_title = "stepwell"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#175ca6", "color-brand-content": "#175ca6"},
+    "dark_css_variables": {"color-brand-primary": "#6cb2f5", "color-brand-content": "#6cb2f5"},
+}
+copybutton_exclude = ".linenos, .gp, .go"
+
+LINK = re.compile(r"(?<=\]\()([\w./-]+\.(?:md|rst))(?=[)#])")
+
+
+def _to_pages(text: str, folder: Path) -> str:
+    """Links between files, which are for readers of the repository, lead to the pages of the site."""
+
+    def page(link: re.Match[str]) -> str:
+        target = (folder / link[0]).resolve()
+        if target.is_relative_to(DOCS):
+            return f"/{target.relative_to(DOCS).as_posix()}"
+        return f"/{INCLUDED[target.relative_to(DOCS.parent).as_posix()]}"
+
+    return LINK.sub(page, text)
+
+
+def _page_read(app: Any, name: str, source: list[str]) -> None:
+    source[0] = _to_pages(source[0], (DOCS / name).parent)
+
+
+def _file_included(app: Any, path: Path, name: str, source: list[str]) -> None:
+    source[0] = _to_pages(source[0], (DOCS / path).parent)
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    import site_parts
+
+    app.add_directive("public", site_parts.Public)
+    app.connect("autodoc-process-docstring", site_parts.as_text, priority=400)  # before Napoleon
+    app.connect("autodoc-process-signature", site_parts.without_constructor)
+    app.connect("source-read", _page_read)
+    app.connect("include-read", _file_included)

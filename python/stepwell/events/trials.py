@@ -1,0 +1,99 @@
+"""Steps of the method from the start of a step, of any length: the trials by which a change of sign is located."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _core, engine
+from .._checks import Array
+from ..reference import contact
+from ..reference.replayed import Operations
+from ..reference.traced import Tracer
+from ..systems.own import OwnSystem
+from .members import Members
+
+#: A step of an own system of more operations is computed by calling its function.
+MOST_OPERATIONS = 4000
+
+
+class Trials:
+    """Steps of any members of a plan, from any of their states.
+
+    The function of an own system takes long to call, so that its step is traced once for all members; the bits are the same.
+
+    Args:
+        plan: of the run.
+        members: its members.
+    """
+
+    def __init__(self, plan: engine.Plan, members: Members) -> None:
+        self._plan, self._members = plan, members
+        self._operations: Operations | None = None
+        self._numbers: list[Array] = []
+        self._is_traced = not isinstance(plan.system, OwnSystem)
+
+    def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """A step of these members from v and y, of another time and length for each."""
+        if not self._is_traced:
+            self._trace()
+            self._is_traced = True
+        if self._operations is None:
+            return one_step(self._members.plan(index), t, h, v, y)
+        state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        numbers = [each if each.shape[-1] == 1 else each[index] for each in self._numbers]
+        with np.errstate(all="ignore"):
+            made = self._operations(state, numbers)
+        n = len(made) - y[..., 0].size
+        return _block(made[:n], v), _block(made[n:], y)
+
+    def _trace(self) -> None:
+        """Trace a step of an own system, if it is short and has no samples."""
+        plan = self._members.plan(np.arange(self._plan.members))
+        tape = _core.Tape()
+        tracer = Tracer(plan.system, tape, plan.force)
+        t, h = tape.state(0), tape.state(1)
+        shapes, leaves = (plan.system.v_shape, plan.system.y_shape), (tape.state(i) for i in range(2, 1 << 30))
+        v, y = (_symbols(shape, leaves) for shape in shapes)
+        s = tracer.scaled(h)
+        if tracer.tables:
+            return
+        v, y = stepped(plan, s, t, h, v, y)
+        operations = Operations(*tape.operations(tracer.flat(v, y)))
+        if len(operations.lines) <= MOST_OPERATIONS:
+            self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+
+def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+    """A step of all members of a plan, likewise."""
+    system: Any = plan.system  # whose step is one number elsewhere
+    with np.errstate(all="ignore"):
+        v, y = stepped(plan, system.scaled(h, plan.batch, plan.force), t, h, v, y)
+    return np.asarray(v), np.asarray(y)
+
+
+def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+    """A step of a method from v and y: what it carries in place of v is made anew for this length."""
+    steps, carries = plan.method.steps, plan.method.carry is not None
+    slot = steps.start(s, plan.choice, t, v, y) if carries else v
+    slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
+    return (steps.finish(s, plan.choice, t + h, slot, y) if carries else slot), y
+
+
+def _symbols(shape: tuple[int, ...], leaves: Any) -> Any:
+    made = np.empty(shape, dtype=object)
+    for index in np.ndindex(shape):
+        made[index] = next(leaves)
+    return made
+
+
+def _rows(block: Array, shape: tuple[int, ...]) -> list[Array]:
+    return [block[index] for index in np.ndindex(shape)]
+
+
+def _block(rows: list[Array], like: Array) -> Array:
+    made = np.empty((len(rows), like.shape[-1]))
+    for row, numbers in zip(made, rows, strict=True):
+        row[:] = numbers
+    return made.reshape(like.shape)

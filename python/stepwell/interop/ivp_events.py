@@ -1,0 +1,123 @@
+"""Events of ``solve_ivp``: zeros of functions of time and state between the ends of steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .. import _checks
+from .._checks import Array
+from ..errors import DTypeError
+from .ivp_function import takes
+
+#: A zero is located to so much, relative to its time, and absolutely where the time is about zero: four roundings.
+ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
+
+#: The most values of an event function for one zero; bisection alone needs fewer than this many for any interval of floats.
+MAX_VALUES = 2200
+
+
+class Event:
+    """An event function with what SciPy reads of its attributes.
+
+    Attributes:
+        terminal: after how many occurrences the run ends; infinite if it does not.
+        direction: above zero for zeros where the function grows, below zero where it falls, zero for both.
+        count: how many were found so far.
+        times: when.
+        states: the states then.
+    """
+
+    def __init__(self, function: Any, args: tuple[Any, ...]) -> None:
+        if not callable(function) or isinstance(function, type):
+            raise DTypeError(f"events: expected functions event(t, y), got {_checks.short(function)} ({type(function).__name__})")
+        takes("events", function, args)
+        terminal = getattr(function, "terminal", None)
+        if terminal is None or terminal is False:
+            self.terminal = np.inf
+        else:
+            self.terminal = 1 if terminal is True else _checks.count("terminal", terminal, 0) or np.inf
+        self.direction = _checks.number("direction", getattr(function, "direction", 0.0))
+        self._function, self._args = function, args
+        self.count = 0
+        self.times: list[float] = []
+        self.states: list[Array] = []
+
+    def value(self, t: float, y: Array) -> float:
+        """The value of the function."""
+        made = np.asarray(self._function(t, y, *self._args))
+        if made.size != 1 or made.dtype.kind not in "biuf":
+            raise DTypeError(f"events: expected a function that returns one real number, got {_checks.short(made)}")
+        return float(made.reshape(-1)[0])
+
+    def occurs(self, before: float, after: float) -> bool:
+        """Whether the values at both ends of a step have a zero between them, in the direction that is asked for."""
+        grows, falls = before <= 0.0 <= after, before >= 0.0 >= after
+        return (grows and self.direction >= 0.0) or (falls and self.direction <= 0.0)
+
+
+def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float) -> float:
+    """A zero of g between a and b, at which it has values of different signs or zero (Brent 1973).
+
+    The zero is bracketed to ``ROOT_TOLERANCE``. If g is continuous, the end of the bracket with the smaller value is returned.
+    """
+    if g_a == 0.0:
+        return a
+    if g_b == 0.0:
+        return b
+    # b is the best estimate, c the other end of the bracket, a the estimate before.
+    c, g_c, step, before = a, g_a, b - a, b - a
+    for _ in range(MAX_VALUES):
+        if abs(g_c) < abs(g_b):
+            a, b, c, g_a, g_b, g_c = b, c, b, g_b, g_c, g_b
+        least = 0.5 * ROOT_TOLERANCE * (1.0 + abs(b))
+        half = 0.5 * (c - b)
+        if abs(half) <= least or g_b == 0.0:
+            break
+        if abs(before) < least or abs(g_a) <= abs(g_b):
+            step = before = half
+        else:
+            s = g_b / g_a
+            if a == c:  # a secant
+                p, q = 2.0 * half * s, 1.0 - s
+            else:  # an inverse parabola
+                r, q = g_b / g_c, g_a / g_c
+                p = s * (2.0 * half * q * (q - r) - (b - a) * (r - 1.0))
+                q = (q - 1.0) * (r - 1.0) * (s - 1.0)
+            p, q = (p, -q) if p > 0.0 else (-p, q)
+            if 2.0 * p < min(3.0 * half * q - abs(least * q), abs(before * q)):
+                step, before = p / q, step
+            else:
+                step = before = half
+        a, g_a = b, g_b
+        b += step if abs(step) > least else (least if half > 0.0 else -least)
+        g_b = g(b)
+        if (g_b > 0.0) == (g_c > 0.0):
+            c, g_c, step, before = a, g_a, b - a, b - a
+    return b
+
+
+def found(
+    events: list[Event], values: list[float], after: list[float], state: Callable[[float], Array], span: Any
+) -> float | None:
+    """Note the events of a step that goes over ``span``; the time at which the run ends by one of them, or None.
+
+    ``values`` are those of the event functions at its start, ``after`` those at its end, and ``state`` gives the state at a time
+    within it.
+    """
+    begin, end = span
+    zeros = []
+    for event, g_a, g_b in zip(events, values, after, strict=True):
+        if event.occurs(g_a, g_b):
+            t = root(lambda at, event=event: event.value(at, state(at)), begin, end, g_a, g_b)  # type: ignore[misc]
+            zeros.append((t, event))
+    zeros.sort(key=lambda each: each[0] if end > begin else -each[0])
+    for t, event in zeros:
+        event.count += 1
+        event.times.append(t)
+        event.states.append(state(t))
+        if event.count >= event.terminal:
+            return t
+    return None

@@ -1,0 +1,165 @@
+"""The adaptive steps of one trajectory one by one, and its states between them, for ``solve_ivp``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import _checks, _core, engine
+from .._checks import Array
+from ..errors import ArgumentError, ShapeError
+from ..methods import Method
+from ..reference import adaptive
+
+#: How many attempts at steps a run may make in one go: as many as are exact in the controller's numbers.
+MAX_ATTEMPTS = 2**53 - 1
+
+#: Why a run ended early, by the status of the core.
+FAILURES = {
+    adaptive.UNDERFLOW: "Required step size is less than spacing between numbers.",
+    adaptive.NOT_FINITE: "No step, however short, gives a finite state.",
+}
+
+
+class Trajectory:
+    """Steps of one trajectory, made one at a time; the time of the system grows, whatever the direction of the user's.
+
+    Attributes:
+        times: ends of the accepted steps, the start first.
+        states: the states there.
+        pace: where the step-size controller stands.
+        status: that of the core: ``adaptive.OK`` when the end was reached, ``adaptive.BUDGET`` before.
+        extra_steps: how many extra steps were made for states between the ends of steps.
+    """
+
+    def __init__(self, system: Any, method: Method, span: tuple[float, float], y: Array, tolerance: tuple[float, float]) -> None:
+        self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1)
+        self._model = engine.model(self._plan)
+        self._method, self.begin, self.end = method, *span
+        self._v = np.empty(0)
+        self.times, self.states = [span[0]], [y]
+        relative, absolute = (np.asarray(each) for each in tolerance)
+        self.pace: Any = engine.pace(self._plan, self._v, y, None, relative, absolute)
+        self.status = adaptive.BUDGET
+        self.extra_steps = 0
+
+    def limited(self, first_step: float | None, max_step: float) -> None:
+        """Set the step to try first, and the longest."""
+        first = self.pace.h if first_step is None else np.asarray(first_step)
+        # A step is limited where inputs change from sample to sample; here that is so for ever.
+        self.pace = self.pace._replace(
+            h=np.minimum(first, max_step),
+            interval=np.asarray(max_step),
+            until=np.asarray(np.inf if max_step < np.inf else -np.inf),
+        )
+
+    @property
+    def evaluations(self) -> int:
+        """Function evaluations so far."""
+        made = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
+        return self._method.attempt_evaluations * (int(made) + self.extra_steps)
+
+    def advance(self) -> bool:
+        """Make one step, after as many attempts as it takes; whether there was one."""
+        while self.status == adaptive.BUDGET:
+            accepted = float(self.pace.accepted)
+            attempts = int(accepted + self.pace.rejected) + 1
+            saved, last = self._made(self.pace, self.states[-1], np.array([self.end]), attempts)
+            if self.status == adaptive.OK:
+                self.times.append(self.end)
+                self.states.append(saved[0])
+                return True
+            if self.pace.accepted > accepted:
+                self.times.append(float(self.pace.t))
+                self.states.append(last)
+                return True
+        return False
+
+    def straight_to_the_end(self, times: Array) -> Array:
+        """The states at ascending times, the last of which is the end; as many as were reached."""
+        saved, _ = self._made(self.pace, self.states[-1], times, MAX_ATTEMPTS)
+        return saved[: len(times) if self.status == adaptive.OK else int((times <= float(self.pace.t)).sum())]
+
+    def state(self, t: float) -> Array:
+        """The state at one time."""
+        made: Array = self.at(np.array([t]))[:, 0]
+        return made
+
+    def at(self, times: Array) -> Array:
+        """The states at times from the start to the end of the steps so far, shape (numbers, times).
+
+        Each is computed by a step of the method from the end of the step before it, so its error is that of a shorter step.
+        """
+        made = np.empty((len(self.states[0]), len(times)))
+        if not len(times):
+            return made
+        ends = np.array(self.times)
+        steps = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
+        on_end = ends[steps] == times
+        for k in np.flatnonzero(on_end):
+            made[:, k] = self.states[steps[k]]
+        for i in np.unique(steps[~on_end]):
+            within = np.flatnonzero((steps == i) & ~on_end)
+            targets, places = np.unique(times[within], return_inverse=True)
+            made[:, within] = self._within(int(i), targets).T[:, places.reshape(-1)]
+        return made
+
+    def _within(self, i: int, times: Array) -> Array:
+        """The states at ascending times within a step, which the controller takes for one that passes them."""
+        longer = 2.0 * (times[-1] - self.times[i])
+        pace = self.pace._replace(t=self.times[i], h=longer, held=1.0, extra=0.0)
+        before = self.pace, self.status
+        saved, _ = self._made(pace, self.states[i], times, MAX_ATTEMPTS)
+        self.pace, self.status = before
+        self.extra_steps += len(times)
+        return saved
+
+    def _made(self, pace: Any, y: Array, times: Array, attempts: int) -> tuple[Array, Array]:
+        """Go on from a pace and a state: the states at the times, and the one where the controller stands then."""
+        n = len(y)
+        saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
+        last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
+        paces = np.array(pace, dtype=np.float64).reshape(engine.PACE_NUMBERS, 1)
+        last_paces = np.empty_like(paces)
+        arrays = engine.AdaptiveArrays(np.empty((0, 1)), y.reshape(n, 1), paces, saved_v, saved_y, last, last_paces, status)
+        _core.adapt(self._model, self._plan, engine.Pacing(times, attempts), arrays)
+        self.pace, self.status = adaptive.Pace(*last_paces.reshape(-1)), int(status[0])
+        return saved_y, last.reshape(n)
+
+
+class Solution:
+    """The states of a trajectory at any time between its ends: ``sol`` of ``solve_ivp``.
+
+    Called with a time it returns the state, shape (n,); with times along one axis, their states, shape (n, times). Each is made
+    by one step of the method, from the end of the step before it: so many function evaluations more, and the error of a shorter
+    step.
+
+    Attributes:
+        ts: the ends of the steps, in the direction of the run.
+        t_min: the earliest of them.
+        t_max: the latest.
+        n_segments: the number of steps.
+    """
+
+    def __init__(self, trajectory: Trajectory, ts: Array, sign: float) -> None:
+        self._trajectory, self._sign = trajectory, sign
+        self.ts = ts
+        self.t_min, self.t_max = float(ts.min()), float(ts.max())
+        self.n_segments = len(ts) - 1
+
+    def __call__(self, t: Any) -> Array:
+        """The states at these times."""
+        times = _checks.numbers("t", t, unit="units of time")
+        if times.ndim > 1:
+            raise ShapeError(f"t: expected a time, or times along one axis, got shape {times.shape}")
+        if times.size and not (self.t_min <= times.min() and times.max() <= self.t_max):
+            raise ArgumentError(
+                f"t: expected times from {self.t_min:g} to {self.t_max:g}, between which there are steps, got {times.min():g} to "
+                f"{times.max():g}"
+            )
+        states = self._trajectory.at(self._sign * times.reshape(-1))
+        return states if times.ndim else states[:, 0]
+
+    def __repr__(self) -> str:
+        return f"<states of {self.n_segments} steps from t = {self.ts[0]:g} to {self.ts[-1]:g}>"

@@ -1,0 +1,262 @@
+"""A run as named arrays and a description in JSON, and back: nothing in a file is code, and reading it runs none.
+
+Only objects of the kinds listed here are made. A function is never stored: an own system is saved as the name of its function and
+a digest of its operations, and the function must be there when the file is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from .. import _core, _encounters, engine
+from .._value import Fixed, FixedDict
+from ..control import Projection
+from ..equations.definition import Definition
+from ..equations.trace import Equations
+from ..errors import ArgumentError
+from ..events.result import Occurrences
+from ..integrate import _collision
+from ..methods import Method
+from ..methods import method as find_method
+from ..reference.traced import Tracer
+from ..result import Run
+from ..systems import System
+from ..systems.own import OwnSystem
+
+Arrays = dict[str, Any]
+
+#: What goes through the steps of a run again, under the names of its attributes; see ``Run``.
+RERUNS: dict[str, Callable[..., Any]] = {
+    "collision": _collision,
+    "encounter": _encounters.of_member,
+    "overshoots": _encounters.overshoots,
+}
+
+#: The first key of an object of JSON tells what it stands for.
+KIND = "is"
+
+
+def kinds(base: type[Any] = Fixed) -> dict[str, type[Any]]:
+    """Classes of stepwell below one, by name: below ``Fixed`` there are systems, controls, surfaces and inputs."""
+    from ..systems import aircraft as aircraft  # imported only when used, but a file may name it
+
+    found, todo = {}, [base]
+    while todo:
+        for each in todo.pop().__subclasses__():
+            todo.append(each)
+            if each.__module__.partition(".")[0] == "stepwell":
+                found[each.__name__] = each
+    return found
+
+
+class Writer:
+    """Takes a run apart; ``arrays`` is filled meanwhile."""
+
+    def __init__(self) -> None:
+        self.arrays: Arrays = {}
+        self._known: dict[tuple[Any, ...], tuple[str, Any]] = {}
+
+    def text(self, run: Run) -> str:
+        """The description of a run in JSON."""
+        parts = {name: self._part(value, name) for name, value in vars(run).items()}
+        return json.dumps(parts, ensure_ascii=False)
+
+    def _part(self, value: Any, name: str) -> Any:
+        if value is None or isinstance(value, (bool, str)) or type(value) in (int, float):
+            return value
+        match value:
+            case np.ndarray():
+                return self._array(value, name)
+            case np.generic():
+                return {KIND: "scalar", "array": self._array(value, name)}
+            case np.dtype():
+                return {KIND: "dtype", "name": value.str}
+            case Method():
+                return {KIND: "method", "name": value.name}
+            case Definition():
+                return {KIND: "function", "module": value.__module__, "name": value.__qualname__}
+            case Equations():
+                parts = {key: each for key, each in vars(value).items() if not key.startswith("_")}
+                return {KIND: "equations", "parts": self._parts(parts, name)}
+            case bytes():
+                return {KIND: "bytes", "hex": value.hex()}
+            case list():
+                return {KIND: "list", "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value)]}
+            case Occurrences():
+                return {KIND: "occurrences", "parts": self._parts(vars(value), name)}
+            case partial():
+                (kind,) = (key for key, function in RERUNS.items() if function is value.func)
+                return {
+                    KIND: "rerun",
+                    "of": kind,
+                    "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value.args)],
+                }
+            case tuple() if type(value) is not tuple:
+                fields = dict(zip(type(value)._fields, value, strict=True))  # type: ignore[attr-defined]  # a named tuple
+                if isinstance(value, engine.Plan):
+                    fields |= {"progress": None, "watched": None}  # the one was shown, and the other looked for
+                return {KIND: type(value).__name__, "parts": self._parts(fields, name)}
+            case tuple():
+                return {KIND: "tuple", "items": [self._part(each, f"{name}.{i}") for i, each in enumerate(value)]}
+            case dict():
+                kind = "parameters" if isinstance(value, FixedDict) else "dict"
+                return {KIND: kind, "parts": self._parts(value, name)}
+            case Fixed():
+                return self._fixed(value, name)
+            case _ if callable(value):
+                return {KIND: "of time", "name": name.rpartition(".")[2]}
+        raise ArgumentError(f"run: expected one that can be saved, got {type(value).__name__} in {name}")
+
+    def _parts(self, values: dict[str, Any], name: str) -> dict[str, Any]:
+        return {key: self._part(each, f"{name}.{key}") for key, each in values.items()}
+
+    def _fixed(self, value: Fixed, name: str) -> Any:
+        state: Any = value.__getstate__()
+        if type(value) not in kinds().values():
+            raise ArgumentError(f"run: expected a system of stepwell, or of your own equations, got {type(value).__name__}")
+        made = {KIND: type(value).__name__, "parts": self._parts(state, name)}
+        if isinstance(value, OwnSystem) and not value.definition.__module__.startswith("stepwell."):
+            made["operations"] = digest(value)
+        return made
+
+    def _array(self, value: Any, name: str) -> Any:
+        """An array under the name of its place; one that is already there, and one that repeats itself, takes no more room."""
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf":
+            raise ArgumentError(f"run: expected numbers, got an array of dtype {array.dtype} in {name}")
+        key = (array.__array_interface__["data"][0], array.shape, array.strides, array.dtype.str)
+        if key not in self._known:
+            self._known[key] = name, array  # which keeps its memory, so that no other array can have its address
+            once = tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)
+            self.arrays[name] = array[once] if array.size else array
+        made: dict[str, Any] = {KIND: "array", "of": self._known[key][0]}
+        if self.arrays[made["of"]].shape != array.shape:
+            made["over"] = list(array.shape)
+        return made
+
+
+class Reader:
+    """Puts a run together again. ``system`` is what the caller gave for functions that are not found by name."""
+
+    def __init__(self, arrays: Arrays, system: Any = None) -> None:
+        self.arrays, self.system = arrays, system
+        self._kinds, self._tuples = kinds(), kinds(tuple)
+
+    def run(self, text: str) -> Run:
+        """The run that a description tells of."""
+        run = Run.__new__(Run)
+        vars(run).update({name: self._whole(part) for name, part in json.loads(text).items()})
+        return run
+
+    def _whole(self, part: Any) -> Any:
+        if isinstance(part, list):
+            return [self._whole(each) for each in part]
+        if not isinstance(part, dict):
+            return part
+        parts = {key: self._whole(each) for key, each in part.get("parts", {}).items()}
+        match part[KIND]:
+            case "array":
+                array = self.arrays[part["of"]]
+                return np.broadcast_to(array, part["over"]) if "over" in part else array
+            case "scalar":
+                return self._whole(part["array"])[()]
+            case "dtype":
+                return np.dtype(part["name"])
+            case "method":
+                return find_method(part["name"])
+            case "function":
+                return self._definition(part["module"], part["name"])
+            case "of time":
+                return self._of_time(part["name"])
+            case "bytes":
+                return bytes.fromhex(part["hex"])
+            case "list":
+                return self._whole(part["items"])
+            case "tuple":
+                return tuple(self._whole(part["items"]))
+            case "dict":
+                return parts
+            case "parameters":
+                return FixedDict(parts)
+            case "occurrences":
+                return Occurrences(**parts)
+            case "rerun":
+                return partial(RERUNS[part["of"]], *self._whole(part["items"]))
+            case "equations":
+                made = Equations(*(parts.pop(key) for key in ("definition", "v_shape", "y_shape", "own_shapes")))
+                vars(made).update(parts)
+                return made
+            case kind if kind in self._tuples:
+                return self._tuples[kind](**parts)
+            case kind:
+                one = object.__new__(self._kinds[kind])
+                one.__setstate__(parts)
+                if "operations" in part:
+                    self._check(one, part["operations"])
+                return one
+
+    def _definition(self, module: str, name: str) -> Definition:
+        """The kind of system that was given, or else the one of that name, in a module that is imported already."""
+        if isinstance(self.system, Definition):
+            return self.system
+        if isinstance(self.system, OwnSystem):
+            return self.system.definition
+        if module.startswith("stepwell."):
+            kinds()
+        found: Any = sys.modules.get(module)
+        for each in name.split("."):
+            found = vars(found).get(each) if hasattr(found, "__dict__") else None
+        if not isinstance(found, Definition):
+            raise ArgumentError(
+                f"system: the run is of equations of your own, {module}.{name}, which are not in the file and not imported; give "
+                f"them, system={name.rpartition('.')[2]}"
+            )
+        return found
+
+    def _of_time(self, name: str) -> Any:
+        given = self.system.parameters_given if isinstance(self.system, OwnSystem) else {}
+        if not callable(given.get(name)):
+            raise ArgumentError(
+                f"system: the parameter {name} of the run is a function of the time, which is not in the file; give the system "
+                f"with it, system=…({name}=…)"
+            )
+        return given[name]
+
+    def _check(self, system: Any, operations: str) -> None:
+        if digest(system) != operations:
+            raise ArgumentError(
+                f"system: {system.definition.name} makes other operations now than when the run was saved, so it is another "
+                f"system, or another version of stepwell; the numbers of the file are found by their names, with numpy.load "
+                f"or zarr.open"
+            )
+
+
+def digest(system: OwnSystem) -> str:
+    """What the operations of an own system are known by: of its rates, its invariants, and the gradient of one that is kept."""
+    known: Any = system if system.equations is not None else system.sized()
+    from .._value import changed
+
+    tape = _core.Tape()
+    tracer = Tracer(changed(known, control=None), tape)
+    v, y, _ = tracer.state()
+    s = tracer.scaled(tape.step())
+    values = tracer.flat(*s.rates(tape.time(), v, y))
+    for name in known.quantities:
+        values += tracer.flat(s.record(name, v, y))
+    if isinstance(known.keeper, Projection):
+        values += tracer.flat(*s.gradient(v, y))
+    return hashlib.sha256(repr(tape.operations(values)).encode()).hexdigest()
+
+
+def is_whole(run: Run) -> None:
+    """Raise if parts of a run do not fit together, as those that another version wrote may not."""
+    system: System = run.system
+    repr(run)
+    system.all_given(run.status.shape)

@@ -1,0 +1,162 @@
+"""Runs in files: ``Run.save`` and ``stepwell.load``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+import numpy as np
+
+from .. import _checks, _core
+from ..errors import ArgumentError, DTypeError, StepwellError
+from .missing import imported
+from .parts import Arrays, Reader, Writer, is_whole
+
+if TYPE_CHECKING:
+    from ..result import Run
+
+#: Endings of files that hold a run.
+ENDINGS = (".npz", ".zarr")
+
+#: Under this name a file has the description of the run, and under the other the version of its form.
+ABOUT, FORM = "stepwell", "stepwell_form"
+
+#: The version of the form of files; one that is read has the same.
+VERSION = 1
+
+
+def save(run: Run, path: str | Path) -> None:
+    """Write a run to a file; see ``Run.save``."""
+    place = _place(path)
+    writer = Writer()
+    text = writer.text(run)
+    # Written beside the file and then put in its place, so that a stop in between loses nothing.
+    beside = place.with_name(f"{place.stem}.{uuid4().hex}{place.suffix}")
+    if place.suffix == ".npz":
+        _checks.file("path", place)
+        try:
+            with beside.open("xb") as file:
+                about = {ABOUT: np.array(text), FORM: np.array([VERSION]), "stepwell_version": np.array(_core.__version__)}
+                np.savez(file, **about, **writer.arrays)  # type: ignore[arg-type]  # NumPy's stubs mean one of its options
+            beside.replace(place)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+        return
+    zarr = imported("zarr", "save")
+    _checks.folder("path", place.parent)
+    if (replaced := place.exists()) and not _is_ours(zarr, place):
+        raise ArgumentError(f"path: expected a new folder, or one with a saved run, got {_checks.short(str(path))}")
+    try:
+        group = zarr.open_group(str(beside), mode="w")
+        for name, array in writer.arrays.items():
+            # A chunk that is zero is left out by default, and then a −0 in it is lost.
+            made = group.create_array(name, shape=array.shape, dtype=array.dtype, config={"write_empty_chunks": True})
+            made[...] = array
+        group.attrs.update({ABOUT: text, FORM: VERSION, "stepwell_version": _core.__version__})
+        if replaced:
+            place.replace(old := place.with_name(f"{place.stem}.{uuid4().hex}.old"))
+        beside.replace(place)
+    except BaseException:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
+    if replaced:
+        shutil.rmtree(old)
+
+
+def load(path: str | Path, *, system: Any = None) -> Run:
+    """Read a run from a file that ``Run.save`` wrote; it is equal to the run that was saved, bit for bit, and goes on as it.
+
+    No code is read: not even a damaged or malicious file can run any. What a run of your own equations needs beside the file is
+    their function.
+
+    Args:
+        path: the file, ending in .npz, or the folder, ending in .zarr.
+        system: for a run of your own equations, what ``stepwell.system`` made of their function; where a parameter is a function
+            of the time, the system with it. Not needed if the function stands, under the same name, in a module that is imported.
+
+    Returns:
+        The ``Run``.
+
+    Raises:
+        ArgumentError: if there is no such file; if it holds no run; if the function is missing, or makes other operations than
+            when the run was saved.
+        UnsupportedError: if the file ends in .zarr and zarr is not installed.
+
+    Example:
+        >>> chain = sw.Chain(10)
+        >>> half = sw.integrate(chain, "verlet", v=1.0, y=0.0, dt=0.1, steps=40)
+        >>> half.save("half.npz")
+        >>> half = sw.load("half.npz")
+        >>> rest = sw.integrate(half.system, half.method, steps=60, **half.resume)
+        >>> whole = sw.integrate(chain, "verlet", v=1.0, y=0.0, dt=0.1, steps=100)
+        >>> np.array_equal(rest.y, whole.y)
+        True
+    """
+    place = _place(path)
+    arrays, text = _from_npz(place) if place.suffix == ".npz" else _from_zarr(place)
+    try:
+        run = Reader(arrays, system).run(text)
+        is_whole(run)
+    except StepwellError:
+        raise
+    except Exception as error:
+        raise ArgumentError(
+            f"path: expected a run that stepwell {_core.__version__} can read, got {_checks.short(str(path))}, which another "
+            f"version wrote or which is damaged ({type(error).__name__}: {error})"
+        ) from None
+    return run
+
+
+def _place(path: Any) -> Path:
+    if not isinstance(path, (str, os.PathLike)):
+        raise DTypeError(f"path: expected the path of a file, got {_checks.short(path)} ({type(path).__name__})")
+    place = Path(os.fsdecode(path))
+    if place.suffix not in ENDINGS:
+        raise ArgumentError(f"path: expected a file ending in {' or '.join(ENDINGS)}, got {_checks.short(str(path))}")
+    return place
+
+
+def _no_run(place: Path, why: object) -> ArgumentError:
+    return ArgumentError(f"path: expected a run that was saved, got {_checks.short(str(place))}: {why}")
+
+
+def _from_npz(place: Path) -> tuple[Arrays, str]:
+    try:
+        with np.load(place, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except Exception as error:  # what NumPy and zipfile raise of a damaged file is of many kinds
+        raise _no_run(place, getattr(error, "strerror", None) or error) from None
+    if ABOUT not in arrays or FORM not in arrays:
+        raise _no_run(place, "it has arrays, and nothing that tells of a run")
+    return arrays, _current(place, arrays[ABOUT].item(), int(arrays[FORM].reshape(-1)[0]))
+
+
+def _from_zarr(place: Path) -> tuple[Arrays, str]:
+    zarr = imported("zarr", "load")
+    try:
+        group = zarr.open_group(str(place), mode="r")
+        arrays = {name: np.asarray(each[...]) for name, each in group.arrays()}
+        about = dict(group.attrs)
+    except Exception as error:
+        raise _no_run(place, error) from None
+    if ABOUT not in about or FORM not in about:
+        raise _no_run(place, "it has arrays, and nothing that tells of a run")
+    return arrays, _current(place, str(about[ABOUT]), int(about[FORM]))
+
+
+def _current(place: Path, text: str, version: int) -> str:
+    if version != VERSION:
+        raise _no_run(place, f"its form is version {version}, and this stepwell reads version {VERSION}")
+    return text
+
+
+def _is_ours(zarr: Any, place: Path) -> bool:
+    """Whether a folder holds a run, so that another may take its place."""
+    try:
+        return ABOUT in zarr.open_group(str(place), mode="r").attrs
+    except Exception:  # anything else that is there is not touched
+        return False

@@ -1,0 +1,386 @@
+"""Taylor series of the solution of a system, order after order: the specification of the core's ``series.rs``.
+
+The rates are run once, with numbers that remember how they were made. From these operations and the coefficients of the state up
+to order k follow those of the rates, and from these the coefficients k + 1 of the state, by the recurrences of Jorba and Zou
+(Experimental Mathematics 14 (2005) 99). Sums over products begin with the terms that are known longest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .marks import Mark
+
+#: A coefficient; None if it is known to be zero.
+Term = Any
+
+
+class Book:
+    """The numbers that change with time, each after those that it is made of, and the functions among them."""
+
+    def __init__(self) -> None:
+        self.made: list[Series] = []
+        self.functions: dict[Any, Series] = {}
+
+    def advance(self, k: int) -> None:
+        """The coefficients of order k of all, from those of lower orders and that of the state. Derivatives of functions join."""
+        i = 0
+        while i < len(self.made):
+            each = self.made[i]
+            if k > 0 and each.rule is not None:
+                each.terms.append(each.rule(k))
+            i += 1
+
+
+class Series:
+    """A number that changes with time, by the coefficients of its Taylor series that are known so far.
+
+    Attributes:
+        book: where it stands.
+        terms: the coefficients, in powers of the share of the step.
+        rule: gives the coefficient of an order above 0; None for the state and the time, which are told theirs.
+        opposite: the series of which it is the negative.
+    """
+
+    __slots__ = ("book", "opposite", "rule", "terms")
+
+    def __init__(self, book: Book, start: Any, rule: Callable[[int], Term] | None, opposite: Series | None = None) -> None:
+        self.book, self.terms, self.rule, self.opposite = book, [start], rule, opposite
+        book.made.append(self)
+
+    def __add__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        if not isinstance(other, Series):
+            return self if _is(other, -0.0) else Series(self.book, self.terms[0] + other, self.terms.__getitem__)
+        if other.opposite is not None:
+            return self - other.opposite
+        if self.opposite is not None:
+            return other - self.opposite
+        return Series(self.book, self.terms[0] + other.terms[0], lambda k: _sum(self.terms[k], other.terms[k]))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        if not isinstance(other, Series):
+            return self if _is(other, 0.0) else Series(self.book, self.terms[0] - other, self.terms.__getitem__)
+        if other.opposite is not None:
+            return self + other.opposite
+        return Series(self.book, self.terms[0] - other.terms[0], lambda k: _difference(self.terms[k], other.terms[k]))
+
+    def __rsub__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        if self.opposite is not None:
+            return self.opposite + other
+        return -self if _is(other, -0.0) else Series(self.book, other - self.terms[0], lambda k: _difference(None, self.terms[k]))
+
+    def __mul__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        if self.opposite is not None:
+            return -(self.opposite * other)
+        if not isinstance(other, Series):
+            if _is(other, 1.0):
+                return self
+            return (
+                -self if _is(other, -1.0) else Series(self.book, self.terms[0] * other, lambda k: _product(self.terms[k], other))
+            )
+        if other.opposite is not None:
+            return -(self * other.opposite)
+        return Series(self.book, self.terms[0] * other.terms[0], lambda k: _convolved(self.terms, other.terms, k))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        if isinstance(other, Series):
+            return _quotient(self.terms[0] / other.terms[0], self.terms.__getitem__, other)
+        if _is(other, 1.0):
+            return self
+        return Series(self.book, self.terms[0] / other, lambda k: None if self.terms[k] is None else self.terms[k] / other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else _quotient(other / self.terms[0], lambda k: None, self)
+
+    def __neg__(self) -> Series:
+        if self.opposite is not None:
+            return self.opposite
+        return Series(self.book, -self.terms[0], lambda k: _difference(None, self.terms[k]), self)
+
+    def __pos__(self) -> Series:
+        return self
+
+    def sqrt(self) -> Series:
+        """√x: from y² = x."""
+        start = self.terms[0]
+        root = start.sqrt() if hasattr(start, "sqrt") else np.sqrt(start)
+        over: list[Any] = []
+
+        def rule(k: int) -> Term:
+            if not over:
+                over.append(0.5 / root)
+            pairs = None
+            for j in range((k + 1) // 2 - 1, 0, -1):
+                pairs = _sum(pairs, _product(made.terms[j], made.terms[k - j]))
+            twice = _sum(pairs, pairs)
+            middle = None if k % 2 else _product(made.terms[k // 2], made.terms[k // 2])
+            rest = _difference(self.terms[k], _sum(middle, twice))
+            return None if rest is None else rest * over[0]
+
+        made = Series(self.book, root, rule)
+        return made
+
+    def __lt__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, self.terms[0] < _start(other))
+
+    def __le__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, self.terms[0] <= _start(other))
+
+    def __gt__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, _start(other) < self.terms[0])
+
+    def __ge__(self, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, _start(other) <= self.terms[0])
+
+    def equals(self, other: Any) -> Truth:
+        """Whether both are equal at the start of the step."""
+        start, other = self.terms[0], _start(other)
+        return Truth(self.book, start.equals(other) if hasattr(start, "equals") else np.equal(start, other))
+
+    def __bool__(self) -> bool:
+        raise TypeError("a series has no truth value")
+
+
+class Truth:
+    """The result of a comparison at the start of the step, which holds for all of it."""
+
+    __slots__ = ("book", "value")
+
+    def __init__(self, book: Book, value: Any) -> None:
+        self.book, self.value = book, value
+
+    def choose(self, yes: Any, no: Any) -> Any:
+        """One of two numbers."""
+        if yes is no:
+            return yes
+
+        def rule(k: int) -> Term:
+            terms = [each.terms[k] if isinstance(each, Series) else None for each in (yes, no)]
+            if terms[0] is None and terms[1] is None:
+                return None
+            return self._one_of(*(0.0 if term is None else term for term in terms))
+
+        return Series(self.book, self._one_of(_start(yes), _start(no)), rule)
+
+    def _one_of(self, yes: Any, no: Any) -> Any:
+        return self.value.choose(yes, no) if hasattr(self.value, "xor_bits") else (yes if self.value else no)
+
+    def __and__(self, other: Any) -> Truth:
+        return Truth(self.book, self.value & _held(other))
+
+    def __or__(self, other: Any) -> Truth:
+        return Truth(self.book, self.value | _held(other))
+
+    def __invert__(self) -> Truth:
+        return Truth(self.book, ~self.value)
+
+    __rand__, __ror__ = __and__, __or__
+
+
+def _held(truth: Any) -> Any:
+    return truth.value if isinstance(truth, Truth) else truth
+
+
+def _start(x: Any) -> Any:
+    """A number at the start of the step."""
+    return x.terms[0] if isinstance(x, Series) else x
+
+
+def at_start(x: Any) -> Any:
+    """Numbers at the start of the step, in an array if they are in one."""
+    if isinstance(x, Series):
+        return x.terms[0]
+    if not among((x,)):
+        return x
+    numbers = [_start(each) for each in x.flat]
+    return _filled(numbers, x.shape)
+
+
+def among(given: Sequence[Any]) -> bool:
+    """Whether any of these is a series, or an array with one."""
+    return any(
+        isinstance(each, Series)
+        or (isinstance(each, np.ndarray) and each.dtype == object and any(isinstance(item, Series) for item in each.flat))
+        for each in given
+    )
+
+
+def _is(x: Any, number: float) -> bool:
+    """Whether x is this number, its sign included."""
+    return isinstance(x, (float, int)) and float(x).hex() == number.hex()
+
+
+def _sum(a: Term, b: Term) -> Term:
+    if a is None or b is None:
+        return b if a is None else a
+    return a + b
+
+
+def _difference(a: Term, b: Term) -> Term:
+    if a is None or b is None:
+        return a if b is None else -b
+    return a - b
+
+
+def _product(a: Term, b: Term) -> Term:
+    return None if a is None or b is None else a * b
+
+
+def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
+    """Σ aⱼ·bₖ₋ⱼ: pairs of terms, the newest last."""
+    total = None if k % 2 else _product(a[k // 2], b[k // 2])
+    for j in range((k + 1) // 2 - 1, -1, -1):
+        total = _sum(total, _sum(_product(a[j], b[k - j]), _product(a[k - j], b[j])))
+    return total
+
+
+def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series) -> Series:
+    """C = a/b: from c·b = a."""
+    over: list[Any] = []
+
+    def rule(k: int) -> Term:
+        if not over:
+            over.append(1.0 / divisor.terms[0])
+        known = None
+        for j in range(1, k + 1):
+            known = _sum(known, _product(divisor.terms[j], made.terms[k - j]))
+        rest = _difference(dividend(k), known)
+        return None if rest is None else rest * over[0]
+
+    made = Series(divisor.book, start, rule)
+    return made
+
+
+def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any], given: Sequence[Any]) -> Any:
+    """A marked function of series, number by number. ``plain`` is the function itself, ``of_numbers`` notes its marks."""
+    if any(isinstance(each, np.ndarray) for each in given):
+        return np.frompyfunc(lambda *each: function(name, of_numbers, plain, each), len(given), 1)(*given)
+    book = next((each.book for each in given if isinstance(each, Series)), None)
+    if book is None:
+        return of_numbers(*given)
+    key = name, *(id(each) if isinstance(each, Series) else each for each in given)
+    if key not in book.functions:
+        start = np.asarray(of_numbers(*map(_start, given)))[()]
+        book.functions[key] = of_function(Mark(name, tuple(given), plain), start, book)
+    return book.functions[key]
+
+
+def has_rule(mark: Mark) -> bool:
+    """Whether a marked value is treated as a function. Roots and squares are operations like others."""
+    from ..derivatives import rules  # which differentiate with the functions of this package
+
+    return mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square")
+
+
+def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
+    """The derivatives of a function by its arguments, as symbols or as series; None for those that are not wanted or zero.
+
+    That of xᵖ by x is p·xᵖ/x here, which needs no further power.
+    """
+    from ..derivatives import rules
+
+    if mark.name != "power":
+        return rules.of_function(mark, value, wanted)
+    x, p = mark.arguments
+    by_exponent = value * rules.function("log", mark.function)(x) if wanted[1] else None
+    return p * (value / x) if wanted[0] else None, by_exponent
+
+
+def operation(book: Book, name: str, of: list[Any], given: int) -> Any:
+    """An operation of a tape, on series and numbers."""
+    from .fused import MEANING
+    from .replayed import OF_SYMBOLS
+
+    if not any(isinstance(each, (Series, Truth)) for each in of):
+        if any(hasattr(each, "xor_bits") for each in of):
+            return OF_SYMBOLS[name](*of)
+        return np.asarray(MEANING[name](*of, given))[()]
+    if name == "choose" and not isinstance(of[0], Truth):
+        return Truth(book, of[0]).choose(*of[1:])
+    if name == "exclusive or":
+        return ~of[0] if isinstance(of[0], Truth) else ~of[1]
+    return OF_SYMBOLS[name](*of)
+
+
+def of_function(mark: Mark, start: Any, book: Book) -> Series:
+    """Y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + …. ``start`` is y at the start of the step."""
+    by: list[Any] = []
+
+    def rule(k: int) -> Term:
+        if not by:
+            by.extend(factors(mark, made, [isinstance(each, Series) for each in mark.arguments]))
+        total = None
+        for argument, factor in zip(mark.arguments, by, strict=True):
+            for j in range(1, k + 1) if factor is not None else ():
+                slope = _product(float(j), argument.terms[j])
+                of_factor = factor.terms[k - j] if isinstance(factor, Series) else (factor if j == k else None)
+                total = _sum(total, _product(slope, of_factor))
+        return None if total is None else (1.0 / k) * total
+
+    made = Series(book, start, rule)
+    return made
+
+
+def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tuple[Any, Any]]:
+    """The Taylor coefficients of v and y around t, from the first to that order, in powers of the share of the step h."""
+    book = Book()
+    v, y = np.asarray(v), np.asarray(y)
+    blocks = [_filled([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
+    # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
+    each_its_own = np.broadcast_arrays(t, h)[0] if np.ndim(h) else t
+    times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(each_its_own)
+    lengths = [(each, length) for each, length in np.broadcast(times, h)]
+    rates = s.dv(times, *blocks), s.dy(times, *blocks)
+    seeds = [each for block in blocks for each in block.flat]
+    found = [
+        each for rate, block in zip(rates, blocks, strict=True) for each in np.broadcast_to(_objects(rate), block.shape).flat
+    ]
+    zero = t.number(0.0) if hasattr(t, "number") else 0.0
+    made = []
+    for k in range(order):
+        book.advance(k)
+        terms = []
+        for seed, rate in zip(seeds, found, strict=True):
+            known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
+            terms.append(known if known is None or k == 0 else (1.0 / (k + 1)) * known)
+            seed.terms.append(terms[-1])
+        for time, length in lengths:
+            time.terms.append(length if k == 0 else None)
+        numbers = [zero if term is None else term for term in terms]
+        made.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
+    return made
+
+
+def _objects(x: Any) -> Any:
+    """An array of objects."""
+    if isinstance(x, np.ndarray):
+        return x
+    made = np.empty((), dtype=object)
+    made[()] = x
+    return made
+
+
+def _filled(numbers: list[Any], shape: tuple[int, ...]) -> Any:
+    """An array of that shape: of objects, unless all are numbers."""
+    if all(isinstance(each, (float, complex, np.number)) for each in numbers):
+        return np.array(numbers, dtype=np.result_type(np.float64, *{type(each) for each in numbers})).reshape(shape)
+    made = np.empty(len(numbers), dtype=object)
+    made[:] = numbers
+    return made.reshape(shape)

@@ -1,0 +1,9 @@
+"""Ensembles: ``sweep``, samples for its axes, and what can be kept of each member."""
+
+from .crossings import Crossing, Period
+from .ensemble import sweep
+from .exponents import Exponents
+from .outcomes import Extremes, Function, History, Last, Mean
+from .samples import random, sobol
+
+__all__ = ["Crossing", "Exponents", "Extremes", "Function", "History", "Last", "Mean", "Period", "random", "sobol", "sweep"]

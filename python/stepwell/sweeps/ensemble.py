@@ -1,0 +1,296 @@
+"""``sweep``: an ensemble of runs, and what is kept of each, as a labelled array."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import _checks
+from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError
+from ..methods import Method
+from ..methods import method as find_method
+from ..systems import System
+from .axes import OF_THE_RUN, Chunk, Grid
+from .axes import grid as a_grid
+from .crossings import Crossing, Period
+from .description import layout_of
+from .engines import Engine
+from .exponents import Exponents
+from .extras import need
+from .layout import named_units
+from .outcomes import Extremes, Function, History, Last, Mean, Outcome
+from .stores import Memory, Zarr, store_of
+from .task import Done, Task, probed
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..control import AnyControl
+
+#: Outcomes by word.
+WORDS: dict[str, type[Outcome]] = {
+    "last": Last,
+    "extremes": Extremes,
+    "mean": Mean,
+    "crossing": Crossing,
+    "period": Period,
+    "lyapunov": Exponents,
+    "history": History,
+}
+#: Default of ``memory``, in bytes.
+MEMORY = 64 * 2**20
+#: Most members of a chunk by default: enough that a call costs little beside their steps.
+MAX_MEMBERS = 1 << 14
+#: Members are divided into so many chunks for each worker, or more, as long as each has so many members.
+CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
+
+
+def sweep(
+    system: System | Callable[..., System],
+    axes: Mapping[str, Any],
+    method: str | Method,
+    *,
+    v: Any = None,
+    y: Any = None,
+    dt: float | None = None,
+    steps: int,
+    transient: int = 0,
+    outcomes: Any = None,
+    every: int | None = None,
+    observe: int = 1,
+    control: AnyControl | None = None,
+    force: Any = None,
+    fused: bool = False,
+    t0: float = 0.0,
+    start: str | None = None,
+    units: Mapping[str, str] | None = None,
+    store: Any = None,
+    engine: Any = None,
+    threads: int | None = None,
+    chunk: int | None = None,
+    memory: float = MEMORY,
+    progress: bool = False,
+) -> xarray.Dataset:
+    """Run an ensemble, and keep of each member what was asked for, in an array with named dimensions.
+
+    Members are computed in chunks, on all cores, in other processes or on a cluster. What is found of a member is the same to the
+    last bit on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not
+    stored, unless ``every`` asks for them. Needs ``pip install "stepwell[sweep]"``.
+
+    Args:
+        system: a system; or what makes one of parameters by name: a class such as ``Oscillator``, your own equations, a function,
+            or ``functools.partial`` of any of them.
+        axes: what varies, by the name of the argument: a parameter of the system, or ``y``, ``v``, ``dt`` or ``force``. Each is
+            (dimension, values) or (dimension, values, attributes), as in xarray, or values alone, whose dimension has the name of
+            the argument. Those of one dimension vary together; different dimensions are multiplied. The dimension is the last
+            axis of the values; axes before it are those of the argument. ``stepwell.sweeps.random`` and ``sobol`` make samples.
+        method: its name, or what ``stepwell.method`` returns.
+        v: velocity block at the start, the same for all members.
+        y: coordinate block at the start, likewise.
+        dt: the step, in units of time, above zero.
+        steps: number of steps that are observed, one or more.
+        transient: number of steps before those, of which nothing is kept.
+        outcomes: what to keep of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
+            "history"; the classes of ``stepwell.sweeps`` of these names, with arguments; or a function of the ``Run`` of a chunk.
+            "last" if None, or with ``every``, "history". How a member ended, ``status`` and ``first_bad_step``, is always kept.
+        every: steps between the states of a history, or of the runs that functions are given.
+        observe: steps between the states that reductions see. What happens in between is not seen.
+        control: as for ``integrate``, the same for all members.
+        force: likewise.
+        fused: likewise.
+        t0: time of step 0.
+        start: likewise.
+        units: words for "t", "v", "y", parameters and results, by name; they become attributes.
+        store: a path ending in .zarr or .nc. Every finished chunk is written there, and a sweep that was interrupted goes on
+            where it stopped when it is called again. Then the results need not fit in memory. None for memory.
+        engine: None for threads of this process, an ``Executor`` of ``concurrent.futures``, or a ``dask.distributed.Client``.
+        threads: how many threads, without an engine; None for as many as there are cores.
+        chunk: most members of a chunk; None for as many as ``memory`` allows, up to 16384.
+        memory: how many bytes a chunk may take while it is computed. As many chunks are computed at once as there are workers.
+        progress: show a progress bar, in a terminal or in a notebook.
+
+    Returns:
+        An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
+
+    Raises:
+        ArgumentError: before any work: what was given and what was expected.
+        UnsupportedError: if the method cannot do the system, or a package is missing.
+        KeyboardInterrupt: at Ctrl-C. The store has all chunks that were finished.
+
+    Warns:
+        DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
+        AccuracyWarning: if numbers are finite and mean nothing. Encounters of bodies are not searched for here.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0, 4.0]), "y": ("y0", [0.5, 1.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, dt=0.01, steps=1000, outcomes=["extremes", "period"])
+        >>> found.y_period.dims, found.y_period.sel(omega=2.0).values.round(6)
+        (('omega', 'y0'), array([3.141593, 3.141593]))
+    """
+    need("xarray")
+    grid, how, named = a_grid(axes), find_method(method), named_units(units)
+    fixed = {"v": v, "y": y, "dt": dt, "force": force}
+    varied = {axis.argument for axis in grid.axes}
+    _fits_axes(system, varied, fixed)
+    if dt is not None:
+        fixed["dt"] = _checks.number("dt", dt, positive=True, unit="units of time")
+    given = {name: value for name, value in fixed.items() if value is not None}
+    given |= {"t0": _checks.number("t0", t0, unit="units of time"), "fused": _checks.flag("fused", fused), "threads": 1}
+    given |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
+    every = None if every is None else _checks.count("every", every, 1)
+    task = Task(
+        system=system,
+        method=how.name,
+        given=given,
+        transient=_checks.count("transient", transient, 0),
+        steps=_checks.count("steps", steps, 1),
+        observe=_checks.count("observe", observe, 1),
+        every=every,
+        outcomes=_outcomes(outcomes, every),
+        memory=_checks.number("memory", memory, positive=True, unit="bytes"),
+    )
+    first, bits = _probe(task, grid)
+    workers = Engine(engine, threads)
+    shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk))
+    layout = layout_of(task, grid, first, bits, named)
+    where = store_of(store)
+    kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
+    _compute(task, grid, workers, kept, _checks.flag("progress", progress))
+    dataset: xarray.Dataset = kept.finish()
+    return dataset
+
+
+def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any]) -> None:
+    """Raise if an argument is given twice or not at all, or a parameter is of nothing."""
+    if both := [name for name, value in fixed.items() if value is not None and name in varied]:
+        raise ArgumentError(f"{both[0]}: given twice, as an argument and in axes; leave one of them out")
+    if missing := [name for name in ("y", "dt") if fixed[name] is None and name not in varied]:
+        raise ArgumentError(f"{' and '.join(missing)}: expected as an argument or in axes")
+    if isinstance(system, System):
+        if of_system := sorted(varied - set(OF_THE_RUN)):
+            raise ArgumentError(
+                f"axes: {of_system[0]} would be a parameter, but {system!r} has its parameters already; give what makes it, such "
+                f"as the class {type(system).__name__}, or functools.partial of it"
+            )
+    elif not callable(system):
+        raise DTypeError(f"system: expected a system, or what makes one of parameters by name, got {type(system).__name__}")
+
+
+def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:
+    if given is None:
+        given = "last" if every is None else "history"
+    several = [given] if isinstance(given, (str, Outcome)) or callable(given) else _checks.several("outcomes", given, "outcomes")
+    found: list[Outcome] = []
+    for each in several:
+        if isinstance(each, str):
+            found.append(WORDS[_checks.known("outcomes", each, WORDS)]())
+        elif isinstance(each, Outcome):
+            found.append(each)
+        elif isinstance(each, type) and issubclass(each, Outcome) and each is not Function:
+            found.append(each())
+        elif callable(each):
+            found.append(Function(each))
+        else:
+            raise DTypeError(f"outcomes: expected words, outcomes or functions of a run, got {_checks.short(each)}")
+    if not found:
+        raise ArgumentError(f"outcomes: expected at least one of {', '.join(WORDS)}, or a function of a run, got none")
+    if every is not None and not any(isinstance(each, (History, Function)) for each in found):
+        raise ArgumentError("every: goes with the outcome 'history' or a function of a run; reductions see states by observe=")
+    return tuple(found)
+
+
+def _probe(task: Task, grid: Grid) -> tuple[System, str]:
+    """The system of the first member, and a hash of what the first steps of the first and the last member compute."""
+    digest = blake2b(digest_size=8)
+    for member in dict.fromkeys((0, grid.members - 1)):
+        index = np.unravel_index(member, grid.shape)
+        one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
+        system, state = probed(task, grid.values(one))
+        for block in state:
+            digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
+        if member == 0:
+            first = system
+    return first, digest.hexdigest()
+
+
+def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | None) -> int:
+    """How many members a chunk may have."""
+    most = task.most_members(system)
+    if most < 1:
+        needed = 8.0 * task.numbers(system) / 2**20
+        raise ArgumentError(
+            f"memory: one member takes some {needed:.3g} MiB while it is computed, got {task.memory / 2**20:.3g} MiB"
+        )
+    if chunk is not None:
+        return min(_checks.count("chunk", chunk, 1), most)
+    parts = CHUNKS_OF_A_WORKER * workers
+    return min(most, MAX_MEMBERS, max(MIN_MEMBERS, -(-grid.members // parts)))
+
+
+def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
+    """Compute every chunk that is not finished, and keep what is found."""
+    done, tally = 0, _Tally(grid)
+    waiting = []
+    for chunk in grid.chunks(kept.chunk_shape):
+        if kept.finished(chunk):
+            done += chunk.members
+        else:
+            waiting.append(chunk)
+    if progress:
+        from .._progress import bar
+
+        shown: Any = bar(f"sweep, {grid.members} members")
+    else:
+        shown = nullcontext(None)
+    with shown as told:
+        found = engine.compute(task, grid, waiting)
+        try:
+            for chunk, each in found:
+                kept.write(chunk, each.found)
+                tally.add(chunk, each)
+                done += chunk.members
+                if told is not None:
+                    told(done / grid.members)
+        finally:
+            found.close()  # type: ignore[attr-defined]
+    tally.warn()
+
+
+class _Tally:
+    """What there is to warn of."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid, self.bad, self.members, self.first, self.step = grid, 0, 0, grid.members, -1
+        self.doubts: dict[int, str] = {}
+
+    def add(self, chunk: Chunk, done: Done) -> None:
+        status = done.found["status"].values
+        self.members += chunk.members
+        if status.any():
+            self.bad += int(np.count_nonzero(status))
+            member = int(np.flatnonzero(status)[0])
+            if chunk.first + member < self.first:
+                self.first, self.step = chunk.first + member, int(done.found["first_bad_step"].values[member])
+        if done.doubt is not None:
+            self.doubts[chunk.first] = done.doubt
+
+    def warn(self) -> None:
+        if self.bad:
+            warnings.warn(
+                f"{self.bad} of {self.members} member(s) diverged; the first of them at {self.grid.place(self.first)}, at step "
+                f"{self.step}; status and first_bad_step tell which and when",
+                DivergenceWarning,
+                stacklevel=4,
+            )
+        if self.doubts:
+            chunk = min(self.doubts)
+            warnings.warn(
+                f"in {len(self.doubts)} chunk(s), the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
+                AccuracyWarning,
+                stacklevel=4,
+            )

@@ -1,0 +1,276 @@
+"""A chunk of members: its system is made, its run is made in pieces, and what was asked for is kept."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import gcd, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._checks import Array
+from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, UnsupportedError
+from ..integrate import integrate
+from ..result import Run
+from ..systems import System
+from ..systems.base import a_system
+from .axes import OF_THE_RUN
+from .exponents import Exponents
+from .observed import Piece
+from .outcomes import Found, Function, History, Outcome, Variable, together
+
+#: A piece of a run makes at most so many steps of members, after which a sweep may be stopped.
+MAX_STEPS_OF_MEMBERS = 50_000_000
+#: A state in a piece takes its own numbers so many times: itself, what is computed of it, and what that leaves in between.
+COPIES_OF_A_STATE = 4
+#: A member takes its own numbers so many times besides: where it starts, what it carries, where it ends.
+COPIES_OF_A_MEMBER = 12
+
+
+class Stopped(Exception):  # noqa: N818 (not an error)
+    """The sweep was stopped while this chunk was computed."""
+
+
+class Task(NamedTuple):
+    """What to do with every chunk.
+
+    Attributes:
+        system: a system, or what makes one of parameters by name.
+        method: name of the method.
+        given: further arguments of ``integrate``, the same for all members.
+        transient: steps before those that are observed.
+        steps: steps that are observed.
+        observe: interval of the states that reductions see, in steps.
+        every: interval of the states of a history or of a function's run, in steps; None for the last alone.
+        outcomes: what to keep.
+        memory: how many bytes a chunk may take.
+    """
+
+    system: Any
+    method: str
+    given: dict[str, Any]
+    transient: int
+    steps: int
+    observe: int
+    every: int | None
+    outcomes: tuple[Outcome, ...]
+    memory: float
+
+    def kinds(self, kind: type[Outcome]) -> list[Any]:
+        """The outcomes of a kind."""
+        return [each for each in self.outcomes if isinstance(each, kind)]
+
+    @property
+    def reductions(self) -> list[Outcome]:
+        """The outcomes that are found piece by piece."""
+        return [each for each in self.outcomes if not isinstance(each, (Function, Exponents))]
+
+    @property
+    def between(self) -> int | None:
+        """Interval of the states that are saved for reductions; None for the last alone."""
+        observed = self.observe if any(each.observes for each in self.reductions) else 0
+        kept = (self.every or 0) if self.kinds(History) else 0
+        return gcd(observed, kept) or None
+
+    def numbers(self, system: System) -> float:
+        """How many numbers a member takes while it is computed, without the states of a piece."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        numbers = COPIES_OF_A_MEMBER * state + sum(each.numbers for each in self.outcomes)
+        saved = 1 if self.every is None else self.steps // self.every + 2
+        if self.kinds(History) or self.kinds(Function):
+            numbers += 2 * saved * state
+        for each in self.kinds(Exponents):
+            k = state if each.exponents == "all" else int(each.exponents)
+            numbers += k * (self.steps // each.every + 10 * state)
+        return numbers
+
+    def most_members(self, system: System) -> int:
+        """How many members may be in a chunk, for its memory."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        least = 0 if self.between is None else 3 * COPIES_OF_A_STATE * state  # two states of a piece, and the one before
+        return int(self.memory / (8.0 * (self.numbers(system) + least)))
+
+    def states_at_once(self, system: System, members: int) -> int:
+        """How many saved states a piece may have, for its memory."""
+        state = prod(system.v_shape) + prod(system.y_shape)
+        room = self.memory / (8.0 * members) - self.numbers(system)
+        return max(2, int(room / (COPIES_OF_A_STATE * state)))
+
+
+class Done(NamedTuple):
+    """What was found of a chunk.
+
+    Attributes:
+        found: results by name, values of shape (*own axes, members).
+        doubt: a message if the numbers are finite and mean nothing, or None.
+    """
+
+    found: Found
+    doubt: str | None
+
+
+def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
+    """The system of these values, and the arguments of its run."""
+    given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
+    parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
+    system = task.system if isinstance(task.system, System) else task.system(**parameters)
+    return a_system(system).sized(given.get("v"), given["y"]), given
+
+
+def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
+    """Compute a chunk of members."""
+    with _quiet(), np.errstate(all="ignore"):  # members that diverge are told of by their status
+        system, given = made(task, values)
+        start = given
+        for each in _pieces(task, system, given, members, task.transient, None, stopped):
+            start = _going_on(given, each)
+        parts: list[Found] = []
+        if functions := task.kinds(Function):
+            whole = integrate(system, task.method, steps=task.steps, every=task.every, **start)
+            _as_many(whole, members)
+            parts += [each.of_run(whole) for each in functions]
+        last, reduced = _reduced(task, system, start, members, stopped)
+        parts += reduced
+        for each in task.kinds(Exponents):
+            _stop(stopped)
+            parts.append(each.of_start(system, task.method, given, task.transient, task.steps))
+    status = Variable((), np.array(last.status), "how the member ended")
+    bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), "first step that was not finite, or −1")
+    return Done(together([*parts, {"status": status, "first_bad_step": bad}]), last.system.doubt(last.y))
+
+
+def _reduced(
+    task: Task, system: System, start: dict[str, Any], members: int, stopped: Callable[[], bool] | None
+) -> tuple[Run, list[Found]]:
+    """The last piece of the run, and what the reductions found in it."""
+    between, reductions = task.between, [(each, each.begin()) for each in task.reductions]
+    at, last = 0, None
+    for each in _pieces(task, system, start, members, task.steps, between, stopped):
+        since = 0 if at == 0 else 1
+        steps = at + (each.t.size - 1 if between else 0)  # number of the last saved state
+        for outcome, reduction in reductions:
+            reduction.see(_thinned(task, outcome, each, at, since))
+        at, last = steps + (0 if between else 1), each
+    assert last is not None
+    return last, [reduction.found() for _, reduction in reductions]
+
+
+def _thinned(task: Task, outcome: Outcome, piece: Run, first: int, since: int) -> Piece:
+    """The states of a piece that an outcome asks for: every so many, counted from the first of all, and the very last."""
+    interval = task.observe if outcome.observes else (task.every or 0) if isinstance(outcome, History) else 0
+    step = interval // (task.between or 1)
+    if step <= 1:
+        return Piece(piece, since)
+    number = first + np.arange(len(piece.t))
+    wanted = number % step == 0
+    wanted[-1] |= piece.start_step + piece.steps >= task.transient + task.steps
+    wanted[:since] = False
+    return Piece(_Chosen(piece, wanted), 0)  # type: ignore[arg-type]
+
+
+class _Chosen:
+    """Some of the saved states of a run."""
+
+    def __init__(self, run: Run, wanted: Any) -> None:
+        self._run, self._wanted = run, wanted
+        self.t, self.v, self.y = run.t[wanted], run.v[wanted], run.y[wanted]
+
+    def quantity(self, name: str) -> Array:
+        return np.asarray(self._run.quantity(name)[self._wanted])
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._run, name)
+
+
+def _pieces(
+    task: Task,
+    system: System,
+    start: dict[str, Any],
+    members: int,
+    steps: int,
+    between: int | None,
+    stopped: Callable[[], bool] | None,
+) -> Iterator[Run]:
+    """So many steps in pieces; a piece ends where a state is saved."""
+    length = max(1, MAX_STEPS_OF_MEMBERS // members)
+    if between is not None:
+        length = between * max(1, min(length // between, task.states_at_once(system, members) - 1))
+    done, going_on = 0, start
+    while done < steps:
+        _stop(stopped)
+        made = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
+        _as_many(made, members)
+        going_on = _going_on(start, made)
+        done += made.steps
+        yield made
+
+
+def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
+    """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
+    kept = {name: value for name, value in given.items() if name in ("threads", "backend")}
+    return {**kept, **run.resume}
+
+
+def _stop(stopped: Callable[[], bool] | None) -> None:
+    if stopped is not None and stopped():
+        raise Stopped
+
+
+def _as_many(run: Run, members: int) -> None:
+    """Raise if the batch of a run is another than the members of the chunk."""
+    if run.status.shape != (members,):
+        raise ShapeError(
+            f"axes: expected a run of as many members as axes have values, batch ({members},), got {run.status.shape}; what "
+            f"varies from member to member is an axis, and everything else is the same for all"
+        )
+
+
+def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Array]]:
+    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed.
+
+    Returns:
+        The system, and the state after some steps.
+    """
+    with _quiet():
+        system, given = made(task, values)
+        for each in task.outcomes:
+            each.check(system)
+        if task.kinds(History) and task.every is None:
+            raise UnsupportedError("every: expected how many steps are between the states of a history")
+        first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
+        _as_many(first, 1)
+    return first.system, (first.v[-1], first.y[-1])
+
+
+#: Of so many steps the bits tell one sweep from another.
+PROBED_STEPS = 3
+
+
+# ---- warnings
+
+_lock = threading.Lock()
+_quiet_runs = 0
+_caught = warnings.catch_warnings()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the warnings of single runs, which a sweep sums up; in any number of threads, since filters are those of all."""
+    global _quiet_runs, _caught
+    with _lock:
+        _quiet_runs += 1
+        if _quiet_runs == 1:
+            _caught = warnings.catch_warnings()
+            _caught.__enter__()
+            warnings.simplefilter("ignore", DivergenceWarning)
+            warnings.simplefilter("ignore", AccuracyWarning)
+    try:
+        yield
+    finally:
+        with _lock:
+            _quiet_runs -= 1
+            if _quiet_runs == 0:
+                _caught.__exit__(None, None, None)

@@ -1,0 +1,128 @@
+"""Arrays of other libraries, in and out without copies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _memory
+from stepwell.errors import ArgumentError, DTypeError
+
+
+class Tensor:
+    """An array of another library: it speaks DLPack, and nothing else."""
+
+    def __init__(self, array: Any) -> None:
+        self.array = array
+
+    def __dlpack__(self, **options: Any) -> Any:
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self) -> Any:
+        return self.array.__dlpack_device__()
+
+
+class OnDevice(Tensor):
+    """One that is not in the memory of the CPU."""
+
+    def __dlpack__(self, **options: Any) -> Any:
+        raise BufferError("the array is on CUDA device 0")
+
+    def __dlpack_device__(self) -> Any:
+        return 2, 0
+
+
+def test_they_are_taken_as_numpys() -> None:
+    omega, y = np.linspace(0.5, 2.0, 50), np.ones(50)
+    plain = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=y, dt=0.1, steps=10)
+    given = sw.integrate(sw.Oscillator(Tensor(omega)), "rk4", v=0.0, y=Tensor(y), dt=0.1, steps=10)
+    assert given.y.tobytes() == plain.y.tobytes()
+    single = sw.integrate(sw.Oscillator(Tensor(omega.astype(np.float32))), "rk4", v=0.0, y=1.0, dt=0.1, steps=10)
+    assert single.y.tobytes() != plain.y.tobytes()
+    # y is about cos(ω·t) at t = 1, and ω below 2 is rounded by 2⁻²⁴ of it at most.
+    assert single.y == pytest.approx(plain.y, abs=2.0**-23)
+
+
+def test_parameters_are_not_copied() -> None:
+    omega = np.linspace(0.5, 2.0, 50)
+    assert np.shares_memory(sw.Oscillator(Tensor(omega)).omega, omega)
+
+
+def test_a_world_steps_them_in_place() -> None:
+    v, y = np.zeros(50), np.ones(50)
+    if not np.from_dlpack(Tensor(y)).flags.writeable:  # NumPy before 2.1 gives all such arrays read-only
+        with pytest.raises(ArgumentError, match="v: expected a writeable array to step in place, got a read-only one"):
+            sw.World(sw.Oscillator(), "rk4", v=Tensor(v), y=Tensor(y), dt=0.1)
+        return
+    world = sw.World(sw.Oscillator(), "rk4", v=Tensor(v), y=Tensor(y), dt=0.1)
+    world.step(10)
+    assert y.tobytes() == sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=np.ones(50), dt=0.1, steps=10).y.tobytes()
+    assert np.shares_memory(world.y, y)
+
+
+@pytest.mark.parametrize("numbers", [_memory.LEAST_LENT // 8, 100_000, 600_000])
+def test_large_results_begin_at_a_cache_line(numbers: int) -> None:
+    """As JAX asks for, which copies others; where NumPy's own memory begins is chance, so it is tried several times."""
+    kept = []
+    for extra in range(4):
+        _memory._kept.clear()
+        run = sw.integrate(sw.Oscillator(np.ones(numbers + extra)), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        kept.append(run)
+        assert run.y.ctypes.data % 64 == run.v.ctypes.data % 64 == 0
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda array: sw.Oscillator(array),
+        lambda array: sw.World(sw.Oscillator(), "rk4", v=array, y=np.ones(3), dt=0.1),
+    ],
+)
+def test_those_elsewhere_are_refused(use: Any) -> None:
+    match = r"expected an array in the memory of the CPU.*got test_dlpack\.OnDevice \(the array is on CUDA device 0\).*convert it"
+    with pytest.raises(DTypeError, match=match):
+        use(OnDevice(np.ones(3)))
+
+
+def test_what_cannot_be_stepped_in_place() -> None:
+    with pytest.raises(DTypeError, match="v: expected dtype float64 to step in place, got float32"):
+        sw.World(sw.Oscillator(), "rk4", v=Tensor(np.zeros(3, np.float32)), y=np.ones(3), dt=0.1)
+    with pytest.raises(ArgumentError, match="y: expected a C-contiguous array to step in place"):
+        sw.World(sw.Oscillator(), "rk4", v=np.zeros(3), y=Tensor(np.ones(6)[::2]), dt=0.1)
+
+
+def test_jax_in_and_out() -> None:
+    jax = pytest.importorskip("jax", reason="jax is large, so the tests go without where it is not installed")
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        omega = jax.numpy.linspace(0.5, 2.0, 20_000)
+        assert sw.Oscillator(omega).omega.ctypes.data == omega.unsafe_buffer_pointer()
+        run = sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=jax.numpy.ones(20_000), dt=0.1, steps=8)
+        for array in (run.y, run.v):
+            out = jax.numpy.from_dlpack(array)
+            assert out.unsafe_buffer_pointer() == array.ctypes.data
+            np.testing.assert_array_equal(out, array)
+        with pytest.raises(ArgumentError, match="y: expected a writeable array to step in place, got a read-only one"):
+            sw.World(sw.Oscillator(), "rk4", v=np.zeros(20_000), y=jax.numpy.ones(20_000), dt=0.1)
+        with pytest.raises(DTypeError, match=r"JAX's by jax\.device_get outside of jax\.jit"):
+            jax.jit(lambda x: sw.integrate(sw.Oscillator(x), "rk4", v=0.0, y=1.0, dt=0.1, steps=1).y)(omega)
+        with pytest.raises(DTypeError, match="omega: expected an array in the memory of the CPU, of a type that NumPy has"):
+            sw.Oscillator(omega.astype(jax.numpy.bfloat16))
+    finally:
+        jax.config.update("jax_enable_x64", before)
+
+
+def test_pytorch_in_and_out() -> None:
+    torch = pytest.importorskip("torch", reason="torch is large, so the tests go without where it is not installed")
+    omega = torch.linspace(0.5, 2.0, 20_000, dtype=torch.float64)
+    assert sw.Oscillator(omega).omega.ctypes.data == omega.data_ptr()
+    v, y = torch.zeros_like(omega), torch.ones_like(omega)
+    run = sw.integrate(sw.Oscillator(omega), "rk4", v=v, y=y, dt=0.1, steps=8)
+    assert torch.from_dlpack(run.y).data_ptr() == run.y.ctypes.data
+    sw.World(sw.Oscillator(omega), "rk4", v=v.numpy(), y=y.numpy(), dt=0.1).step(8)
+    assert torch.equal(y, torch.from_dlpack(run.y)[-1])
+    with pytest.raises(DTypeError, match="without gradients"):
+        sw.Oscillator(omega.requires_grad_())

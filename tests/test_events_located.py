@@ -1,0 +1,262 @@
+"""Where events are: against closed forms, with the order of the method; and mistakes that these tests must notice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.events import driver
+from stepwell.events.trials import Trials
+from stepwell.reference import events
+
+U = 2.0**-53
+
+# ---- the search within a step
+
+
+def found(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
+    """The shares found for a function of the share that rises through zero, and how many trials that took."""
+    trials = 0
+
+    def trial(which: Any, share: Any) -> Any:
+        nonlocal trials
+        trials += 1
+        return g(share), share[np.newaxis], -share[np.newaxis]
+
+    ends = np.zeros(n), np.ones(n)
+    share, v, y = events.located(trial, g(ends[0]), g(ends[1]), *(np.ones((1, n)), -np.ones((1, n))), np.full(n, events.SHARE))
+    np.testing.assert_array_equal(v[0], share)  # the state is that of the share
+    np.testing.assert_array_equal(y[0], -share)
+    return share, trials
+
+
+#: Functions of a share that rise through zero at 0.3 alone, at which secants go astray.
+HARD: dict[str, Callable[[Any], Any]] = {
+    "a jump": lambda s: np.where(s < 0.3, -1.0, 1.0),
+    "a high jump": lambda s: np.where(s < 0.3, -1e-300, 1e300),
+    "flat": lambda s: (s - 0.3) ** 9,
+    "steep at the end": lambda s: np.expm1(200.0 * (s - 0.3)),
+    "a pole": lambda s: -1.0 / (0.3 - s),
+    "infinite at both ends": lambda s: np.where(s <= 0.0, -np.inf, np.where(s >= 1.0, np.inf, s - 0.3)),
+    "NaN before it": lambda s: np.where((s < 0.3) & (s > 0.0), np.nan, s - 0.3),
+}
+
+
+@pytest.mark.parametrize("g", HARD.values(), ids=HARD)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_no_function_takes_more_trials_than_bisection_and_one(g: Callable[[Any], Any]) -> None:
+    """Bisection of 1 down to 2⁻⁴⁸ takes 48. What is returned is at or past the zero, by no more than the width."""
+    (share,), trials = found(g)
+    assert trials <= 49
+    # (s − 0.3)⁹ is 0 in floating point where it underflows, |s − 0.3| < 10⁻³⁶: not beside 0.3, whose neighbours are 5·10⁻¹⁷ away.
+    assert 0.3 - U <= share <= 0.3 + events.SHARE + U
+
+
+def test_smooth_functions_take_few_trials_and_members_do_not_matter() -> None:
+    """Nearly straight, as g is within a step: ten trials for a member, where bisection would take 48."""
+    roots = np.linspace(0.001, 0.999, 97)
+
+    def g(share: Any, root: Any = roots) -> Any:
+        return (share - root) * (1.0 + 0.3 * share)
+
+    trials = 0
+
+    def trial(which: Any, share: Any) -> Any:
+        nonlocal trials
+        trials += len(which)
+        return g(share, roots[which]), share[np.newaxis], share[np.newaxis]
+
+    one = np.ones((1, len(roots)))
+    width = np.full(len(roots), events.SHARE)
+    share = events.located(trial, g(np.zeros(97)), g(np.ones(97)), one, one, width)[0]
+    assert trials <= 10 * len(roots)
+    assert (np.abs(share - roots) <= events.SHARE + 2 * U).all()
+    for i in (0, 50, 96):
+        (alone,), _ = found(lambda s, i=i: g(s, roots[i]))
+        assert alone == share[i]
+
+
+# ---- against the method's own motion, to the last digits
+
+
+def polynomial(order: int) -> Callable[[Any], Any]:
+    """The multiple of a mode in a step of a Runge-Kutta method of so many stages and that order, up to 4."""
+    return lambda x: sum(x**j / mpmath.factorial(j) for j in range(order + 1))
+
+
+@pytest.mark.parametrize(("method", "order"), [("standard_euler", 1), ("standard_heun", 2), ("rk4", 4)])
+def test_the_place_is_that_of_a_step_of_the_method_from_the_start_of_its_step(method: str, order: int) -> None:
+    """For ẏ = v, v̇ = −y, z = y + iv becomes R(−ih)·z in a step, so that the zero of y after k steps and a share s of one solves
+    Re(R(−ish)·R(−ih)ᵏ) = 0, which is solved in 30 digits.
+
+    Bound: a step makes at most 40 roundings of numbers of size up to 1.5 (Standard Euler grows to 1.2 up to t = 4), which move y
+    by at most 60·U; y moves at a speed of 0.9 or more at its zero, so t is off by at most 67·U·(k + 1), and by the width, and by
+    the rounding of t.
+    """
+    h = 0.1
+    down = sw.Event(lambda t, v, y: y, direction=-1, name="down")
+    run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, dt=h, steps=40, events=down)
+    place = run.events["down"]
+    with mpmath.workdps(30):
+        step, k = polynomial(order), int(place.step[0])
+        z = step(mpmath.mpc(0, -mpmath.mpf(h))) ** k
+        share = mpmath.findroot(lambda s: (step(mpmath.mpc(0, -s * mpmath.mpf(h))) * z).real, (0.0, 1.0), solver="anderson")
+        t = k * mpmath.mpf(h) + share * mpmath.mpf(h)
+        there = step(mpmath.mpc(0, -share * mpmath.mpf(h))) * z
+        bound = 67 * U * (k + 1) + events.SHARE * h + 4 * U * float(t)
+        assert abs(float(mpmath.mpf(float(place.t[0])) - t)) <= bound
+        assert abs(place.v[0] - float(there.imag)) <= bound
+    assert -2 * bound <= place.y[0] <= 2 * bound
+
+
+# ---- against the true motion, with the order of the method
+
+
+def pendulum(method: str, dt: float) -> float:
+    """By how much the fourth passage of a pendulum through its lowest point is off; the period is 2π/agm(1, cos(a/2)) (Gauss)."""
+    zero = sw.Event(lambda t, v, y: y, name="zero")
+    quarter = float(mpmath.pi / 2 / mpmath.agm(1, mpmath.cos(0.5)))
+    run = sw.integrate(sw.Pendulum(), method, v=0.0, y=1.0, dt=dt, steps=round(13 / dt), events=zero)
+    return abs(float(run.events["zero"].t[3]) - 7.0 * quarter)
+
+
+def pericentre(method: str, dt: float) -> float:
+    """By how much a planet of eccentricity 1/2 that begins at its apocentre is early or late at its pericentre, π later."""
+    event = sw.Event(lambda t, v, y: y[1, 0] * v[1, 0] + y[1, 1] * v[1, 1], direction=1, name="pericentre")
+    v, y = (np.array([[0.0, 0.0], each]) for each in ([0.0, (1 / 3) ** 0.5], [1.5, 0.0]))
+    sun = sw.NBody([1.0, 0.0], force="newton")
+    run = sw.integrate(sun, method, v=v, y=y, dt=dt, steps=round(4 / dt), events=event)
+    return abs(float(run.events["pericentre"].t[0]) - np.pi)
+
+
+def driven(method: str, dt: float) -> float:
+    """The same of y = cos t, driven by v̇ = −cos t alone, at y = 1/2: the time counts."""
+    run = sw.integrate(by_time(), method, v=0.0, y=1.0, dt=dt, steps=round(2 / dt), events=half)
+    return abs(float(run.events["half"].t[0]) - np.pi / 3)
+
+
+@sw.system
+def by_time(t: Any, v: Any, y: Any, *, amplitude: float = 1.0) -> Any:
+    return -amplitude * np.cos(t)
+
+
+half = sw.Event(lambda t, v, y: y - 0.5, name="half")
+
+#: The longest step, short enough that the error is nearly c·hᵖ, and long enough that it is far above the roundings.
+STEP = {8: 0.8, 5: 0.1, 4: 0.1, 2: 0.02, 1: 0.005}
+
+
+def order_of(error: Callable[[str, float], float], method: str, dt: float) -> float:
+    """By what power of the step the error falls, from two halvings; the places of events within their steps make it uneven."""
+    return float(np.log2(error(method, dt) / error(method, dt / 4)) / 2)
+
+
+@pytest.mark.parametrize("method", [m.name for m in sw.methods()])
+def test_a_pendulum_passes_with_the_order_of_the_method(method: str) -> None:
+    order = sw.method(method).order
+    assert order_of(pendulum, method, STEP[order]) > order - 0.3
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "verlet", "standard_heun", "rk4", "pefrl", "fehlberg", "fehlberg_5"])
+def test_a_planet_is_at_its_pericentre_with_the_order_of_the_method(method: str) -> None:
+    order = sw.method(method).order
+    # The error of Fehlberg's method changes its sign at a step of about 0.1.
+    assert order_of(pericentre, method, (0.5 if order < 5 else 0.25) * STEP[order]) > order - 0.3
+
+
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "verlet", "standard_heun", "rk4", "pefrl"])
+def test_a_driven_motion_passes_with_the_order_of_the_method(method: str) -> None:
+    order = sw.method(method).order
+    assert order_of(driven, method, STEP[order]) > order - 0.3
+
+
+def test_bounces() -> None:
+    """Falling from 1 under gravity 1, bouncing with half of the speed: at √2·(1, 1 + 1, 1 + 1 + 1/2, …).
+
+    RK4 is exact for a parabola; each flight adds some roundings of numbers up to 4, and those of the start speed are halved.
+    """
+
+    @sw.system
+    def ball(t: Any, v: Any, y: Any, *, gravity: float = 1.0) -> Any:
+        return -gravity
+
+    ground = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
+    v, y, t, times = 0.0, 1.0, 0.0, []
+    for _ in range(6):
+        run = sw.integrate(ball(), "rk4", v=v, y=y, dt=0.01, steps=400, t0=t, events=ground)
+        assert run.stopped_at is not None
+        v, y, t = -0.5 * float(run.v[-1]), float(run.y[-1]), float(run.stopped_at)
+        assert -1e-13 < y <= 0.0  # at or past the ground
+        times.append(t)
+    expected = 2**0.5 * (1.0 + 2.0 * np.concatenate([[0.0], np.cumsum(0.5 ** np.arange(1, 6))]))
+    assert np.abs(np.array(times) - expected).max() < 1000 * 4 * U
+
+
+# ---- mistakes
+
+
+def straight(trial: Any, before: Any, after: Any, v: Any, y: Any, width: Any) -> Any:
+    """Mistake: by a straight line between both ends of the step."""
+    share = before / (before - after)
+    return (share, *trial(np.arange(len(before)), share)[1:])
+
+
+def low_end(trial: Any, before: Any, after: Any, v: Any, y: Any, width: Any) -> Any:
+    """Mistake: the end of the bracket that is before the event."""
+    share, *_ = events.located(trial, before, after, v, y, width)
+    share = share - 2.0 * events.SHARE
+    return (share, *trial(np.arange(len(before)), share)[1:])
+
+
+def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(driver, "located", straight)
+    assert order_of(driven, "rk4", STEP[4]) < 3.5
+
+
+def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(driver, "located", low_end)
+    with pytest.raises(AssertionError):
+        test_bounces()
+
+
+def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = Trials.step
+    monkeypatch.setattr(Trials, "step", lambda self, index, t, h, v, y: step(self, index, 0.0 * t, h, v, y))
+    assert order_of(driven, "rk4", STEP[4]) < 3.5
+
+
+def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verlet's previous y is one of h ago; with it, a step of another length is wrong by a share of the whole way."""
+    from stepwell.events import trials
+
+    def wrong(plan: Any, s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
+        full = plan.system.scaled(plan.dt, plan.batch)
+        slot = plan.method.steps.start(full, plan.choice, t, v, y)
+        slot, y = plan.method.steps.step(s, t, h, slot, y)
+        return plan.method.steps.finish(s, plan.choice, t + h, slot, y), y
+
+    monkeypatch.setattr(trials, "stepped", wrong)
+    assert order_of(pendulum, "verlet", STEP[2]) < 1.7
+
+
+def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from test_events import test_a_state_at_zero_counts_once_and_not_at_the_start as check
+
+    monkeypatch.setattr(driver, "crosses", lambda a, b, _: ((a <= 0) & (b >= 0)) | ((a >= 0) & (b <= 0)))
+    with pytest.raises(AssertionError):
+        check()
+
+
+def test_mistake_a_secant_without_a_bound_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regula falsi alone: one end of the bracket stays where it is."""
+
+    def secant(low: Any, high: Any, g_low: Any, g_high: Any, width: Any, done: int) -> Any:
+        return np.clip((g_high * low - g_low * high) / (g_high - g_low), low + 0.5 * width, high - 0.5 * width)
+
+    monkeypatch.setattr(events, "_next", secant)
+    with pytest.raises(AssertionError):
+        test_no_function_takes_more_trials_than_bisection_and_one(HARD["steep at the end"])

@@ -1,0 +1,293 @@
+"""Environments of Gymnasium: what its checker says, the steps of its own environments, and the work of a motor."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import sys
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
+
+gymnasium = pytest.importorskip("gymnasium")
+
+import stepwell.gym  # noqa: E402
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
+
+NAMES = ["CartPole", "DoubleRod", "Pendulum"]
+EPS32 = np.finfo(np.float32).eps
+
+
+def many(name: str, num_envs: int = 5, **options: Any) -> Any:
+    return gymnasium.make_vec(f"stepwell/{name}-v0", num_envs=num_envs, **options).unwrapped
+
+
+def one(name: str, **options: Any) -> Any:
+    return gymnasium.make(f"stepwell/{name}-v0", **options)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gymnasiums_checker_has_nothing_to_say(name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # It recommends actions of −1 to 1, which those of the task are not.
+        warnings.filterwarnings("ignore", ".*For Box action spaces, we recommend using a symmetric and normalized space.*")
+        check_env(one(name).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_vector_is_what_it_says(name: str) -> None:
+    """Shapes, types, spaces; that nothing that was returned is written to again."""
+    envs = many(name, 7)
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    envs.action_space.seed(3)
+    seen, told = envs.reset(seed=5)
+    assert told == {}
+    earlier = []
+    for _ in range(30):
+        assert seen in envs.observation_space
+        assert seen.dtype == np.float32
+        earlier.append((seen, seen.copy()))
+        seen, rewards, terminated, truncated, told = envs.step(envs.action_space.sample())
+        assert (rewards.shape, rewards.dtype) == ((7,), np.float64)
+        assert terminated.shape == truncated.shape == (7,)
+        assert terminated.dtype == truncated.dtype == np.bool_
+        assert told == {}
+    assert all((a == b).all() for a, b in earlier)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_and_actions_give_the_same_bits(name: str) -> None:
+    def told(seed: int) -> bytes:
+        envs = many(name)
+        envs.action_space.seed(1)
+        made = [envs.reset(seed=seed)[0]] + [envs.step(envs.action_space.sample())[0] for _ in range(50)]
+        return np.stack(made).tobytes()
+
+    assert told(1) == told(1)
+    assert told(1) != told(2)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_is_a_vector_of_one(name: str) -> None:
+    single, envs = one(name, max_episode_steps=20), many(name, 1, max_episode_steps=20)
+    envs.action_space.seed(2)
+    seen, _ = single.reset(seed=4)
+    np.testing.assert_array_equal(seen, envs.reset(seed=4)[0][0])
+    for _ in range(60):
+        action = envs.action_space.sample()
+        alone, together = single.step(action[0]), envs.step(action)
+        for a, b in zip(alone[:4], together[:4], strict=True):
+            np.testing.assert_array_equal(a, b[0])
+        if alone[2] or alone[3]:
+            # The vector ignores the next action, and draws from the same numbers.
+            begun, _ = single.reset()
+            np.testing.assert_array_equal(begun, envs.step(action)[0][0])
+
+
+def test_episodes_end_and_begin_again() -> None:
+    """With NEXT_STEP: the last state is returned, the next call begins anew with no reward, whatever its action."""
+    envs = many("CartPole", 3, max_episode_steps=30)
+    envs.reset(seed=0)
+    ended = np.zeros(3, dtype=bool)
+    length = np.zeros(3, dtype=int)
+    lengths = []
+    for _ in range(200):
+        seen, rewards, terminated, truncated, _ = envs.step(np.array([1, 1, 0]) if lengths else np.array([1, 0, 0]))
+        assert (rewards[ended] == 0.0).all()
+        assert (rewards[~ended] == 1.0).all()
+        assert (np.abs(seen[ended]) <= 0.05).all()
+        assert not (terminated | truncated)[ended].any()
+        length = np.where(ended, 0, length + 1)
+        out = (np.abs(seen[:, 0]) > 2.4) | (np.abs(seen[:, 2]) > np.radians(12.0))
+        np.testing.assert_array_equal(terminated, out & ~ended)
+        np.testing.assert_array_equal(truncated, (length >= 30) & ~ended)
+        ended = terminated | truncated
+        lengths += length[ended].tolist()
+    assert len(lengths) > 20
+    assert max(lengths) <= 30
+
+
+def test_some_can_be_reset() -> None:
+    envs = many("Pendulum", 4)
+    before, _ = envs.reset(seed=0)
+    mask = np.array([True, False, True, False])
+    after, _ = envs.reset(options={"reset_mask": mask})
+    np.testing.assert_array_equal(after[~mask], before[~mask])
+    assert (after[mask] != before[mask]).any(axis=1).all()
+    with pytest.raises(ShapeError, match="reset_mask: expected 4 booleans"):
+        envs.reset(options={"reset_mask": [1, 0]})
+
+
+# ---- known truths
+
+
+def test_the_steps_of_gymnasiums_cart_pole() -> None:
+    """By Standard Euler: the same formulas, in another order here and there, so they differ by rounding alone.
+
+    Pushes to and fro keep |x| small and the pole falls from 0.05 rad within some 25 steps, each of which multiplies differences
+    by at most 1 + 0.02·√15 < 1.1: 25 steps of some 20 roundings of numbers below 10 stay below 25·20·10·2⁻⁵³·1.1²⁵ < 1e-11.
+    """
+    theirs = gymnasium.make("CartPole-v1").unwrapped
+    envs = many("CartPole", 1, method="standard_euler")
+    envs.reset(seed=0)
+    for seed in range(5):
+        theirs.reset(seed=seed)
+        x, speed, angle, turning = theirs.state
+        envs.world.v[:, 0], envs.world.y[:2, 0] = (speed, turning), (x, angle)
+        envs._over[:] = False
+        for k in range(25):
+            action = (k // 3) % 2
+            _, reward, terminated, _, _ = theirs.step(action)
+            mine = envs.step(np.array([action]))
+            now = [envs.world.y[0, 0], envs.world.v[0, 0], envs.world.y[1, 0], envs.world.v[1, 0]]
+            assert np.abs(now - theirs.state).max() < 1e-11
+            assert (bool(mine[2][0]), float(mine[1][0])) == (terminated, reward)
+            if terminated:
+                break
+    # Another method is another motion.
+    envs = many("CartPole", 1, method="rk4")
+    envs.reset(seed=0)
+    theirs.reset(seed=0)
+    x, speed, angle, turning = theirs.state
+    envs.world.v[:, 0], envs.world.y[:2, 0] = (speed, turning), (x, angle)
+    theirs.step(1)
+    envs.step(np.array([1]))
+    assert abs(envs.world.y[0, 0] - theirs.state[0]) > 1e-4
+
+
+@pytest.mark.parametrize(
+    "wrong", [("4.0 / 3.0", "1.3333"), ("pull - moment", "pull + moment"), ("cosine**2 / whole", "cosine**2")]
+)
+def test_a_wrong_formula_of_the_cart_would_be_seen(wrong: tuple[str, str]) -> None:
+    """By far more than the bound above: one step of 0.02 s makes it so."""
+    text = inspect.getsource(sw.gym.cart_pole.function)
+    assert wrong[0] in text
+    namespace: dict[str, Any] = {"np": np, "system": sw.system, "Any": Any}
+    exec(text.replace(*wrong), namespace)
+    after = []
+    for kind in (sw.gym.cart_pole, namespace["cart_pole"]):
+        world = sw.World(kind, "standard_euler", v=np.array([0.1, 0.2]), y=np.array([0.0, 0.1, 10.0]), dt=0.02)
+        world.step()
+        after.append(world.v)
+    assert np.abs(after[0] - after[1]).max() > 1e-7
+
+
+def test_the_steps_of_gymnasiums_pendulum() -> None:
+    """By False Euler, from where it hangs, so that its speed stays below the bound: 40 steps of roundings of numbers below 20."""
+    theirs = gymnasium.make("Pendulum-v1").unwrapped
+    envs = many("Pendulum", 1, method="false_euler")
+    envs.reset(seed=0)
+    rng = np.random.default_rng(7)
+    theirs.reset(seed=0)
+    theirs.state = np.array([np.pi - 0.3, 0.5])
+    envs.world.v[0], envs.world.y[0] = 0.5, np.pi - 0.3 + np.pi
+    for _ in range(40):
+        action = rng.uniform(-2.5, 2.5, 1).astype(np.float32)
+        seen, reward, *_ = theirs.step(action.astype(np.float64))  # of a float32 it would compute in float32
+        mine = envs.step(action[np.newaxis])
+        # From below, √15·0.05 rad a step: differences of about 1e-15 a step grow by no more than the number of steps, squared.
+        assert np.abs(mine[0][0] - seen).max() <= 8 * EPS32
+        assert abs(envs.world.v[0] - theirs.state[1]) < 40 * 40 * 20 * 2.0**-52
+        # The angle of the reward is reduced to ±π, where it is rounded like π.
+        assert float(mine[1][0]) == pytest.approx(float(reward), abs=1e-9)
+
+
+@pytest.mark.parametrize("torque", [1.0, -0.7])
+def test_the_motor_of_the_double_rod_does_its_work(torque: float) -> None:
+    """The energy grows by ∫ u·(ω₂ − ω₁) dt: by the trapezoidal rule over n = 4000 steps of h, which errs by h²/12·t·max|f″|.
+
+    f = u·(ω₂ − ω₁) turns with some 8 rad/s at most: |f″| < 8³, so the error is below (0.5/4000)²/12·0.5·512 < 4e-7. A torque held
+    over a step while the rods turn adds h/2·max|f′|·t = 0.5/8000·64·0.5 < 2.1e-3 at most. A torque of the wrong sign on one of
+    the rods would be seen: the work of each is more than 0.01, and would be missing twice.
+    """
+    envs = many("DoubleRod", 1, dt=0.5 / 4000, max_episode_steps=None)
+    envs.reset(seed=3)
+    energy, work, of_each = [], 0.0, np.zeros(2)
+    rate = None
+    for _ in range(4001):
+        v, y = envs.world.v[..., 0], envs.world.y[..., 0]
+        energy.append(0.5 * (v**2).sum() + 9.8 * y[:, 1].sum())
+        _, turning = envs._rods()
+        now = torque * np.array([-turning[0, 0], turning[1, 0]])
+        if rate is not None:
+            of_each += 0.5 * (rate + now) * (0.5 / 4000)
+        rate = now
+        envs.step(np.full((1, 1), torque, np.float32))
+    work = of_each.sum()
+    assert energy[-1] - energy[0] == pytest.approx(work, abs=2.1e-3)
+    assert (np.abs(of_each) > 0.01).all()
+    assert np.abs(np.linalg.norm(envs.world.y[0, :, 0]) - 1.0) < 1e-12
+
+
+def test_what_is_seen_of_the_double_rod() -> None:
+    envs = many("DoubleRod", 200)
+    seen, _ = envs.reset(seed=1)
+    assert (np.abs(np.arctan2(seen[:, 1], seen[:, 0])) <= 0.1 + EPS32).all()
+    assert (np.abs(seen[:, 4:]) <= 0.1 * (1 + 4 * EPS32)).all()
+    tip = -(seen[:, 0] + seen[:, 2])
+    assert tip == pytest.approx(envs.world.y[1, 1], abs=4 * float(EPS32))
+    envs.world.y[..., 0] = [[0.0, 1.0], [0.1, 1.99]]
+    _, rewards, terminated, _, _ = envs.step(np.zeros((200, 1), np.float32))
+    assert terminated.tolist() == [True] + [False] * 199
+    assert rewards.tolist() == [0.0] + [-1.0] * 199
+
+
+def test_shorter_steps_come_nearer_to_the_truth() -> None:
+    """Method, step and number of steps are arguments: sixteen steps of RK4 for one err less by 16⁴, and are much nearer."""
+
+    def end(substeps: int) -> Any:
+        envs = many("Pendulum", 1, dt=0.05 / substeps, substeps=substeps)
+        envs.reset(seed=2)
+        for _ in range(20):
+            envs.step(np.full((1, 1), 0.5, np.float32))
+        return envs.world.y[0]
+
+    finest = end(64)
+    assert 0 < abs(end(16) - finest) < abs(end(1) - finest) / 1000
+
+
+@pytest.mark.parametrize("name", [name for name in sw.gym.__all__ if name.endswith("VectorEnv") and name != "WorldVectorEnv"])
+def test_examples_print_what_they_say(name: str) -> None:
+    found = doctest.DocTestParser().get_doctest(inspect.getdoc(getattr(sw.gym, name)) or "", {}, name, None, None)
+    assert found.examples
+    told: list[str] = []
+    runner = doctest.DocTestRunner(verbose=False)
+    runner.run(found, out=told.append)
+    assert runner.failures == 0, "".join(told)
+
+
+# ---- wrong calls
+
+
+def test_wrong_calls() -> None:
+    with pytest.raises(ArgumentError, match="num_envs: expected 1 or more, got 0"):
+        sw.gym.PendulumVectorEnv(0)
+    with pytest.raises(ArgumentError, match="dt: expected numbers above zero in seconds"):
+        sw.gym.PendulumVectorEnv(dt=0.0)
+    with pytest.raises(UnknownNameError, match="there is no 'rk5'"):
+        sw.gym.PendulumVectorEnv(method="rk5")
+    with pytest.raises(UnsupportedError, match="leapfrog needs a second-order system"):
+        sw.gym.CartPoleVectorEnv(method="leapfrog")
+    with pytest.raises(ArgumentError, match="render_mode: expected None"):
+        sw.gym.PendulumVectorEnv(render_mode="human")  # type: ignore[arg-type]
+    envs = sw.gym.CartPoleVectorEnv(3)
+    with pytest.raises(ArgumentError, match=r"step: expected after reset\(\)"):
+        envs.step(np.zeros(3, dtype=int))
+    envs.reset()
+    with pytest.raises(ShapeError, match=r"actions: expected shape \(3,\), got int64 of shape \(2,\)"):
+        envs.step(np.zeros(2, dtype=np.int64))
+
+
+def test_gymnasium_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("stepwell.gym")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delattr(sw, "gym", raising=False)
+    with pytest.raises(UnsupportedError, match=r"needs gymnasium, which is not installed; pip install 'stepwell\[gym\]'"):
+        _ = sw.gym

@@ -1,0 +1,291 @@
+"""The site: it builds from a copy of the tree without a network or a warning, and its pages work in a browser, on a phone too."""
+
+from __future__ import annotations
+
+import html
+import inspect
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+from collections.abc import Iterator
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+import stepwell as sw
+from PIL import Image
+from stepwell import charts, quaternion, stability
+
+pytest.importorskip("sphinx_gallery", reason="the extra docs is not installed")
+pytest.importorskip("myst_nb", reason="the extra docs is not installed")
+pytest.importorskip("furo", reason="the extra docs is not installed")
+
+try:
+    from playwright.sync_api import Error, sync_playwright
+except ImportError:  # what is skipped then needs no names
+    sync_playwright = None  # type: ignore[assignment]
+
+ROOT = Path(__file__).resolve().parents[1]
+#: What a fresh clone has of the site: what was built in docs/ before is left out.
+NEEDED = ("docs", "examples", "benches", "README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+LEFT_OUT = shutil.ignore_patterns("gallery", "__pycache__", "control")
+#: A proxy at which nobody listens: whatever asks for a page of the web fails.
+NOWHERE = "http://127.0.0.1:9"
+FEWEST_PICTURES = 24
+TUTORIALS = ("first_run", "choose_a_step", "keep_energy", "your_equations", "game_loop", "sweep")
+CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+#: Attributes by which a page loads something, by element; a link that is only followed loads nothing.
+LOADS = {"script": "src", "img": "src", "iframe": "src", "source": "srcset", "video": "src", "link": "href", "object": "data"}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built site; ``make docs`` runs the same command."""
+    tree = tmp_path_factory.mktemp("site")
+    for name in NEEDED:
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tree / name, **({"ignore": LEFT_OUT} if copy is shutil.copytree else {}))
+    (recipe,) = re.findall(r"^\t\$\(BIN\)/sphinx-build (.*) docs \$\(OUT\)/docs$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert {"-n", "-W"} <= set(recipe.split()), "warnings are errors"
+    proxies = {name: NOWHERE for each in ("http_proxy", "https_proxy", "all_proxy") for name in (each, each.upper())}
+    # The package under test, whatever else is installed; an empty entry of the path would be the folder of the copy.
+    found = os.pathsep.join([str(Path(sw.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", *recipe.split(), "docs", "built"],
+        cwd=tree,
+        env=os.environ | proxies | {"PYTHONPATH": found, "no_proxy": "127.0.0.1,localhost", "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-6000:]
+    assert (tree / "built" / "index.html").exists()
+    return tree / "built"
+
+
+class Page(HTMLParser):
+    """What a page loads, where its links lead, and the names of its places."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.links: list[str] = []
+        self.places: set[str] = set()
+        self.frames: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        if "id" in given:
+            self.places.add(given["id"])
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        if LOADS.get(tag) in given:
+            self.loads.append(given[LOADS[tag]])
+        self.frames += [given["srcdoc"]] if "srcdoc" in given else []
+
+
+@cache
+def read(path: Path) -> Page:
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def from_the_web(site: Path) -> list[str]:
+    """Everything that a page, a style or a frame within a page would load from the web."""
+    found = []
+    for path in site.rglob("*.html"):
+        pages = [read(path), *map(Page, read(path).frames)]
+        found += [f"{path.name}: {load[:80]}" for page in pages for load in page.loads if re.match(r"(https?:)?//", load)]
+    for path in site.rglob("*.css"):
+        style = path.read_text(encoding="utf-8")
+        found += [f"{path.name}: {load}" for load in re.findall(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^)\"']*)", style)]
+    return found
+
+
+def test_nothing_is_loaded_from_the_web(site: Path) -> None:
+    assert not from_the_web(site)
+
+
+def test_what_is_loaded_from_the_web_is_found(tmp_path: Path) -> None:
+    frame = html.escape('<img src="https://example.org/a.png">')
+    (tmp_path / "a.html").write_text(f'<script src="//cdn.example.org/x.js"></script><iframe srcdoc="{frame}"></iframe>')
+    (tmp_path / "a.css").write_text('@import "https://example.org/font.css"; p { background: url(data:x) }')
+    assert len(from_the_web(tmp_path)) == 3
+
+
+def lost(site: Path) -> list[str]:
+    """Links and pictures that lead nowhere: to a file or a place in it that is not there, or to no proper address."""
+    found = []
+    for path in site.rglob("*.html"):
+        page = read(path)
+        for link in page.links + page.loads:
+            parts = urlsplit(link)
+            if parts.scheme in ("data", "mailto"):
+                continue
+            if parts.scheme or parts.netloc:
+                good = parts.scheme == "https" and re.fullmatch(r"[\w-]+(\.[\w-]+)+", parts.netloc)
+            else:
+                target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+                good = target.is_file() and (
+                    not parts.fragment or target.suffix != ".html" or unquote(parts.fragment) in read(target).places
+                )
+            if not good:
+                found.append(f"{path.relative_to(site)}: {link}")
+    return found
+
+
+def test_links_lead_somewhere(site: Path) -> None:
+    # The button at the end of a page leads to its start, which has no name.
+    assert not [each for each in lost(site) if not each.endswith(": #")]
+
+
+def test_a_lost_link_is_found(tmp_path: Path) -> None:
+    links = "b.html", "#here", "#there", "http://example.org", "https://example", "a.html#here", "https://example.org/x"
+    (tmp_path / "a.html").write_text('<p id="here">' + "".join(f'<a href="{link}">' for link in links))
+    assert [each.partition(": ")[2] for each in lost(tmp_path)] == ["b.html", "#there", "http://example.org", "https://example"]
+
+
+def thumbnails(site: Path) -> list[Path]:
+    """The pages of the gallery's thumbnails."""
+    text = (site / "gallery" / "index.html").read_text(encoding="utf-8")
+    found = re.findall(r'<div class="sphx-glr-thumbcontainer".*?<a[^>]* href="([^"#]*)', text, re.DOTALL)
+    return [site / "gallery" / link for link in found]
+
+
+def test_every_picture_of_the_gallery_has_its_script_and_notebook(site: Path) -> None:
+    pages = thumbnails(site)
+    scripts = sorted(file.stem for file in (ROOT / "examples").glob("*/*.py"))
+    assert sorted(page.stem for page in pages) == scripts
+    assert len(pages) >= FEWEST_PICTURES
+    for page in pages:
+        files = {Path(link).suffix: page.parent / link for link in read(page).links if "_downloads/" in link}
+        (script,) = (ROOT / "examples").glob(f"*/{page.stem}.py")
+        assert files[".py"].read_bytes() == script.read_bytes()
+        cells = json.loads(files[".ipynb"].read_text(encoding="utf-8"))["cells"]
+        assert {cell["cell_type"] for cell in cells} == {"code", "markdown"}
+        drawn = [load for load in read(page).loads if "/sphx_glr_" in load]
+        assert len(drawn) == 1, page.stem
+        with Image.open(page.parent / drawn[0]) as picture:
+            assert len(picture.convert("RGB").resize((160, 120)).getcolors(1 << 24) or []) > 50, (
+                f"{page.stem} draws next to nothing"
+            )
+
+
+def test_a_gallery_page_says_what_it_shows() -> None:
+    """A title, and one to three sentences."""
+    for script in (ROOT / "examples").glob("*/*.py"):
+        title, line, _, *told = script.read_text(encoding="utf-8").partition('"""')[2].partition('"""')[0].splitlines()
+        assert re.fullmatch("=+", line), script.name
+        assert len(title) == len(line), script.name
+        assert 40 < len(" ".join(told)) < 600, script.name
+
+
+def test_every_tutorial_ends_in_a_picture_or_an_animation(site: Path) -> None:
+    for name in TUTORIALS:
+        page = read(site / "tutorials" / f"{name}.html")
+        drawn = [load for load in page.loads if "_images/" in load]
+        assert drawn or page.frames, name
+        text = (site / "tutorials" / f"{name}.html").read_text(encoding="utf-8")
+        assert "output stderr" not in text, f"{name} shows a warning"
+        assert f"tutorials/{name}.html" in "".join(read(site / "index.html").links), "it is in the navigation"
+
+
+def documented(site: Path) -> set[str]:
+    """The names of the reference."""
+    inventory = (site / "objects.inv").read_bytes().split(b"\n", 4)[4]
+    return {line.split()[0] for line in zlib.decompress(inventory).decode("utf-8").splitlines() if " py:" in line}
+
+
+def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> None:
+    known = documented(site)
+    for module in (sw, charts, sw.errors, stability, quaternion, sw.scenes):
+        for name in getattr(module, "__all__", None) or dir(module):
+            thing = getattr(module, name)
+            own = getattr(thing, "__module__", "").startswith(module.__name__) and not name.startswith("_")
+            if own and (inspect.isfunction(thing) or inspect.isclass(thing)):
+                assert {f"{module.__name__}.{name}", f"stepwell.{name}"} & known, f"{module.__name__}.{name}"
+    page = (site / "reference" / "runs.html").read_text(encoding="utf-8")
+    assert "&gt;&gt;&gt; " in page
+
+
+# ---- in a browser
+
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None or sync_playwright is None, reason="there is no Chromium or no playwright here"
+)
+
+SEEN = (
+    *("index", "tutorials/first_run", "tutorials/sweep", "howto/usage", "gallery/index", "gallery/motion/heavy_top"),
+    *(
+        "reference/index",
+        "reference/systems",
+        "theory/stability",
+        "theory/paper",
+        "benchmarks/work-precision",
+        "developing/design",
+    ),
+)
+PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_playwright() as started:
+        try:
+            made = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        except Error as error:
+            pytest.skip(f"Chromium does not start here: {str(error)[:200]}")
+        yield made
+        made.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("window", [PHONE, DESKTOP], ids=["phone", "desktop"])
+def test_pages_open_without_a_complaint(site: Path, browser: Any, window: Any, scheme: str, tmp_path: Path) -> None:
+    context = browser.new_context(viewport=window, color_scheme=scheme)
+    page = context.new_page()
+    page.set_default_timeout(60_000)
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
+    allowed = ("file:", "data:", "about:", "blob:")
+    page.on("request", lambda request: None if request.url.startswith(allowed) else complaints.append(request.url))
+    for name in SEEN:
+        page.goto((site / f"{name}.html").as_uri())
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= window["width"], f"{name} is {wide} pixels wide"
+        shot = tmp_path / f"{name.replace('/', '-')}.png"
+        page.screenshot(path=shot)
+        with Image.open(shot) as seen:
+            small = seen.convert("L")
+            assert seen.width == window["width"]
+            corner = small.getpixel((seen.width - 3, seen.height - 3))
+            assert corner > 200 if scheme == "light" else corner < 60, f"{name} is not {scheme}"
+            low, high = small.getextrema()
+            assert high - low > 150, f"{name} shows next to nothing"
+    context.close()
+    assert not complaints
+
+
+@needs_browser
+def test_a_tutorial_animates_and_the_search_finds(site: Path, browser: Any) -> None:
+    page = browser.new_page()
+    page.set_default_timeout(60_000)
+    page.goto((site / "tutorials" / "first_run.html").as_uri())
+    frame = page.frame_locator("iframe.animation")
+    before = frame.locator("output").inner_text()
+    page.locator("iframe.animation").scroll_into_view_if_needed()
+    page.wait_for_timeout(1500)
+    assert frame.locator("output").inner_text() != before
+    page.goto((site / "search.html").as_uri() + "?q=leapfrog")
+    page.locator("#search-results li").first.wait_for()
+    page.close()

@@ -1,0 +1,534 @@
+"""``solve_ivp`` as SciPy has it: the same arguments and results, zeros of events where they are, and what is refused."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import (
+    ArgumentError,
+    DTypeError,
+    ShapeError,
+    ToleranceWarning,
+    TraceError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from stepwell.interop.ivp_events import ROOT_TOLERANCE, root
+
+EPS = np.finfo(float).eps
+
+
+def decay(t: Any, y: Any) -> Any:
+    return -0.5 * y
+
+
+def cannon(t: Any, y: Any) -> Any:
+    return [y[1], -0.5]
+
+
+def turning(t: Any, y: Any) -> Any:
+    return [y[1], -y[0]]
+
+
+def lotka_volterra(t: Any, z: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    x, y = z
+    return [a * x - b * x * y, -c * y + d * x * y]
+
+
+def event(function: Callable[..., Any], **attributes: Any) -> Any:
+    """An event function with attributes of its own."""
+
+    def copy(*given: Any) -> Any:
+        return function(*given)
+
+    for name, value in attributes.items():
+        setattr(copy, name, value)
+    return copy
+
+
+# ---- like SciPy
+
+
+def test_the_arguments_are_those_of_scipy() -> None:
+    scipy = pytest.importorskip("scipy.integrate")
+    theirs = [name for name in inspect.signature(scipy.solve_ivp).parameters if name != "options"]
+    mine = inspect.signature(sw.solve_ivp).parameters
+    assert [name for name, each in mine.items() if each.kind is each.POSITIONAL_OR_KEYWORD] == theirs
+    options = {*inspect.signature(scipy.DOP853).parameters, *inspect.signature(scipy.LSODA).parameters}
+    options |= {*inspect.signature(scipy.Radau).parameters} - {"extraneous"}
+    assert {name for name, each in mine.items() if each.kind is each.KEYWORD_ONLY} == options - {
+        "fun", "t0", "y0", "t_bound", "vectorized", "extraneous"
+    }  # fmt: skip
+
+
+#: The examples of SciPy's page, with the names of what they import left out.
+SCRIPTS = {
+    "decay": """
+def exponential_decay(t, y): return -0.5 * y
+sol = solve_ivp(exponential_decay, [0, 10], [2, 4, 8])
+""",
+    "decay at times": """
+def exponential_decay(t, y): return -0.5 * y
+sol = solve_ivp(exponential_decay, [0, 10], [2, 4, 8], t_eval=[0, 1, 2, 4, 10])
+""",
+    "cannon": """
+def upward_cannon(t, y): return [y[1], -0.5]
+def hit_ground(t, y): return y[0]
+hit_ground.terminal = True
+hit_ground.direction = -1
+sol = solve_ivp(upward_cannon, [0, 100], [0, 10], events=hit_ground)
+""",
+    "cannon, apex": """
+def upward_cannon(t, y): return [y[1], -0.5]
+def hit_ground(t, y): return y[0]
+hit_ground.terminal = True
+hit_ground.direction = -1
+def apex(t, y): return y[1]
+sol = solve_ivp(upward_cannon, [0, 100], [0, 10], events=(hit_ground, apex), dense_output=True)
+""",
+    "Lotka-Volterra": """
+import numpy as np
+def lotkavolterra(t, z, a, b, c, d):
+    x, y = z
+    return [a*x - b*x*y, -c*y + d*x*y]
+sol = solve_ivp(lotkavolterra, [0, 15], [10, 5], args=(1.5, 1, 3, 1), dense_output=True, t_eval=np.linspace(0, 15, 300))
+""",
+}
+
+
+@pytest.mark.parametrize("which", SCRIPTS)
+def test_scipys_examples_run_by_one_import(which: str) -> None:
+    pytest.importorskip("scipy")
+    made = {}
+    for package in ("scipy.integrate", "stepwell"):
+        namespace: dict[str, Any] = {}
+        exec(f"from {package} import solve_ivp\n{SCRIPTS[which]}", namespace)
+        made[package] = namespace["sol"]
+    theirs, mine = made["scipy.integrate"], made["stepwell"]
+    assert set(mine) == set(theirs)
+    for name in ("status", "message", "success", "njev", "nlu"):
+        assert mine[name] == theirs[name]
+        assert type(mine[name]) is type(theirs[name])
+    assert (mine.sol is None) == (theirs.sol is None)
+    assert (mine.t_events is None) == (theirs.t_events is None)
+    assert mine.y.shape == (len(theirs.y), len(mine.t))
+    for one, other in zip(mine.t_events or [], theirs.t_events or [], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+    for one, other in zip(mine.y_events or [], theirs.y_events or [], strict=True):
+        assert one.shape == other.shape
+    if "at times" in which:
+        np.testing.assert_array_equal(mine.t, theirs.t)
+    assert mine.t[0] == theirs.t[0]
+    assert mine.t[-1] == pytest.approx(theirs.t[-1], rel=1e-12)
+
+
+def test_the_result_is_a_dictionary_with_attributes() -> None:
+    found = sw.solve_ivp(decay, (0, 1), [1.0])
+    assert found["t"] is found.t
+    assert {"t", "y", "sol"} <= set(dir(found))
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = found.nothing
+    assert repr(found).splitlines()[0].split() == ["message:", *found.message.split()]
+    assert max(map(len, repr(found).splitlines())) < 120
+
+
+def test_backward_in_time() -> None:
+    """And there and back again: each way adds at most its steps times the tolerance of one."""
+    rtol, atol = 1e-11, 1e-14
+    there = sw.solve_ivp(lambda t, y: -t * y, (2.0, -1.0), [1.0], rtol=rtol, atol=atol, dense_output=True)
+    assert (np.diff(there.t) < 0).all()
+    assert there.t[[0, -1]].tolist() == [2.0, -1.0]
+    # y = exp((4 − t²)/2); an error made at s is multiplied by y(t)/y(s), so relative errors add up.
+    bound = (len(there.t) + 1) * (rtol + atol)  # y is 1 or more
+    for t, y in zip([*there.t, 0.5], [*there.y[0], there.sol(0.5)[0]], strict=True):
+        assert abs(y / np.exp((4 - t * t) / 2) - 1) < bound
+    back = sw.solve_ivp(lambda t, y: -t * y, (-1.0, 2.0), there.y[:, -1], rtol=rtol, atol=atol)
+    assert abs(back.y[0, -1] - 1.0) < bound + (len(back.t) + 1) * (rtol + atol)
+    falling = sw.solve_ivp(turning, (0.0, -7.0), [1.0, 0.0], t_eval=[0.0, -1.0, -7.0], rtol=1e-9)
+    assert falling.t.tolist() == [0.0, -1.0, -7.0]
+    assert falling.y[0] == pytest.approx(np.cos(falling.t), abs=1e-6)
+
+
+# ---- the same bits as a run
+
+
+def test_states_are_those_of_a_run_to_the_bit() -> None:
+    """At times and from ``sol``, with steps one by one and all at once."""
+
+    @sw.system(order=1, shape=(3,))
+    def lorenz(t: Any, y: Any) -> Any:
+        return [10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
+
+    times = np.linspace(0.0, 5.0, 41)
+    run = sw.integrate(lorenz, "merson", y=[1.0, 2.0, 3.0], tolerance=(1e-6, np.sqrt(3) * 1e-8), at=times)
+    options: dict[str, Any] = {"t_span": (0.0, 5.0), "y0": [1.0, 2.0, 3.0], "method": "merson", "rtol": 1e-6, "atol": 1e-8}
+    once = sw.solve_ivp(lorenz, t_eval=times, **options)
+    stepped = sw.solve_ivp(lorenz.function, t_eval=times, dense_output=True, **options)
+    assert once.y.tobytes() == np.ascontiguousarray(run.y.T).tobytes()
+    assert stepped.y.tobytes() == once.y.tobytes()
+    shuffled = np.random.default_rng(1).permutation(np.append(times, times[3]))
+    again = stepped.sol(shuffled)
+    assert again.tobytes() == once.y[:, np.searchsorted(times, shuffled)].tobytes()
+    assert run.paces is not None
+    assert once.nfev == run.paces.evaluations
+    steps = sw.solve_ivp(lorenz.function, **options)
+    assert len(steps.t) == run.paces.accepted + 2  # the start, and the step that ends at the end
+    assert steps.sol is None
+    np.testing.assert_array_equal(stepped.sol(steps.t), steps.y)
+    assert stepped.sol.n_segments == len(steps.t) - 1
+
+
+def test_sol_is_refused_outside_its_steps() -> None:
+    found = sw.solve_ivp(decay, (0, 1), [1.0, 2.0], dense_output=True)
+    assert found.sol(0.5).shape == (2,)
+    assert found.sol([0.5]).shape == (2, 1)
+    assert found.sol([]).shape == (2, 0)
+    assert (found.sol.t_min, found.sol.t_max) == (0.0, 1.0)
+    for wrong in (-1e-9, 1.0 + 1e-9, [0.5, 2.0]):
+        with pytest.raises(ArgumentError, match="t: expected times from 0 to 1, between which there are steps"):
+            found.sol(wrong)
+    with pytest.raises(ShapeError, match="t: expected a time, or times along one axis"):
+        found.sol([[0.5]])
+
+
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+def test_a_state_within_a_step_is_as_good_as_at_its_end(method: str) -> None:
+    """Turning keeps lengths, so errors only add up: N steps and an extra one err by no more than (N + 1) tolerances."""
+    rtol, atol = 1e-8, 1e-12
+    found = sw.solve_ivp(turning, (0, 10), [1.0, 0.0], method=method, dense_output=True, rtol=rtol, atol=atol)
+    t = np.linspace(0, 10, 301)
+    error = np.linalg.norm(found.sol(t) - [np.cos(t), -np.sin(t)], axis=0)
+    # The estimate is of the result with which these methods go on, or of a lower order and so larger.
+    assert error.max() < (len(found.t) + 1) * (rtol + np.sqrt(2) * atol)
+    # A cubic polynomial through both ends and their rates, which would cost nothing, is not as good.
+    i = np.clip(np.searchsorted(found.t, t, side="right") - 1, 0, len(found.t) - 2)
+    h = found.t[i + 1] - found.t[i]
+    s = (t - found.t[i]) / h
+    a, b = found.y[:, i], found.y[:, i + 1]
+    rates_a, rates_b = np.array([a[1], -a[0]]), np.array([b[1], -b[0]])
+    cubic = (
+        (1 + 2 * s) * (1 - s) ** 2 * a + s * (1 - s) ** 2 * h * rates_a + s * s * (3 - 2 * s) * b - s * s * (1 - s) * h * rates_b
+    )
+    if method == "dop853":
+        assert np.linalg.norm(cubic - [np.cos(t), -np.sin(t)], axis=0).max() > 1000 * error.max()
+
+
+# ---- events
+
+
+@pytest.mark.parametrize(
+    ("g", "a", "b", "zero"),
+    [
+        (lambda x: x**3 - 2.0, 0.0, 2.0, 2 ** (1 / 3)),
+        (lambda x: np.cos(x), 1.0, 2.0, np.pi / 2),
+        (lambda x: np.cos(x), 2.0, 1.0, np.pi / 2),
+        (lambda x: np.exp(x) - 1e6, -10.0, 100.0, np.log(1e6)),
+        (lambda x: x - 1e-9, -1.0, 1.0, 1e-9),
+        (lambda x: (x - 1 / 3) ** 9, 0.0, 1.0, 1 / 3),
+        (lambda x: np.sign(x - 0.7), 0.0, 1.0, 0.7),
+        (lambda x: np.tanh(1e5 * (x - 1e5)), 0.0, 3e5, 1e5),
+    ],
+)
+def test_a_zero_is_found_to_four_roundings(g: Callable[[float], float], a: float, b: float, zero: float) -> None:
+    calls = []
+
+    def counted(x: float) -> float:
+        calls.append(x)
+        return float(g(x))
+
+    found = root(counted, a, b, counted(a), counted(b))
+    if "** 9" in inspect.getsource(g) and zero == 1 / 3:
+        assert abs(found - zero) < 1e-5  # where the power underflows it is zero all around
+    else:
+        assert abs(found - zero) <= ROOT_TOLERANCE * (1.0 + abs(zero)) + 2 * EPS * abs(zero)
+    assert len(calls) < 150
+
+
+def test_a_zero_at_an_end() -> None:
+    assert root(lambda x: x, 0.0, 1.0, 0.0, 1.0) == 0.0
+    assert root(lambda x: x - 1, 0.0, 1.0, -1.0, 0.0) == 1.0
+
+
+def height(t: Any, y: Any) -> Any:
+    return y[0]
+
+
+def test_events_lie_where_they_do() -> None:
+    """The zeros of the cosine: at each the error is that of the state, at most a tolerance a step, over the slope, which is 1."""
+    rtol, atol = 1e-10, 1e-13
+    found = sw.solve_ivp(turning, (0, 20), [1.0, 0.0], events=height, rtol=rtol, atol=atol)
+    true = np.pi * (np.arange(6) + 0.5)
+    bound = (len(found.t) + 1) * (rtol + np.sqrt(2) * atol)
+    assert found.t_events is not None
+    assert found.t_events[0].shape == true.shape
+    assert np.abs(found.t_events[0] - true).max() < bound
+    assert found.y_events[0].shape == (6, 2)
+    assert np.abs(found.y_events[0][:, 0]).max() < 100 * EPS
+    # A straight line between the ends of the steps would not find them.
+    i = np.flatnonzero(np.diff(np.sign(found.y[0])))
+    line = found.t[i] - found.y[0, i] * np.diff(found.t)[i] / np.diff(found.y[0])[i]
+    assert np.abs(line - true).max() > 1000 * bound
+    # Events change no step.
+    np.testing.assert_array_equal(found.y, sw.solve_ivp(turning, (0, 20), [1.0, 0.0], rtol=rtol, atol=atol).y)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("direction", "which"), [(0, [0, 1, 2, 3, 4, 5]), (1, [1, 3, 5]), (-1, [0, 2, 4])])
+def test_directions_and_ends(direction: int, which: list[int], sign: int) -> None:
+    """In the order of the run, forward or backward; SciPy's directions are those of the run as well."""
+    options: dict[str, Any] = {"t_span": (0, 20 * sign), "y0": [1.0, 0.0], "rtol": 1e-9}
+    found = sw.solve_ivp(turning, events=event(height, direction=direction), **options)
+    true = sign * np.pi * (np.array(which) + 0.5)
+    assert found.t_events[0] == pytest.approx(true, abs=1e-6)
+    assert found.status == 0
+    for terminal in (True, 1, 2):
+        ended = sw.solve_ivp(turning, events=event(height, direction=direction, terminal=terminal), dense_output=True, **options)
+        last = true[int(terminal) - 1]
+        assert ended.status == 1
+        assert ended.success
+        assert ended.message == "A termination event occurred."
+        assert ended.t[-1] == ended.t_events[0][-1] == pytest.approx(last, abs=1e-6)
+        assert len(ended.t_events[0]) == int(terminal)
+        np.testing.assert_array_equal(ended.y[:, -1], ended.y_events[0][-1])
+        np.testing.assert_array_equal(ended.sol(ended.t[-1]), ended.y[:, -1])
+    scipy = pytest.importorskip("scipy.integrate")
+    # Older versions do not know numbers for ``terminal``.
+    theirs = scipy.solve_ivp(turning, events=event(height, direction=direction, terminal=True), method="DOP853", **options)
+    assert ended.t_events[0][:1] == pytest.approx(theirs.t_events[0], abs=1e-6)
+
+
+def test_events_of_one_step_come_in_their_order() -> None:
+    """Of three in a step, listed in another order, the second ends the run: the first is noted, the third is not."""
+    events = [
+        event(lambda t, y, at=at: y[0] - at, terminal=terminal) for at, terminal in ((3.0, True), (2.0, True), (1.0, False))
+    ]
+    found = sw.solve_ivp(lambda t, y: [1.0], (0, 10), [0.0], events=events, first_step=5.0)
+    assert [len(each) for each in found.t_events] == [0, 1, 1]
+    assert [each.shape for each in found.y_events] == [(0, 1), (1, 1), (1, 1)]
+    assert found.t[-1] == pytest.approx(2.0, abs=1e-14)
+    assert found.t_events[2] == pytest.approx([1.0], abs=1e-14)
+
+
+def test_times_end_with_an_event() -> None:
+    ground = event(height, terminal=True, direction=-1)
+    found = sw.solve_ivp(cannon, (0, 100), [0.0, 10.0], t_eval=np.arange(0.0, 100.0, 15.0), events=ground)
+    assert found.t.tolist() == [0.0, 15.0, 30.0]
+    # y = 10·t − t²/4 is exact but for rounding: it errs by some roundings of 100 near the ground, where its slope is −10.
+    assert found.y[0] == pytest.approx([0.0, 93.75, 75.0], abs=100 * 30 * EPS)
+    assert found.t_events[0] == pytest.approx([40.0], abs=100 * 30 * EPS / 10 + ROOT_TOLERANCE * 41)
+
+
+def test_an_event_gets_the_arguments() -> None:
+    def above(t: float, z: Any, a: float, b: float, c: float, d: float) -> float:
+        return z[0] - c
+
+    found = sw.solve_ivp(lotka_volterra, (0, 15), [10, 5], args=(1.5, 1, 3, 1), events=above, rtol=1e-8)
+    assert len(found.t_events[0]) > 2
+    assert np.abs(found.y_events[0][:, 0] - 3).max() < 1e-12
+
+
+# ---- what is traced
+
+
+class Swing:
+    """Equations of an object."""
+
+    def __init__(self, k: float) -> None:
+        self.k = k
+
+    def rates(self, t: Any, y: Any) -> Any:
+        return np.array([y[1], -self.k * np.sin(y[0])])
+
+    def __call__(self, t: Any, y: Any) -> Any:
+        return self.rates(t, y)
+
+
+def swing(k: float, t: Any, y: Any) -> Any:
+    return np.array([y[1], -k * np.sin(y[0])])
+
+
+def swing_matrix(t: Any, y: Any, both: dict[str, Any]) -> Any:
+    return both["turn"] @ y - np.array([0.0, both["k"] * (np.sin(y[0]) - y[0])])
+
+
+def swing_column(t: Any, y: Any) -> Any:
+    assert y.ndim == 2
+    return np.array([y[1], -2.0 * np.sin(y[0])])
+
+
+WAYS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "lambda": (lambda t, y: (y[1], -2.0 * np.sin(y[0])), {}),
+    "method": (Swing(2.0).rates, {}),
+    "object": (Swing(2.0), {}),
+    "partial": (functools.partial(swing, 2.0), {}),
+    "args": (lambda t, y, k: [y[1], -k * np.sin(y[0])], {"args": (2.0,)}),
+    "args, a list": (lambda t, y, k: [y[1], -k * np.sin(y[0])], {"args": [2]}),
+    "args, a dictionary": (swing_matrix, {"args": ({"turn": np.array([[0.0, 1.0], [-2.0, 0.0]]), "k": 2.0},)}),
+    "column": (swing_column, {"vectorized": True}),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_any_callable_is_traced(way: str) -> None:
+    fun, options = WAYS[way]
+    found = sw.solve_ivp(fun, (0, 5), [1.0, 0.0], rtol=1e-9, atol=1e-12, t_eval=[5.0], **options)
+    run = sw.integrate(sw.Pendulum(np.sqrt(2.0)), "dop853", v=0.0, y=1.0, tolerance=1e-12, at=[5.0])
+    assert found.y[:, 0] == pytest.approx([run.y[-1], run.v[-1]], abs=1e-6)
+
+
+def test_a_single_number_may_be_returned() -> None:
+    found = sw.solve_ivp(lambda t, y: -0.5 * y[0], (0, 1), [1.0], rtol=1e-9, atol=1e-12)
+    assert found.y[0, -1] == pytest.approx(np.exp(-0.5), abs=1e-8)
+
+
+def test_the_line_that_cannot_be_traced_is_named() -> None:
+    def bouncing(t: Any, y: Any) -> Any:
+        if y[0] < 0:
+            return [y[1], 1.0]
+        return [y[1], -1.0]
+
+    with pytest.raises(TraceError, match=r"fun: bouncing \(test_solve_ivp.py, line \d+: if y\[0\] < 0:\): .* write\s+np.where"):
+        sw.solve_ivp(bouncing, (0, 1), [1.0, 0.0])
+
+
+# ---- steps
+
+
+def test_steps_can_be_limited() -> None:
+    free = sw.solve_ivp(decay, (0, 10), [1.0])
+    assert np.diff(free.t).max() > 1.0
+    held = sw.solve_ivp(decay, (0, 10), [1.0], max_step=0.25)
+    assert np.diff(held.t).max() <= 0.25 + np.spacing(10.0)  # each time is rounded by half of that
+    first = sw.solve_ivp(decay, (0, 10), [1.0], first_step=0.3)
+    assert first.t[1] == 0.3
+    assert sw.solve_ivp(decay, (0, 10), [1.0], first_step=5.0, max_step=0.5).t[1] == 0.5
+    narrow = event(lambda t, y: (y[0] - np.exp(-1.0)) * (y[0] - np.exp(-1.01)))  # two zeros, at t = 2 and 2.02
+    assert len(sw.solve_ivp(decay, (0, 10), [1.0], events=narrow, rtol=1e-8).t_events[0]) == 0
+    assert len(sw.solve_ivp(decay, (0, 10), [1.0], events=narrow, rtol=1e-8, max_step=0.01).t_events[0]) == 2
+
+
+def test_a_state_that_ends_is_told() -> None:
+    """y = 1/(1 − t) ends at t = 1; the states before it are returned."""
+    for options in ({}, {"t_eval": [0.0, 0.5, 0.9, 1.5]}, {"dense_output": True}):
+        found = sw.solve_ivp(lambda t, y: y * y, (0, 2), [1.0], rtol=1e-6, **options)  # type: ignore[arg-type]
+        assert (found.status, found.success) == (-1, False)
+        assert found.message in {
+            "Required step size is less than spacing between numbers.",
+            "No step, however short, gives a finite state.",
+        }
+        assert 0.9 <= found.t[-1] <= 1.01
+        assert found.y.shape == (1, len(found.t))
+        assert np.isfinite(found.y).all()
+    assert found.sol(0.5) == pytest.approx([2.0], rel=1e-3)
+
+
+def test_no_time_at_all() -> None:
+    for options in ({}, {"t_eval": [1.0]}, {"dense_output": True}, {"events": height}):
+        found = sw.solve_ivp(decay, (1.0, 1.0), [2.0], **options)  # type: ignore[arg-type]
+        assert found.success
+        assert found.t.tolist() == [1.0]
+        assert found.y.tolist() == [[2.0]]
+
+
+def test_the_absolute_tolerance_may_be_zero_or_several() -> None:
+    found = sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=1e-9, atol=0.0)
+    assert found.y[:, -1] == pytest.approx(np.exp(-5.0) * np.array([1.0, 2.0]), rel=1e-7)
+    several = sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=[1e-3, 1e-6], atol=[1e-6, 1e-9])
+    np.testing.assert_array_equal(several.y, sw.solve_ivp(decay, (0, 10), [1.0, 2.0], rtol=1e-6, atol=1e-9).y)
+    with pytest.warns(ToleranceWarning, match="rtol: 1e-20 is too small"):
+        sw.solve_ivp(decay, (0, 1), [1.0], rtol=1e-20)
+
+
+# ---- methods
+
+
+def test_methods_by_name() -> None:
+    default = sw.solve_ivp(decay, (0, 10), [1.0])
+    for name in ("DOP853", "dop853", sw.method("dop853")):
+        np.testing.assert_array_equal(sw.solve_ivp(decay, (0, 10), [1.0], name).y, default.y)
+    scipy = pytest.importorskip("scipy.integrate")
+    np.testing.assert_array_equal(sw.solve_ivp(decay, (0, 10), [1.0], scipy.DOP853).y, default.y)
+
+
+@pytest.mark.parametrize("name", ["RK45", "rk45", "RK23", "Radau", "BDF", "LSODA"])
+def test_methods_that_are_not_here_are_never_replaced(name: str) -> None:
+    stiff = name in ("Radau", "BDF", "LSODA")
+    match = (
+        f"method: {name.upper() if name == 'rk45' else name} is .* here.*{'stay with SciPy' if stiff else 'write one of these: '}"
+    )
+    with pytest.raises(UnknownNameError, match=match) as told:
+        sw.solve_ivp(decay, (0, 10), [1.0], name)
+    able = [m.name for m in sw.methods() if m.error_order is not None]
+    assert all(repr(each) in str(told.value) for each in able)
+    scipy = pytest.importorskip("scipy.integrate")
+    with pytest.raises(UnknownNameError, match=match):
+        sw.solve_ivp(decay, (0, 10), [1.0], getattr(scipy, name.upper() if name == "rk45" else name))
+
+
+def test_methods_that_cannot_choose_their_steps() -> None:
+    with pytest.raises(UnsupportedError, match=r"method: rk4 does not estimate its error.*write one of these: 'fehlberg'"):
+        sw.solve_ivp(decay, (0, 1), [1.0], "rk4")
+    with pytest.raises(UnknownNameError, match="there is no 'nonsense'"):
+        sw.solve_ivp(decay, (0, 1), [1.0], "nonsense")
+    with pytest.raises(DTypeError, match=r"method: expected a name, got 3 \(int\)"):
+        sw.solve_ivp(decay, (0, 1), [1.0], 3)
+
+
+# ---- wrong calls
+
+RIGHT: dict[str, Any] = {"fun": decay, "t_span": (0, 1), "y0": [1.0, 2.0]}
+WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
+    ({"y0": 1.0}, ShapeError, r"y0: expected a state of shape \(n,\), got shape \(\)"),
+    ({"y0": []}, ShapeError, r"y0: expected a state of shape \(n,\), got shape \(0,\)"),
+    ({"y0": [[1.0]]}, ShapeError, r"y0: expected a state of shape \(n,\), got shape \(1, 1\)"),
+    ({"y0": [1j]}, DTypeError, "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts"),
+    ({"y0": [np.nan]}, ArgumentError, "y0: expected finite numbers"),
+    ({"t_span": 1.0}, ShapeError, r"t_span: expected the times \(t0, tf\)"),
+    ({"t_span": (0.0, 1.0, 2.0)}, ShapeError, r"t_span: expected the times \(t0, tf\)"),
+    ({"t_span": (0.0, np.inf)}, ArgumentError, "t_span: expected finite numbers"),
+    ({"t_eval": [0.5, 2.0]}, ArgumentError, "t_eval: expected times within t_span, 0 to 1, got 0.5 to 2"),
+    ({"t_eval": [0.5, 0.2]}, ArgumentError, "t_eval: expected times that go from 0 to 1"),
+    ({"t_eval": [0.5, 0.5]}, ArgumentError, "t_eval: expected times that go from 0 to 1"),
+    ({"t_eval": 0.5}, ShapeError, "t_eval: expected times along one axis"),
+    ({"first_step": 0.0}, ArgumentError, "first_step: expected numbers above zero"),
+    ({"first_step": 2.0}, ArgumentError, "first_step: expected at most the whole time, 1, got 2"),
+    ({"max_step": 0.0}, ArgumentError, "max_step: expected numbers above zero"),
+    ({"rtol": 0.0}, ArgumentError, "rtol: expected numbers above zero"),
+    ({"atol": -1.0}, ArgumentError, "atol: expected numbers of zero or more"),
+    ({"atol": [1e-6, 1e-6, 1e-6]}, ShapeError, "atol: expected a number, or one for each of the 2 of the state"),
+    ({"args": (3.0,)}, ArgumentError, r"fun, args: decay\(t, y\) is called with t, y and 1 args"),
+    ({"events": lambda t: t}, ArgumentError, r"events, args: <lambda>\(t\) is called with t, y and 0 args"),
+    ({"events": dict}, DTypeError, r"events: expected functions event\(t, y\), got <class 'dict'>"),
+    ({"args": 3}, ArgumentError, r"args: expected a tuple such as args=\(a,\), got 3"),
+    ({"events": 3}, DTypeError, "events: expected a list of functions, got 3"),
+    ({"events": [3]}, DTypeError, r"events: expected functions event\(t, y\), got 3 \(int\)"),
+    ({"events": lambda t, y: y}, DTypeError, "events: expected a function that returns one real number"),
+    ({"events": event(height, terminal=-1)}, ArgumentError, "terminal: expected 0 or more"),
+    ({"dense_output": 1}, DTypeError, "dense_output: expected True or False"),
+    ({"fun": 3}, DTypeError, r"fun: expected a function fun\(t, y\), got 3 \(int\)"),
+    ({"fun": sw.system(lambda t, v, y: -y)}, DTypeError, "got the system <lambda> of second order; use integrate"),
+    ({"fun": np.sin}, DTypeError, "fun: expected a function written in Python"),
+    ({"fun": lambda t, y: [1.0]}, TraceError, r"expected ẏ of shape \(2,\)"),
+    ({"fun": lambda t, y: 1j * y}, TraceError, "complex"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "error", "match"), WRONG, ids=[str(next(iter(given.items())))[:40] for given, _, _ in WRONG])
+def test_wrong_calls(given: dict[str, Any], error: type[Exception], match: str) -> None:
+    with pytest.raises(error, match=match):
+        sw.solve_ivp(**RIGHT | given)
+
+
+def test_arguments_of_implicit_methods_are_of_no_use() -> None:
+    with pytest.warns(UserWarning, match="jac, min_step: of no use"):
+        sw.solve_ivp(decay, (0, 1), [1.0], jac=lambda t, y: [[-0.5]], min_step=1e-9)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.solve_ivp(decay, (0, 1), [1.0], jac=None)

@@ -1,0 +1,410 @@
+"""Taylor series of solutions: their coefficients against known ones, their steps, what they refuse."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core, engine
+from stepwell.errors import UnsupportedError
+from stepwell.reference import series, series_pace
+from stepwell.reference.traced import Tracer
+from test_graphs import assert_one_graph
+from truths import DRIVE, END, FORCE, OMEGA, forced_exact
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benches.compare.chosen import solar
+
+TAYLOR = sw.method("taylor")
+EPS = 2.0**-52
+
+#: Rates that are functions of the time alone, as NumPy and as mpmath have them; p is a polynomial, about 0.4.
+FUNCTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {
+    "product": (lambda p: p * p * (p + 1.0), lambda p: p * p * (p + 1)),
+    "quotient": (lambda p: (p + 1.0) / (p * p + 2.0), lambda p: (p + 1) / (p * p + 2)),
+    "reciprocal": (lambda p: 2.0 / p, lambda p: 2 / p),
+    "root": (np.sqrt, mpmath.sqrt),
+    "negative": (lambda p: -p * (1.0 - p), lambda p: -p * (1 - p)),
+    "sin": (np.sin, mpmath.sin),
+    "cos": (np.cos, mpmath.cos),
+    "tan": (np.tan, mpmath.tan),
+    "arcsin": (np.arcsin, mpmath.asin),
+    "arccos": (np.arccos, mpmath.acos),
+    "arctan": (np.arctan, mpmath.atan),
+    "arctan2": (lambda p: np.arctan2(p, p + 1.0), lambda p: mpmath.atan(p / (p + 1))),
+    "sinh": (np.sinh, mpmath.sinh),
+    "cosh": (np.cosh, mpmath.cosh),
+    "tanh": (np.tanh, mpmath.tanh),
+    "exp": (np.exp, mpmath.exp),
+    "expm1": (np.expm1, mpmath.expm1),
+    "log": (np.log, mpmath.log),
+    "log1p": (np.log1p, mpmath.log1p),
+    "cbrt": (np.cbrt, mpmath.cbrt),
+    "hypot": (lambda p: np.hypot(p, 2.0 * p + 1.0), lambda p: mpmath.sqrt(p * p + (2 * p + 1) ** 2)),
+    "whole power": (lambda p: p**3, lambda p: p**3),
+    "power": (lambda p: p**0.3, lambda p: p ** mpmath.mpf(0.3)),
+    "exponent": (lambda p: 1.7**p, lambda p: mpmath.mpf(1.7) ** p),
+    "both": (lambda p: p**p, lambda p: p**p),
+    "abs": (lambda p: abs(-p), lambda p: p),
+}
+
+
+def polynomial(t: Any) -> Any:
+    return 0.4 + t * (0.25 + t * (-0.125 + t * 0.5))
+
+
+def of_time(name: str) -> sw.System:
+    function = FUNCTIONS[name][0]
+
+    @sw.system(order=1)
+    def rate(t: Any, y: Any) -> Any:
+        return function(polynomial(t)) + 0.0 * y
+
+    return rate().sized(None, np.zeros(()))
+
+
+def coefficients(system: sw.System, order: int, v: Any, y: Any) -> list[Any]:
+    with np.errstate(all="ignore"):
+        return series.coefficients(system.alone(1.0, ()), order, 0.0, 1.0, np.asarray(v), np.asarray(y))
+
+
+def assert_known(name: str) -> None:
+    """The coefficients of a function of a polynomial, within roundings.
+
+    One of order k is a sum of products of lower ones. With the polynomial's |cⱼ| ≤ ½·ρ⁻ʲ and functions that are analytic where
+    |t| < ρ, roundings grow as ρ⁻ᵏ: they are allowed 40 units of the largest of the coefficients so far for each order.
+    """
+    found = [float(y) for _, y in coefficients(of_time(name), 13, np.zeros(0), 0.0)]
+    with mpmath.workdps(60):
+        true = [float(mpmath.re(c)) for c in mpmath.taylor(lambda t: FUNCTIONS[name][1](polynomial(t)), 0, 12)]
+    size = 1.0
+    for k in range(13):
+        size = max(size, abs(true[k]))
+        assert abs(found[k] * (k + 1) - true[k]) <= 40 * (k + 1) * EPS * size, (name, k)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_coefficients_of_functions(name: str) -> None:
+    assert_known(name)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_core_and_reference_are_one_graph(name: str) -> None:
+    system, tape = of_time(name), _core.Tape()
+    for what, of in (("step", Tracer(system, tape).step), ("attempt", Tracer(system, tape).attempt)):
+        model = engine.model(engine.Plan(system, TAYLOR, (), 0.1))
+        assert_one_graph(tape, tape.trace(model, what), of(TAYLOR))
+
+
+def _wrong_product(a: Any, b: Any, k: int) -> Any:
+    return series._product(a[k], b[0]) if k else None
+
+
+MISTAKES: dict[str, tuple[str, Any, str]] = {
+    "a product of the newest terms only": ("_convolved", _wrong_product, "product"),
+    "a difference for a sum": ("_sum", lambda a, b: series._difference(a, b), "quotient"),
+    "a sum for a difference": ("_difference", lambda a, b: b if a is None else (a if b is None else a + b), "root"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_wrong_recurrence_is_noticed(mistake: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, wrong, of = MISTAKES[mistake]
+    monkeypatch.setattr(series, name, wrong)
+    with pytest.raises(AssertionError):
+        assert_known(of)
+
+
+def test_a_wrong_derivative_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from stepwell.derivatives import rules
+
+    monkeypatch.setitem(rules.PARTIALS, "sin", (lambda f, y, x: -f("cos")(x),))
+    with pytest.raises(AssertionError):
+        assert_known("sin")
+
+
+def test_a_step_is_the_series_cut_off_at_order_eight() -> None:
+    """Of ẏ = y², y(0) = 1: 1/(1 − t) = Σ tᵏ. Every power and every sum is rounded: some 40 times in all, each term below 1.3."""
+
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y * y
+
+    for h in (0.1, 0.2):
+        run = sw.integrate(growth, "taylor", y=1.0, dt=h, steps=1)
+        assert abs(run.y[-1] - sum(h**k for k in range(9))) < 40 * EPS
+        assert abs(run.y[-1] - sum(h**k for k in range(8))) > 0.5 * h**8
+
+
+def _cleaned_slopes(error: Callable[[int], tuple[Any, Any]]) -> list[float]:
+    """The order that 8, 16 and 32 steps show, of v and of y.
+
+    E(h) = C·h⁸ + D·h⁹ + …. F(h) = 2⁹·E(h/2) − E(h) has no h⁹, so its slope is off by O(h²). With E alone it is
+    off by O(h), and that of v on the forced system all but vanishes at 4 steps: slopes from 2 steps on are 13.3, 3.7, 7.5, 7.8.
+    Rounding, 1e-15·2⁹, is below a hundredth of F.
+    """
+    errors = [error(steps) for steps in (8, 16, 32)]
+    slopes = []
+    for block in (0, 1):
+        first, second = (np.linalg.norm(2.0**9 * np.atleast_1d(b[block]) - a[block]) for a, b in itertools.pairwise(errors))
+        slopes.append(float(np.log2(first / second)))
+    return slopes
+
+
+def _forced(steps: int, backend: Any) -> tuple[Any, Any]:
+    system = sw.Oscillator(OMEGA, 0.2, a=sw.Sinusoid(FORCE, DRIVE), form="physical")
+    run = sw.integrate(system, "taylor", v=0.3, y=1.0, dt=END / steps, steps=steps, backend=backend)
+    v, y = forced_exact(END, 0.2, 0.3, 1.0)
+    return run.v[-1] - v, run.y[-1] - y
+
+
+def _clover(steps: int, backend: Any) -> tuple[Any, Any]:
+    """Three bodies on the unit circle, angular speed 1, after three units of time."""
+    scene = sw.scenes.clover()
+    run = sw.integrate(scene.system, "taylor", v=scene.v, y=scene.y, dt=3.0 / steps, steps=steps, backend=backend)
+    assert scene.exact is not None
+    v, y = scene.exact(np.array([3.0]))
+    return run.v[-1] - v[0], run.y[-1] - y[0]
+
+
+@pytest.mark.parametrize("error", [_forced, _clover])
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_the_order_is_eight(error: Callable[[int, Any], tuple[Any, Any]], backend: str) -> None:
+    """Of a damped oscillator under a sinusoid, whose derivatives in time the series needs; and of bodies."""
+    assert _cleaned_slopes(lambda steps: error(steps, backend)) == pytest.approx([8.0, 8.0], abs=0.1)
+
+
+def test_a_wrong_order_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A term less; and an input that stays as it is at the start of the step."""
+    monkeypatch.setattr(TAYLOR.steps, "ORDER", 7)
+    assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
+    monkeypatch.undo()
+    held = series.coefficients
+    monkeypatch.setattr(TAYLOR.steps, "coefficients", lambda s, order, t, h, v, y: held(s, order, t, 0.0 * h, v, y))
+    assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
+
+
+def test_growth_above_the_limit() -> None:
+    """By the radius |Σ (iΦ)ᵏ/k!| in each step, to the letter: the matrix turns and stretches, so lengths are its powers.
+
+    A thousandth above the limit that is 11.02 after 4000 steps: growth begins slowly there. Each step has some 50 roundings.
+    """
+    phi = TAYLOR.limit * np.array([0.999, 1.0 - 1e-9, 1.0 + 1e-9, 1.001])
+    radius = abs(sum((1j * phi) ** k / math.factorial(k) for k in range(9)))
+    assert np.array_equal(radius > 1.0, [False, False, True, True])
+    assert radius[3] ** 4000 == pytest.approx(11.02, rel=1e-3)
+    run = sw.integrate(sw.Oscillator(phi), "taylor", v=0.0, y=1.0, dt=1.0, steps=4000)
+    np.testing.assert_allclose(np.hypot(run.v[-1], run.y[-1]), radius**4000, rtol=4000 * 50 * EPS * 10)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
+    """Of ẏ = y the coefficients are y/k!, so the step is known.
+
+    It is the least of (τ·k!)^(1/k), k = p − 1 and p, times exp(−0.7/(p − 1)), where τ is the tolerance times the larger of y and
+    of what ẏ makes in the step before. The core's exponential has an error below 1e-8.
+    """
+
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y
+
+    order = math.ceil(1.0 - 0.5 * math.log(tolerance))
+    assert series_pace.order_of(tolerance) == order
+    run = sw.integrate(growth, "taylor", y=1.0, tolerance=tolerance, at=[5.0])
+    assert run.paces is not None
+    reach = 0.01  # of the time in which y changes, to begin with
+    for _ in range(int(run.paces.accepted) + 1):
+        tolerated = tolerance * max(1.0, reach)
+        reach = min((tolerated * math.factorial(k)) ** (1.0 / k) for k in (order - 1, order)) * math.exp(-0.7 / (order - 1))
+    assert abs(run.paces.h / reach - 1.0) < 1e-7
+    assert run.paces.evaluations == order * (run.paces.accepted + 1)  # the step with the saved time is held, not taken
+    assert abs(run.y[-1] / math.exp(5.0) - 1.0) < (5.0 / reach + 1.0) * (2.0 * tolerance + 10 * EPS)
+
+
+def squared() -> sw.System:
+    @sw.system(order=1)
+    def growth(t: Any, y: Any) -> Any:
+        return y * y
+
+    return growth().sized(None, np.zeros(()))
+
+
+@pytest.mark.parametrize("order", [4, 8, 12, 20])
+def test_evaluations_are_operations_over_those_of_one_evaluation(order: int) -> None:
+    """Of a linear system each order is its matrix once more: p evaluations.
+
+    Of y·y, one product, the coefficient k has ⌊k/2⌋ + 1 different products and k sums. One evaluation for each order would be far
+    too few.
+    """
+    for linear in (sw.Oscillator(1.3), sw.Oscillator(1.3, 0.2, form="physical")):
+        assert engine.evaluations(TAYLOR, linear, order=order, paced=True) == order
+    assert (
+        engine.evaluations(TAYLOR, squared(), order=order, paced=True) == sum(k // 2 + 1 + k for k in range(order)) > order**2 / 2
+    )
+
+
+def operations_of(tape: _core.Tape, values: list[Any]) -> int:
+    """Operations on the state and on the time that these values are made of; a change of sign is none."""
+    lines, _ = tape.operations(values)
+    changes: list[bool] = []
+    for name, operands, _more in lines:
+        changes.append(name in ("state", "time", "sample") or any(changes[i] for i in operands))
+    return sum(
+        change and bool(operands) and name != "negate" and name != "sample"
+        for change, (name, operands, _) in zip(changes, lines, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    "system", [sw.Pendulum(), sw.NBody([1.0, 0.5], force="newton"), sw.NBody(), sw.RestrictedThreeBody(0.1)], ids=repr
+)
+def test_evaluations_counted_by_the_reference(system: sw.System) -> None:
+    """Its operations but for the product that makes a coefficient of the state of one of the rates.
+
+    That is the method's own, as the sums of stages are of other methods. The first is a product with 1, which is not on the tape.
+    """
+    tape = _core.Tape()
+    tracer = Tracer(system, tape)
+    v, y, _ = tracer.state()
+    s, t = tracer.scaled(tape.step()), tape.time()
+    rates = operations_of(tape, tracer.flat(s.dv(t, v, y), s.dy(t, v, y)))
+    terms = [each for pair in series.coefficients(s, 8, t, tape.step(), v, y) for each in pair]
+    every = operations_of(tape, tracer.flat(*terms)) - 7 * (v.size + y.size)
+    evaluations = -(-every // rates)
+    assert engine.evaluations(TAYLOR, system) == evaluations
+    assert sw.stability.operations(TAYLOR, system).rate_evaluations == evaluations
+
+
+def test_saved_states_are_on_the_series() -> None:
+    """At any times: as near to the true circle as the tolerance says, and steps do not depend on them."""
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-12}
+    times = np.sort(np.random.default_rng(1).uniform(0.0, 20.0, 200))
+    many, last = (sw.integrate(sw.Oscillator(), "taylor", at=at, **ask) for at in (times, times[-1:]))
+    assert many.paces is not None
+    assert last.paces is not None
+    assert many.paces.accepted == last.paces.accepted
+    assert np.array_equal(many.y[-1], last.y[-1])
+    # A step errs by less than the tolerance of the lengths of v and y, which are 1; twenty units of time have so many steps.
+    assert np.abs(many.y - np.cos(times)).max() < (many.paces.accepted + 1) * 2e-12
+
+
+def test_energy_at_rounding_level() -> None:
+    """A hundred orbits of e = 0.5 at a tolerance of half a rounding: errors are roundings, which add up at random (Brouwer 1937).
+
+    A step changes the energy by a few roundings of its largest part, the potential energy at the perihelion, here 2. With n steps
+    the sum is some √n of these; 10·√n is allowed, and a drift of one rounding a step would be n.
+    """
+    y = np.array([[0.0, 0.0], [0.5, 0.0]])
+    v = np.array([[0.0, 0.0], [0.0, math.sqrt(3.0)]])
+    system = sw.NBody([1.0, 0.0], force="newton")
+    run = sw.integrate(system, "taylor", v=v, y=y, tolerance=1e-16, at=2.0 * np.pi * np.arange(1, 101))
+    assert run.paces is not None
+    speed, place = run.v[:, 1], run.y[:, 1]
+    energy = 0.5 * (speed**2).sum(axis=1) - 1.0 / np.sqrt((place**2).sum(axis=1))
+    assert np.abs(energy + 0.5).max() < 10 * math.sqrt(float(run.paces.accepted)) * 2 * EPS
+
+
+def _growth_of_energy_errors(tolerance: float) -> float:
+    """The power of the time with which energy errors of the outer solar system grow: root mean squares of 64 turned systems."""
+    members, years = 64, np.array([25.0, 1600.0])
+    rng = np.random.default_rng(1937)
+    turns = np.linalg.qr(rng.normal(size=(members, 3, 3)))[0]
+    v, y = (np.einsum("mij,bj->bim", turns, block) for block in solar.at_rest())
+    run = sw.integrate(
+        sw.NBody(solar.MASSES, force="newton", G=solar.G), "taylor", v=v, y=y, tolerance=tolerance, at=[*solar.YEAR * years]
+    )
+    assert not run.status.any()
+    start = np.stack([solar.energy(v[None, ..., i], y[None, ..., i]) for i in range(members)], axis=-1)
+    end = np.stack([solar.energy(run.v[..., i], run.y[..., i]) for i in range(members)], axis=-1)
+    rms = np.sqrt(np.mean(((end - start) / start).astype(float) ** 2, axis=-1))
+    return float(np.log(rms[1] / rms[0]) / np.log(years[1] / years[0]))
+
+
+def test_energy_errors_grow_as_the_square_root_of_the_time() -> None:
+    """Of a walk at random (Brouwer 1937) the power is 1/2; of a bias, however small, it is 1 at last.
+
+    A turned system has other roundings, so 64 of them are as many walks. A root mean square of n of them is known to
+    1/√(2n) of itself, so the power between the two times, 64 apart, to √2/√(2n)/ln 64 = 0.03; four times that is allowed.
+    """
+    assert abs(_growth_of_energy_errors(2.0**-53) - 0.5) < 0.12
+
+
+def test_a_bias_of_the_energy_is_noticed() -> None:
+    """At a tolerance at which the terms that are cut off count: these always err to the same side."""
+    assert _growth_of_energy_errors(1e-7) > 0.5 + 2 * 0.12
+
+
+def test_motion_without_forces_is_exact_however_long_the_step() -> None:
+    """All terms above the first vanish, so nothing but the growth of the step bounds it."""
+    run = sw.integrate(sw.NBody([1.0]), "taylor", v=[[1.0, 2.0]], y=[[0.5, 0.0]], tolerance=1e-6, at=[1024.0])
+    assert np.array_equal(run.y[-1], [[1024.5, 2048.0]])
+
+
+def test_what_is_refused() -> None:
+    samples = sw.Oscillator(x=sw.Sampled(np.arange(5.0), 0.1))
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0]}
+    with pytest.raises(UnsupportedError, match=r"samples of an input .* dop853"):
+        sw.integrate(samples, "taylor", **ask)
+
+    @sw.system
+    def bouncing(t: Any, v: Any, y: Any) -> Any:
+        return np.where(y < 0.0, -100.0 * y, 0.0) - 1.0
+
+    with pytest.raises(UnsupportedError, match=r"bouncing.* chooses between values"):
+        sw.integrate(bouncing, "taylor", **ask)
+    with pytest.raises(UnsupportedError, match=r"one order for all members"):
+        sw.integrate(sw.Oscillator(), "taylor", **ask | {"tolerance": np.array([1e-3, 1e-9])})
+    with pytest.raises(UnsupportedError, match=r"derivatives of inputs"):
+        sw.integrate(sw.Oscillator(x=sw.Sinusoid(1.0, 1.0)), "taylor", v=0.0, y=1.0, dt=0.1, steps=3, form="matrix")
+    bodies = sw.NBody(np.ones(40))
+    state = np.random.default_rng(0).normal(size=(40, 2))
+    with pytest.raises(UnsupportedError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
+        sw.integrate(bodies, "taylor", v=0.0 * state, y=state, dt=0.01, steps=3)
+    assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
+
+
+def three_bodies(members: int) -> dict[str, Any]:
+    rng = np.random.default_rng(3)
+    return {"v": rng.normal(size=(3, 2, members)), "y": 2.0 * rng.normal(size=(3, 2, members))}
+
+
+@pytest.mark.parametrize("control", [None, sw.Projection()], ids=["free", "projected"])
+@pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
+def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, fused: bool) -> None:
+    """Several within a step, and steps without any; a projection acts on the saved states, too, and counts its work once."""
+    bodies = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1)
+    ask: dict[str, Any] = three_bodies(20) | {"tolerance": 1e-4, "control": control, "fused": fused}
+    ask["at"] = np.sort(np.random.default_rng(5).uniform(0.0, 1.0, 9))
+    ours = sw.integrate(bodies, "taylor", **ask)
+    few = {name: ask[name][..., :2] for name in ("v", "y")}
+    theirs = sw.integrate(bodies, "taylor", **ask | few, backend="numpy")
+    assert np.array_equal(ours.v[..., :2], theirs.v)
+    assert np.array_equal(ours.y[..., :2], theirs.y)
+    assert ours.paces is not None
+    assert theirs.paces is not None
+    assert all(np.array_equal(a[:2], b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+    if control is not None:
+        assert np.array_equal(ours.work[:2], theirs.work)
+
+
+def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> None:
+    bodies, at = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1), np.linspace(0.02, 3.0, 60)
+    whole = sw.integrate(bodies, "taylor", **three_bodies(20), tolerance=1e-8, at=at)
+    done, state = 0, three_bodies(20) | {"tolerance": 1e-8}
+    for until in (1, 2, 3, 11, 30, 60):
+        run = sw.integrate(bodies, "taylor", at=at[done:until], **state)
+        assert np.array_equal(run.y, whole.y[done:until])
+        done, state = until, run.resume
+    assert run.paces is not None
+    assert whole.paces is not None
+    assert all(np.array_equal(a, b) for a, b in zip(run.paces, whole.paces, strict=True))
