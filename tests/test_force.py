@@ -375,3 +375,25 @@ def test_it_goes_with_the_direct_form(form: str) -> None:
 def test_it_goes_with_fixed_steps() -> None:
     with pytest.raises(ArgumentError, match="force: goes with fixed steps only"):
         sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0], force=1.0)
+
+
+@pytest.mark.parametrize("side", [4, 40])
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_fixed_particles_feel_no_force(side: int, backend: str) -> None:
+    """On a tape (4 × 4) and over rows (40 × 40): wind on all of it moves what is free, and not what holds it."""
+    place = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2) / side
+    number = np.arange(side * side).reshape(side, side)
+    pairs = np.concatenate(
+        [np.stack([number[1:], number[:-1]], -1).reshape(-1, 2), np.stack([number[:, 1:], number[:, :-1]], -1).reshape(-1, 2)]
+    )
+    held = [0, side - 1]
+    net = sw.Springs(pairs, stiffness=50.0, rest=1.0 / side, fixed=held)
+    wind = np.ones_like(place)
+    run = sw.integrate(net, "leapfrog", v=0.0, y=place, dt=0.01, steps=5, force=wind, backend=backend)
+    assert np.array_equal(run.y[-1][held], place[held])
+    assert np.array_equal(run.v[-1][held], np.zeros((2, 2)))
+    assert (np.delete(run.y[-1], held, axis=0) > np.delete(place, held, axis=0)).all()
+    world = sw.World(net, "leapfrog", v=np.zeros_like(place), y=place.copy(), dt=0.01, force=wind.copy())
+    for _ in range(5):
+        world.step(1)
+    assert np.array_equal(world.y, run.y[-1])

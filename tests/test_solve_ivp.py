@@ -520,7 +520,9 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("given", "error", "match"), WRONG, ids=[str(next(iter(given.items())))[:40] for given, _, _ in WRONG])
+@pytest.mark.parametrize(
+    ("given", "error", "match"), WRONG, ids=[f"{next(iter(given))} {i}" for i, (given, _, _) in enumerate(WRONG)]
+)
 def test_wrong_calls(given: dict[str, Any], error: type[Exception], match: str) -> None:
     with pytest.raises(error, match=match):
         sw.solve_ivp(**RIGHT | given)

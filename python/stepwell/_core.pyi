@@ -27,6 +27,8 @@ __all__ = [
     "isa_levels",
     "program",
     "run",
+    "series_evaluations",
+    "sound",
     "systems",
     "times",
 ]

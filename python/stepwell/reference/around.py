@@ -29,7 +29,7 @@ class Around:
 
 
 class Forced(Around):
-    """A force is added to v̇."""
+    """A force is added to v̇, but to that of fixed particles."""
 
     def __init__(self, s: Scaled, h: float, force: Array) -> None:
         super().__init__(s)
@@ -37,7 +37,11 @@ class Forced(Around):
 
     def dv(self, t: float, v: Array, y: Array) -> Array:
         """h·v̇ and h times the force."""
-        return np.asarray(self.s.dv(t, v, y) + self.push)
+        dv = np.asarray(self.s.dv(t, v, y))
+        pushed = np.asarray(dv + self.push)
+        if len(fixed := getattr(self.s, "fixed", ())):
+            pushed[fixed] = dv[fixed]
+        return pushed
 
 
 class Rubbing(Around):

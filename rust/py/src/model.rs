@@ -142,7 +142,7 @@ impl ModelSpec {
     /// numbers of 32 bits.
     #[new]
     #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false))]
-    #[allow(clippy::too_many_arguments, reason = "Python gives them by name")]
+    #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn new(
         py: Python<'_>,
         system: String,

@@ -68,7 +68,7 @@ class Springs:
         self.held = stiffness * rest
         ends = numbers_of(pairs).reshape(-1, 2)
         self.i, self.j = ends.T
-        fixed_ones = numbers_of(fixed)
+        self.fixed = fixed_ones = numbers_of(fixed)
         self.free = np.delete(np.arange(n), fixed_ones)
         self.rounds = in_order(ends, fixed_ones)
         self.by_mass = h / masses

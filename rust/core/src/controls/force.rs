@@ -22,19 +22,33 @@ pub fn check(given: &Given, shape: Shape) -> Result<(), Error> {
 pub fn wrap<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>) -> Box<dyn System<N>> {
     match p.numbers(NAME) {
         [] => system,
-        force => Box::new(Forced { system, push: Block::from_iterator(force.len(), force.iter().map(|force| p.h * *force)) }),
+        force => {
+            let fixed = fixed(p.given, force.len());
+            let push = force.iter().zip(&fixed).map(|(force, fixed)| (!fixed).then(|| p.h * *force)).collect();
+            Box::new(Forced { system, push })
+        }
     }
+}
+
+/// Which numbers of v belong to particles that feel no force.
+pub fn fixed(given: &Given, numbers: usize) -> Vec<bool> {
+    let mut fixed = vec![false; numbers];
+    let dim = numbers / given.whole("n").max(1);
+    given.list("fixed").iter().for_each(|particle| fixed[dim * *particle as usize..][..dim].fill(true));
+    fixed
 }
 
 struct Forced<N: Number> {
     system: Box<dyn System<N>>,
-    /// h times the force.
-    push: Block<N>,
+    /// h times the force; none on what is fixed.
+    push: Vec<Option<N>>,
 }
 
 impl<N: Number> System<N> for Forced<N> {
     fn dv(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {
-        self.system.dv(t, v, y).zip_map(&self.push, |dv, push| dv + push)
+        let dv = self.system.dv(t, v, y);
+        let pushed = dv.iter().zip(&self.push).map(|(dv, push)| push.map_or(*dv, |push| *dv + push));
+        Block::from_iterator(dv.len(), pushed)
     }
 
     fn dy(&self, t: N, v: &Block<N>, y: &Block<N>) -> Block<N> {

@@ -2,7 +2,7 @@
 
 use super::{Asked, Facts, Rates};
 use crate::{
-    controls::force::NAME,
+    controls::force::{NAME, fixed},
     run::{stage::Force, workers::Stop},
     spec::Spec,
 };
@@ -12,17 +12,28 @@ pub fn wrap(rates: Box<dyn Rates>, asked: &Asked) -> Box<dyn Rates> {
     if asked.given.count(NAME) == 0 {
         return rates;
     }
-    Box::new(ForcedRates { rates, h: asked.h, push: vec![0.0; asked.shape.v] })
+    let fixed = fixed(asked.given, asked.shape.v);
+    Box::new(ForcedRates { rates, h: asked.h, push: vec![-0.0; asked.shape.v], fixed })
 }
 
 struct ForcedRates {
     rates: Box<dyn Rates>,
     h: f64,
-    /// h times the force.
+    /// h times the force; −0 on what is fixed, which changes no sum.
     push: Vec<f64>,
+    fixed: Vec<bool>,
 }
 
 impl ForcedRates {
+    /// Takes another force, by rows.
+    fn set(&mut self, force: impl Fn(usize) -> f64) {
+        for (i, (push, fixed)) in self.push.iter_mut().zip(&self.fixed).enumerate() {
+            if !fixed {
+                *push = self.h * force(i);
+            }
+        }
+    }
+
     fn add(&self, dv: &mut [f64]) {
         dv.iter_mut().zip(&self.push).for_each(|(dv, push)| *dv += push);
     }
@@ -35,12 +46,12 @@ impl Rates for ForcedRates {
 
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         let place = spec.given.place(NAME).unwrap_or(0);
-        self.push.iter_mut().zip(&spec.rows[place..]).for_each(|(push, row)| *push = self.h * row.at(first));
+        self.set(|i| spec.rows[place + i].at(first));
         self.rates.prepare(spec, first, count);
     }
 
     fn set_force(&mut self, force: &Force, first: usize, _count: usize) {
-        self.push.iter_mut().enumerate().for_each(|(i, push)| *push = self.h * force.row(i)[first]);
+        self.set(|i| force.row(i)[first]);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {
