@@ -100,8 +100,16 @@ def assert_true(brute: Brute, advice: sw.advice.Advice) -> None:
 
 
 def assert_cheap(brute: Brute, advice: sw.advice.Advice) -> None:
-    """Nothing that brute force finds costs less than two thirds."""
-    assert brute.best(advice.tolerance, brute.cost(advice) / WORTH) is None
+    """Nothing that brute force finds costs less than two thirds, but steps that end where the system jumps, by luck.
+
+    Their error is nearly nothing, and that of one step more or one step fewer a hundred times what is allowed.
+    """
+    found = brute.best(advice.tolerance, brute.cost(advice) / WORTH)
+    if found is not None and found.tolerance is None:
+        beside = [brute.error(found.method, brute.end / n, n) for n in (found.steps - 1, found.steps + 1)]
+        assert min(beside) > 100 * advice.tolerance
+    else:
+        assert found is None
 
 
 def tried(cases: Mapping[str, Sequence[float]], long: Collection[str] = ()) -> list[Any]:

@@ -502,7 +502,7 @@ def test_the_core_refuses_too() -> None:
         ({"carry": np.zeros(3)}, "carry: expected 4, got 3"),
         ({"saved_y": np.zeros((3, 1, 4))}, "saved_y: expected 4, got 12"),
         ({"recorded": np.zeros((1, 1, 4))}, "recorded: expected 0, got 4"),
-        ({"tally": np.zeros(3)}, "tally: expected 4, got 3"),
+        ({"tally": np.zeros(3)}, "tally: expected 0, got 3"),
         ({"given": free | {"omega": np.ones((1, 3))}}, "a parameter: expected 4, got 3"),
     ):
         with pytest.raises(ValueError, match=re.escape(text)):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import ADAPTIVE, SYSTEMS
+from cases import ADAPTIVE, SOME, SYSTEMS, drawn
 from stepwell import _core, engine
 from stepwell.explanation import listing
 from stepwell.reference import adaptive
@@ -340,30 +340,33 @@ def assert_counted(explained: sw.Explanation) -> None:
     assert all(len(line.formula) < 120 for section in explained.sections for line in section.lines)
 
 
+@SOME
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
 @pytest.mark.parametrize("name", [name for name in SYSTEMS if made(name)[1].size <= 30 * MEMBERS])  # whose steps are one tape
-def test_every_listing_is_a_step(name: str, fused: bool) -> None:
+def test_every_listing_is_a_step(name: str, fused: bool, some: int | None) -> None:
     system, v, y = made(name)
-    for method in METHODS:
+    for method in drawn(METHODS, some, name, fused):
         if fits(system, method) and not _core.in_parts(engine.model(engine.Plan(system, method, (MEMBERS,), H)), MEMBERS):
             assert_listing_is_a_step(system, method, v, y, fused=fused)
 
 
+@SOME
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
 @pytest.mark.parametrize("control", CONTROLS)
-def test_every_listing_under_control_is_a_step(control: str, fused: bool) -> None:
+def test_every_listing_under_control_is_a_step(control: str, fused: bool, some: int | None) -> None:
     for name in ("three bodies", "two bodies", "three bodies in space, newton"):
         system, v, y = made(name)
         held = system.controlled(CONTROLS[control], v, y, H)
-        for method in METHODS:
+        for method in drawn(METHODS, some, name, control, fused):
             if fits(held, method):
                 assert sw.explain(system, method, control=CONTROLS[control], fused=fused) == sw.explain(held, method, fused=fused)
                 assert_listing_is_a_step(held, method, v, y, fused=fused)
 
 
+@SOME
 @pytest.mark.parametrize("fused", [False, True], ids=["plain", "fused"])
 @pytest.mark.parametrize("name", [name for name in ADAPTIVE if not name.startswith("thirty-five")])
-def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
+def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | None) -> None:
     system, v, y = made(name)
     system = system.uncontrolled
     first = dict.fromkeys(adaptive.Pace._fields, np.zeros(MEMBERS))
@@ -379,7 +382,7 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
         }
         | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0), "longest_v": row(0.1, 1.0, 0.0)}
     )
-    for method in ABLE:
+    for method in drawn(ABLE, some and some // 2, name, fused):
         plan = engine.Plan(system, method, (MEMBERS,), H, fused=fused)
         if _core.in_parts(engine.model(plan._replace(fused=False)), MEMBERS, attempts=True):
             continue  # it is not one tape
@@ -389,7 +392,7 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool) -> None:
         known |= dict(zip(listing.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
         after = state(explained, plan, evaluate(explained, known, tables))
         if fused:
-            following, v1, y1 = engine._fused_attempt(plan, 9)(pace, 9, v, y)
+            following, v1, y1 = engine._evaluated_attempt(plan, 9)(pace, 9, v, y)
         else:
             s = adaptive.Attempted(system.scaled(1.0, system.batch))
             axes = len(system.v_shape), len(system.y_shape)

@@ -9,7 +9,7 @@ import pytest
 import symbols
 from stepwell import _core
 from stepwell.reference import functions as fn
-from stepwell.reference.fused import MEANING, Evaluated
+from stepwell.reference.fused import MEANING, Evaluated, fused
 from stepwell.reference.tape import Operation
 from true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
 
@@ -127,7 +127,7 @@ def test_fused_they_are_as_accurate(name: str) -> None:
     tape = _core.Tape()
     operations, roots = tape.operations([getattr(fn, name)(*map(tape.state, range(len(given))))])
     plain = [Operation(kind, tuple(of), more) for kind, of, more in operations]
-    fused = Evaluated(plain, roots, {}, [])
+    evaluated = Evaluated(*fused(plain, roots), {}, [])
     with np.errstate(all="ignore"):
-        (found,) = fused(given, 0.0, 1.0)
+        (found,) = evaluated(given, 0.0, 1.0)
     assert errors(found, name, given).max() < 1.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import SYSTEMS
+from cases import SOME, SYSTEMS, drawn
 from hypothesis import given
 from hypothesis import strategies as st
 from stepwell import _core, engine
@@ -73,15 +73,14 @@ def operations(tape: Any, symbols: list[Any]) -> tuple[list[Operation], list[int
     return [Operation(name, tuple(of), given) for name, of, given in listed], list(roots)
 
 
+@SOME
 @pytest.mark.parametrize("name", SYSTEMS)
-def test_both_fuse_the_same(name: str) -> None:
+def test_both_fuse_the_same(name: str, some: int | None) -> None:
     system, _, _ = made(name)
     if int(np.prod(system.v_shape)) > 30:
         return  # its step is too long for one tape
     counts = []
-    for method in METHODS:
-        if not fits(system, method):
-            continue
+    for method in drawn([each for each in METHODS if fits(system, each)], some, name):
         tape = _core.Tape()
         symbols = Tracer(system, tape).step(method)
         core = operations(*tape.fused(symbols))

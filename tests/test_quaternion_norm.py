@@ -19,7 +19,8 @@ import tops
 from stepwell.stability.expansion import polynomials
 from truths import CLOSED_FORMS
 
-METHODS = [m.name for m in sw.methods() if not m.needs_acceleration]
+#: A series has no stages: what is said of them is not of it, and a test of its own has its growth.
+METHODS = [m.name for m in sw.methods() if not (m.needs_acceleration or m.has_series)]
 
 #: Of the methods with two blocks, that which they are for one block alone: v stands still here.
 ONE_BLOCK = {
@@ -226,3 +227,15 @@ def test_at_rest_the_gain_is_limited_by_the_method(method: str) -> None:
         )
         off = abs((run.y[-20:] ** 2).sum(axis=1) - 1.0).max()
         assert bool(off < 1e-12) is settles, off
+
+
+@pytest.mark.parametrize("phi", [0.01, 0.3, 1.1])
+def test_the_norm_under_a_series_grows_as_the_series_ends(phi: float) -> None:
+    """q̇ turns q by a right angle, so a step multiplies it by Σ (iΦ)ᵏ/k! up to the order; to a few roundings each."""
+    order = sw.method("taylor").order
+    square, _ = norms("taylor", 2 * phi / OMEGA, 1)
+    factor = sum((1j * phi) ** k / math.factorial(k) for k in range(order + 1))
+    wrong = sum((1j * phi) ** k / math.factorial(k) for k in range(order))
+    assert square[1] / square[0] == pytest.approx(abs(factor) ** 2, abs=4 * order * 2.0**-52)
+    if phi > 1.0:
+        assert abs(abs(wrong) ** 2 - abs(factor) ** 2) > 1e-6

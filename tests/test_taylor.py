@@ -105,6 +105,24 @@ def test_core_and_reference_are_one_graph(name: str) -> None:
         assert_one_graph(tape, tape.trace(model, what), of(TAYLOR))
 
 
+@pytest.mark.parametrize(
+    ("system", "v", "y"),
+    [
+        (sw.Pendulum(1.2, 0.1, a=sw.Sinusoid(0.3, 2.0)), [0.1], [0.4]),
+        (sw.NBody([1.0, 2.0, 3.0]), [[0.1, 0.2], [0.0, -0.1], [0.3, 0.0]], [[0.0, 0.0], [1.0, 0.2], [-0.5, 1.0]]),
+    ],
+    ids=["pendulum", "three bodies"],
+)
+def test_numbers_one_by_one_are_those_of_the_tape(system: sw.System, v: Any, y: Any) -> None:
+    """The reference as it is read, of numbers; the NumPy backend evaluates its tape, for all members at once."""
+    plan = engine.Plan(system, TAYLOR, (), 0.1)
+    v, y = np.array(v).reshape(system.v_shape), np.array(y).reshape(system.y_shape)
+    by_numbers = TAYLOR.steps.step(plan.scaled(), 0.3, 0.1, v, y)
+    run = sw.integrate(system, "taylor", v=v, y=y, dt=0.1, t0=0.3, steps=1, backend="numpy")
+    for found, expected in zip(by_numbers, (run.v[-1], run.y[-1]), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
 def _wrong_product(a: Any, b: Any, k: int) -> Any:
     return series._product(a[k], b[0]) if k else None
 

@@ -353,6 +353,42 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"fun": lambda t, y, k: -k * y, "t_span": (0.1, 0.0), "y0": [1.0], "method": "merson", "t_eval": [0.05, 0.0]}
         | {"events": [lambda t, y, k: y[0]], "args": (2.0,), "vectorized": False},
     ),
+    "sweep": (
+        sw.sweep,
+        {
+            "system": sw.Oscillator,
+            "axes": {"omega": ("omega", [1.0, 2.0])},
+            "method": "rk4",
+            "v": 0.0,
+            "y": 1.0,
+            "dt": 0.1,
+            "steps": 4,
+        }
+        | {
+            "outcomes": None,
+            "transient": 0,
+            "observe": 1,
+            "control": None,
+            "force": None,
+            "fused": False,
+            "t0": 0.0,
+            "start": None,
+        }
+        | {"units": None, "store": None, "engine": None, "threads": 1, "chunk": None, "memory": 1e8, "progress": False},
+    ),
+    "sweep of histories": (
+        sw.sweep,
+        {
+            "system": sw.Oscillator,
+            "axes": {"omega": ("omega", [1.0, 2.0])},
+            "method": "rk4",
+            "v": 0.0,
+            "y": 1.0,
+            "dt": 0.1,
+            "steps": 4,
+            "every": 2,
+        },
+    ),
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,

@@ -385,6 +385,8 @@ def in_place(
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:
         raise ArgumentError(f"{argument}: expected a C-contiguous array {what}, got strides {array.strides}")
+    if not array.flags.aligned:
+        raise ArgumentError(f"{argument}: expected an aligned array {what}, got one at an address that is no multiple of 8 bytes")
     if written and not array.flags.writeable:
         raise ArgumentError(f"{argument}: expected a writeable array {what}, got a read-only one")
     numbers(argument, array)

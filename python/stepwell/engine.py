@@ -89,6 +89,11 @@ class Plan(NamedTuple):
         return self.system.scaled(self.dt, self.batch, self.force)
 
     @property
+    def by_tape(self) -> bool:
+        """Whether the NumPy backend evaluates the tape of the reference, as for what is fused or of float32, and for a series."""
+        return self.fused or self.single or self.method.has_series
+
+    @property
     def members(self) -> int:
         """How many trajectories."""
         return prod(self.batch)
@@ -170,7 +175,7 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
         made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
         return made
 
-    step = _traced_step(plan, s) if plan.fused or plan.single else plain
+    step = _evaluated_step(plan, s) if plan.by_tape else plain
     slot = v if carried else _start(plan, v, y)
     slot, y, kept, first_bad = _loop(plan, step, slot, y, before, plan.block_axes, _velocity(plan))
     out = _finished(plan, slot, kept, first_bad)
@@ -183,10 +188,10 @@ def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outc
     return out._replace(recorded=recorded, work=_per_step(plan, work))
 
 
-def _traced(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
-    """A method's "step" or "attempt", or how it goes from v to what it carries and back, of fused multiply-adds or of float32.
+def _evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], Any], Array]:
+    """A method's "step" or "attempt", or how it goes from v to what it carries and back, by the tape of the reference.
 
-    That is its tape, evaluated line by line: from the rows of a state, and the time, to the next ones.
+    It is evaluated line by line, for all members at once: from the rows of a state, and the time, to the next ones.
     """
     from .reference import single  # only such runs need it
     from .reference.fused import Evaluated
@@ -208,7 +213,7 @@ def _traced(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], An
     if plan.single:
         evaluated = single.evaluated(tape, symbols, numbers, plan.fused)
     else:
-        evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables)
+        evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
 
     def made(state: list[Array], t: Any) -> Array:
         out = np.empty((len(symbols), *plan.batch), dtype=plan.dtype)
@@ -230,9 +235,9 @@ def _blocks(v: Array, y: Array, made: Array) -> Blocks:
     return made[:n_v].reshape(v.shape), made[n_v : n_v + n_y].reshape(y.shape)
 
 
-def _traced_step(plan: Plan, s: Any) -> reference.Step:
+def _evaluated_step(plan: Plan, s: Any) -> reference.Step:
     """A step; what a control of ``s`` adds up is added up there."""
-    made = _traced(plan, "step")
+    made = _evaluated(plan, "step")
 
     def step(t: float, v: Array, y: Array) -> Blocks:
         if plan.system.control is None:
@@ -243,9 +248,9 @@ def _traced_step(plan: Plan, s: Any) -> reference.Step:
     return step
 
 
-def _traced_slot(plan: Plan, which: str) -> reference.Velocity:
+def _evaluated_slot(plan: Plan, which: str) -> reference.Velocity:
     """What a method carries from velocities, or back."""
-    made = _traced(plan, which)
+    made = _evaluated(plan, which)
     return lambda t, v, y: _blocks(v, y, made(_rows(plan, v, y), t))[0]
 
 
@@ -275,8 +280,8 @@ def _velocity(plan: Plan) -> reference.Velocity | None:
     """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
     if plan.method.carry is None:
         return None
-    if plan.fused or plan.single:
-        return _traced_slot(plan, "finish")
+    if plan.by_tape:
+        return _evaluated_slot(plan, "finish")
     return partial(plan.method.steps.finish, plan.scaled(), plan.choice)
 
 
@@ -308,8 +313,8 @@ def _start(plan: Plan, v: Array, y: Array) -> Array:
         return v
     t = plan.t0 + plan.first * plan.dt
     with np.errstate(all="ignore"):
-        if plan.fused or plan.single:
-            return _traced_slot(plan, "start")(t, v, y)
+        if plan.by_tape:
+            return _evaluated_slot(plan, "start")(t, v, y)
         return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
 
@@ -643,9 +648,9 @@ def attempts(method: Method, system: Any, block_axes: tuple[int, int], order: in
     return partial(adaptive.attempt, steps, system, method.error_order, block_axes)
 
 
-def _fused_attempt(plan: Plan, budget: int) -> Any:
+def _evaluated_attempt(plan: Plan, budget: int) -> Any:
     """An attempt at an adaptive step."""
-    made = _traced(plan, "attempt", budget)
+    made = _evaluated(plan, "attempt", budget)
 
     def attempt(pace: Pace, budget: int, v: Array, y: Array) -> tuple[Pace, Array, Array]:
         out = made([*_rows(plan, v, y), *np.broadcast_arrays(*pace)], None)
@@ -659,8 +664,8 @@ def adapt(plan: Plan, pacing: Pacing, pace: Pace, v: Array, y: Array) -> Adapted
     from .reference import adaptive
 
     if plan.backend == "numpy":
-        if plan.fused:
-            return adaptive.run(_fused_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
+        if plan.by_tape:
+            return adaptive.run(_evaluated_attempt(plan, pacing.budget), v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
         system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
         attempt = attempts(plan.method, system, plan.block_axes, plan.order)
         return adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)

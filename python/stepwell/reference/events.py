@@ -82,5 +82,5 @@ def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, d
         near = np.where(moved <= np.abs(middle - secant), secant + towards * moved, middle)
     # Both ends must be able to move: a trial at an end would change nothing.
     near = np.minimum(np.maximum(near, low + 0.5 * within), high - 0.5 * within)
-    most = 0.5 * SHARE * 2.0 ** (MOST_TRIALS - done) - 0.5 * width
+    most = np.ldexp(0.5 * SHARE, MOST_TRIALS - done) - 0.5 * width
     return np.asarray(np.where(np.abs(near - middle) <= most, near, middle - towards * most))

@@ -184,9 +184,14 @@ class Evaluated:
         self.tape, self.roots, self.numbers, self.tables, self.meaning = tape, roots, numbers, tables, meaning
 
     @classmethod
-    def traced(cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any]) -> "Evaluated":
-        """For symbols on a tape that lists its operations, which are fused."""
-        return cls(*fused(*listed(tape, symbols)), numbers, tables)
+    def traced(
+        cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any], *, fuse: bool
+    ) -> "Evaluated":
+        """For symbols on a tape that lists its operations, with fused multiply-adds if that is wanted."""
+        operations, roots = listed(tape, symbols)
+        if fuse:
+            operations, roots = fused(operations, roots)
+        return cls(operations, roots, numbers, tables)
 
     def __call__(self, state: Sequence[Array], t: Any, h: float) -> list[Any]:
         """The values of the roots for these rows of the state, at time t with the step h."""

@@ -59,12 +59,12 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
 def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: Array) -> Array:
     """P of any system at the state (v, y) and time t: the exact derivative of the reference step with respect to the slots.
 
-    By the complex step where the system's reference accepts complex numbers, else from the tape of the step. A projection of the
-    system onto its energy is part of the step.
+    By the complex step where the system's reference accepts complex numbers, else from the tape of the step, as that of a series,
+    which goes number by number. A projection of the system onto its energy is part of the step.
     """
     members = together(system, dt, v, y)
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
-    if not system.complex_step:
+    if method.has_series or not system.complex_step:
         return traced.matrix(system, "step", method, members, slot, y, t, dt)[0]
     s: Any = _scaled(system, dt, (sum(size(system)), *members))
     h: Any = float(dt) if dt.ndim == 0 else dt

@@ -169,7 +169,7 @@ class System(Fixed, Value, ABC):
 
     def all_given(self, batch: Shape) -> dict[str, Any]:
         """The parameters of this system, of its surfaces, its control and its friction, by name."""
-        given = self.given(batch)
+        given = dict(self.given(batch))
         if self.contacts:
             given |= self.given_contacts(batch)
         if self.control is not None or self.rubbing is not None:

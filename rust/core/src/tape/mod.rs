@@ -194,10 +194,10 @@ impl Counts {
     }
 
     /// All of them.
-    pub fn sum(&self) -> usize {
+    pub fn total(&self) -> usize {
         let kinds =
             [self.additions, self.multiplications, self.fused, self.divisions, self.square_roots, self.choices, self.bits];
-        kinds.iter().map(|count| *count as usize).sum()
+        kinds.iter().fold(0, |all, count| all + *count as usize)
     }
 }
 
@@ -269,7 +269,7 @@ impl Tape {
                 counts.note(*op);
             }
         }
-        counts.sum() - without.iter().filter(|id| mask[**id as usize] && changes[**id as usize]).count()
+        counts.total() - without.iter().filter(|id| mask[**id as usize] && changes[**id as usize]).count()
     }
 
     /// Notes how many operations one evaluation of the rates takes, and how many all coefficients of their series.

@@ -277,7 +277,7 @@ impl Lower<'_> {
         if from_one {
             // What fills up stays where it is.
             let lanes = (0..4).map(|at| places.get(at).map_or(at as u8, |(_, lane)| *lane) << (2 * at));
-            return self.shift(Move::Permute(lanes.sum()), 4, first, None);
+            return self.shift(Move::Permute(lanes.fold(0, |all, lane| all | lane)), 4, first, None);
         }
         let (low, high) = (self.gather(&ids[..2]), self.gather(&ids[2..]));
         self.shift(Move::Join, 4, low, Some(high))
