@@ -202,7 +202,7 @@ def test_a_step_is_timed_per_member(monkeypatch):
     """With a clock that counts steps times members in place of the machine's, every step takes one nanosecond."""
     clock = 0.0
 
-    def integrate(system, method, *, v, y, dt, steps, threads, fused):
+    def integrate(system, method, *, v, y, dt, steps, threads, fused, dtype):
         nonlocal clock
         assert threads == 1
         assert v.shape == y.shape == (3, 2, measure.MEMBERS)

@@ -256,6 +256,33 @@ def member(array: Array, index: Shape) -> Array:
 _FEW_BYTES = 1 << 24
 
 
+def is_single(dtype: Any) -> bool:
+    """Whether float32 is asked for; raise if it is neither that nor float64."""
+    try:
+        name = np.dtype(dtype).name if dtype is not None else ""
+    except TypeError:
+        name = ""
+    if name not in ("float64", "float32"):
+        raise DTypeError(f"dtype: expected 'float64' or 'float32', got {short(dtype)}")
+    return name == "float32"
+
+
+def fits_single(name: str, numbers: Array | None) -> None:
+    """Raise if finite numbers are beyond the range of float32."""
+    if numbers is None or not numbers.size:
+        return
+    least, most = float(np.fmin.reduce(numbers, axis=None)), float(np.fmax.reduce(numbers, axis=None))
+    if max(-least, most) <= LARGEST_SINGLE:
+        return  # the usual case, found without another array
+    large = np.abs(numbers[np.isfinite(numbers)])
+    if large.size and float(large.max()) > LARGEST_SINGLE:
+        raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {large.max():g}")
+
+
+#: What is larger than this rounds to infinity in float32.
+LARGEST_SINGLE = float(np.finfo(np.float32).max)
+
+
 def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0.0) -> None:
     """Raise if ``rows`` numbers for each member of a batch, and so many bytes beside, do not fit in what memory is available."""
     members = 1
@@ -340,7 +367,15 @@ def _fields(path: str) -> dict[str, int]:
     return {line[0]: int(line[1]) for line in map(str.split, _read(path).splitlines()) if len(line) > 1}
 
 
-def in_place(argument: str, array: Any, shape: Shape, what: str = "to step in place", *, written: bool = True) -> Array:
+def in_place(
+    argument: str,
+    array: Any,
+    shape: Shape,
+    what: str = "to step in place",
+    *,
+    written: bool = True,
+    dtype: Any = np.float64,
+) -> Array:
     """Return ``array`` if it can be stepped in place, or read in place if it is not written; it is never copied.
 
     Of another library's array in the memory of the CPU it is NumPy's array over that memory.
@@ -349,8 +384,8 @@ def in_place(argument: str, array: Any, shape: Shape, what: str = "to step in pl
         array = shared(argument, array)
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
-    if array.dtype != np.float64 or not array.dtype.isnative:
-        raise DTypeError(f"{argument}: expected dtype float64 {what}, got {array.dtype}")
+    if array.dtype != dtype or not array.dtype.isnative:
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

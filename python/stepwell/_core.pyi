@@ -75,23 +75,27 @@ class ModelSpec:
         record: list[str] = ...,
         fused: bool = False,
         order: int = 0,
+        single: bool = False,
     ) -> ModelSpec: ...
 
 @final
 class World:
-    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first`` and ``members``."""
+    """Of the plan it reads ``t0``, ``dt``, ``choice``, ``first`` and ``members``.
+
+    The arrays are of float32 if the model is single, else of float64.
+    """
 
     def __new__(
         cls,
         model: ModelSpec,
         plan: Plan,
-        v: NDArray[np.float64],
-        y: NDArray[np.float64],
-        carry: NDArray[np.float64] | None = None,
-        force: NDArray[np.float64] | None = None,
+        v: NDArray[Any],
+        y: NDArray[Any],
+        carry: NDArray[Any] | None = None,
+        force: NDArray[Any] | None = None,
     ) -> World: ...
     def step(self, n: int = 1) -> None: ...
-    def carry(self) -> NDArray[np.float64] | None: ...
+    def carry(self) -> NDArray[Any] | None: ...
     @property
     def t(self) -> float: ...
     @property
@@ -104,6 +108,10 @@ class Symbol:
     @property
     def id(self) -> int:
         """The number of the operation that makes it."""
+
+    @property
+    def single(self) -> bool:
+        """Whether its numbers are those of float32."""
 
     def __add__(self, other: _Value, /) -> Symbol: ...
     def __radd__(self, other: _Value, /) -> Symbol: ...
@@ -144,9 +152,12 @@ _Value = Symbol | float
 
 @final
 class Tape:
-    """A list of operations, each once. Symbols write to it, and the core's steps are traced onto it."""
+    """A list of operations, each once. Symbols write to it, and the core's steps are traced onto it.
 
-    def __new__(cls) -> Tape: ...
+    If it is ``single``, its numbers are those of float32: constants are rounded to it, and operations on bits are on 32 of them.
+    """
+
+    def __new__(cls, *, single: bool = False) -> Tape: ...
     def state(self, i: int) -> Symbol: ...
     def param(self, i: int) -> Symbol: ...
     def budget(self) -> Symbol: ...

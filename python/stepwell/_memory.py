@@ -63,9 +63,12 @@ def _memory(numbers: int) -> Array:
     return room[first : first + numbers]
 
 
-def empty(shape: Shape) -> Array:
-    """As ``np.empty``, of float64."""
+def empty(shape: Shape, dtype: Any = np.float64) -> Array:
+    """As ``np.empty``, of float64 or float32."""
     numbers = prod(shape)
+    if dtype != np.float64:
+        whole: Array = empty((-(-numbers // 2),)).view(dtype)
+        return whole[:numbers].reshape(shape)
     if 8 * numbers < LEAST_LENT:
         return np.empty(shape)
     return np.asarray(_Loan(_memory(numbers), shape))

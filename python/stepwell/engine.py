@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _core, _memory
+from . import _checks, _core, _memory
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .methods import Method
@@ -51,7 +51,7 @@ class Watched(NamedTuple):
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
 
-    ``order`` is that of a series with adaptive steps.
+    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32.
     """
 
     system: System
@@ -72,6 +72,12 @@ class Plan(NamedTuple):
     force: Array | None = None
     watched: Watched | None = None
     order: int = 0
+    single: bool = False
+
+    @property
+    def dtype(self) -> type[Any]:
+        """Of the states."""
+        return np.float32 if self.single else np.float64
 
     @property
     def saves(self) -> Whole:
@@ -94,8 +100,8 @@ class Plan(NamedTuple):
 
     @property
     def by_tape(self) -> bool:
-        """Whether the NumPy backend evaluates the tape of the reference, as for what is fused and for a series."""
-        return self.fused or self.method.has_series
+        """Whether the NumPy backend evaluates the tape of the reference, as for what is fused or of float32, and for a series."""
+        return self.fused or self.single or self.method.has_series
 
     @property
     def members(self) -> int:
@@ -172,6 +178,8 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
 
 def _numpy(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     steps, s = plan.method.steps, plan.scaled()
+    if plan.single:
+        v, y = v.astype(plan.dtype), y.astype(plan.dtype)
 
     def plain(t: float, v: Array, y: Array) -> Blocks:
         made: Blocks = contact.step(steps, s, plan.choice, t, plan.dt, v, y)
@@ -195,11 +203,12 @@ def _evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array],
 
     It is evaluated line by line, for all members at once: from the rows of a state, and the time, to the next ones.
     """
-    from .reference.fused import Evaluated  # only such runs need it
+    from .reference import single  # only such runs need it
+    from .reference.fused import Evaluated
     from .reference.traced import Tracer
 
     _core.check(model(plan))
-    tape = _core.Tape()
+    tape = _core.Tape(single=plan.single)
     tracer = Tracer(plan.system, tape, plan.force)
     match what:
         case "step":
@@ -210,10 +219,14 @@ def _evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array],
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))
     [(_, _, number_of_budget)], _ = tape.operations([tape.budget()])
-    evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
+    evaluated: Callable[..., list[Any]]
+    if plan.single:
+        evaluated = single.evaluated(tape, symbols, numbers, plan.fused)
+    else:
+        evaluated = Evaluated.traced(tape, symbols, numbers | {number_of_budget: budget}, tracer.tables, fuse=plan.fused)
 
     def made(state: list[Array], t: Any) -> Array:
-        out = np.empty((len(symbols), *plan.batch))
+        out = np.empty((len(symbols), *plan.batch), dtype=plan.dtype)
         for i, each in enumerate(evaluated(state, t, plan.dt)):
             out[i] = each
         return out
@@ -239,7 +252,7 @@ def _evaluated_step(plan: Plan, s: Any) -> reference.Step:
     def step(t: float, v: Array, y: Array) -> Blocks:
         if plan.system.control is None:
             return _blocks(v, y, made(_rows(plan, v, y), t))
-        *_, s.work = out = made([*_rows(plan, v, y), s.work], t)
+        *_, s.work = out = made([*_rows(plan, v, y), np.asarray(s.work, dtype=plan.dtype)], t)
         return _blocks(v, y, out)
 
     return step
@@ -255,7 +268,7 @@ def _per_step(plan: Plan, work: Array | None) -> Array | None:
     """What a control did, in units of energy, from h times the sum over all evaluations."""
     if work is None:
         return None
-    return np.asarray(work / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
+    return np.asarray(np.asarray(work, dtype=np.float64) / (pushes(plan.system.control, plan.method.evaluations) * plan.dt))
 
 
 def pushes(control: Any, evaluations: int) -> int:
@@ -277,7 +290,7 @@ def _velocity(plan: Plan) -> reference.Velocity | None:
     """Makes velocities of what the method carries in their place at a time; None if it carries nothing else."""
     if plan.method.carry is None:
         return None
-    if plan.fused:
+    if plan.by_tape:
         return _evaluated_slot(plan, "finish")
     return partial(plan.method.steps.finish, plan.scaled(), plan.choice)
 
@@ -310,7 +323,7 @@ def _start(plan: Plan, v: Array, y: Array) -> Array:
         return v
     t = plan.t0 + plan.first * plan.dt
     with np.errstate(all="ignore"):
-        if plan.fused:
+        if plan.by_tape:
             return _evaluated_slot(plan, "start")(t, v, y)
         return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
@@ -329,6 +342,8 @@ def _finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
 
 def model(plan: Plan) -> _core.ModelSpec:
     """What to step, as the core takes it."""
+    if plan.single:
+        return _single_model(plan)
     given = plan.system.parameters(plan.batch, series=plan.method.has_series)
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
@@ -340,19 +355,33 @@ def model(plan: Plan) -> _core.ModelSpec:
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
 
 
+def _single_model(plan: Plan) -> _core.ModelSpec:
+    """The same for steps of float32."""
+    given = plan.system.parameters(plan.batch, single=True)
+    if plan.force is not None:
+        given.append(("added.force", rows(np.asarray(plan.force, np.float64), plan.batch, len(plan.system.v_shape))))
+    for name, value in given:
+        if isinstance(value, np.ndarray):
+            _checks.fits_single(name, value)
+    return _core.ModelSpec(plan.system.kernel, plan.method.name, given, fused=plan.fused, single=True)
+
+
 def _rust(
     plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
 ) -> Outcome:
     carries = plan.method.carry is not None if carries is None else carries
     kept = plan.kept
     empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
-    saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
-    carry = np.empty(v.shape) if carries else None
+    if plan.single:
+        saved_v, saved_y = (_memory.empty((kept, *a.shape), plan.dtype) for a in (v, y))
+    else:
+        saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
+    carry = np.empty(v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
         shapes = {name: plan.system.quantities[name] for name in plan.record}
         recorded = _memory.empty((kept, sum(map(prod, shapes.values())), *plan.batch))
-    work = None if plan.system.control is None else np.empty(plan.batch)
+    work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
     tally, noticed = None if work is None else work.reshape(-1), None
     if plan.watched is not None:
         before_it = 0 if work is None else 1

@@ -70,6 +70,7 @@ def integrate(
     events: Any = None,
     form: RunForm = "direct",
     fused: bool = False,
+    dtype: Any = "float64",
     t0: float = 0.0,
     start: str | None = None,
     max_steps: int | None = None,
@@ -122,6 +123,9 @@ def integrate(
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 4000 operations.
+        dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
+            rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
+            same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
         t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
@@ -164,6 +168,9 @@ def integrate(
     v = velocities(system, v)
     fits_together(system, how)
     fused = _checks.flag("fused", fused)
+    single = _checks.is_single(dtype)
+    if single and (tolerance is not None or at is not None):
+        raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
     if tolerance is not None or at is not None:
         fixed = {
             "steps": steps,
@@ -209,6 +216,10 @@ def integrate(
     if form == "power":
         _goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    if single:
+        from . import _single  # only such runs need it
+
+        dt = _single.step(system, how, form, dt, events=asked is not None)
     goes_on_alike(how, dt, carried_by, dt_before)
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
@@ -220,6 +231,8 @@ def integrate(
             f"after {steps} steps of {dt:g}"
         )
     system.check_time(max(-begin, end))
+    if single:
+        _single.check_inputs(system, max(-begin, end))
     every = None if every is None else _checks.count("every", every, 1)
     record = _quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
@@ -243,7 +256,9 @@ def integrate(
         batches["force"] = force.shape[len(system.v_shape) :]
     batch = _checks.batch_shape(batches)
     rows = prod(system.v_shape) + prod(system.y_shape)
-    plan = engine.Plan(system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused)
+    plan = engine.Plan(
+        system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused, single=single
+    )
     # What the core does not record is computed from the saved states, with some of them in between.
     recorded = 0
     for name in record:
@@ -255,17 +270,26 @@ def integrate(
         "keep less with every= or split the batch",
         beside=plan.kept * BYTES_PER_TIME,
     )
+    if single:
+        for name, block in (("v", v), ("y", y), ("force", force)):
+            _checks.fits_single(name, block)
+        if control is not None:  # whose target is that of the start as it is stepped
+            v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
     if control is not None:
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
+        if single:
+            _single.check_control(system)
     system = system.stepped_by(how)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
         plan = plan._replace(force=_spread(force, system.v_shape, batch))
     if record or system is not plan.system:
-        plan = plan._replace(system=system, record=tuple(name for name in record if name in system.quantities))
+        # In float32 they are computed from the saved states, in float64.
+        kept = () if single else tuple(name for name in record if name in system.quantities)
+        plan = plan._replace(system=system, record=kept)
     make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
     ended = None
     if asked is not None:
@@ -306,6 +330,8 @@ def integrate(
     )
     if ended is not None:
         ended.tell(run)
+    if single:
+        run.recorded |= {name: run.quantity(name) for name in record}
     for name in plan.record:
         if name not in run.recorded:
             run.recorded[name] = run.quantity(name)

@@ -200,6 +200,11 @@ class Run(Value):
         self.events: dict[str, Occurrences] = {}
         self.stopped_at: Array | None = None
 
+    @property
+    def dtype(self) -> str:
+        """Of the states, and of the arithmetic of the steps: "float64" or "float32"."""
+        return str(self.y.dtype)
+
     def _held(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""
         return {name: each for name, each in vars(self).items() if name not in ("collision", "encounter", "overshoots")}
@@ -207,10 +212,13 @@ class Run(Value):
     def quantity(self, name: str) -> Array:
         """A quantity that can be recorded, computed now for every saved state, shape (saved, *shape of it, *batch).
 
+        It is computed in float64, whatever the states are.
+
         Raises:
             UnknownNameError: if the system has none of that name.
         """
-        v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((self.v, self.system.v_shape), (self.y, self.system.y_shape)))
+        states = ((np.asarray(self.v, np.float64), self.system.v_shape), (np.asarray(self.y, np.float64), self.system.y_shape))
+        v, y = (np.moveaxis(a, 0, len(s)) for a, s in states)
         name = _checks.known("name", name, ("energy", *self.system.quantities))
         with np.errstate(all="ignore"):
             values = self.system.recordable(name, v, y, self.dt)
@@ -285,7 +293,9 @@ class Run(Value):
                 f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run"
                 f"{' for each' if stopped > 1 else ''}: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
             )
-        told = {"fused": True} if self.fused else {}
+        told: dict[str, Any] = {"fused": True} if self.fused else {}
+        if self.dtype != "float64":
+            told["dtype"] = self.dtype
         if self.stand is not None:
             kept = {} if self.system.keeper is None else {"control": self.system.keeper}
             going_on = {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, **told, **kept}
@@ -430,7 +440,7 @@ class Run(Value):
         if stopped:
             verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
         return [
-            ("steps", steps + (", fused" if self.fused else "")),
+            ("steps", steps + (", fused" if self.fused else "") + ("" if self.dtype == "float64" else f", {self.dtype}")),
             ("time", f"{first:g} to {last:g}"),
             ("saved states", str(len(self.t))),
             ("members", counted(members, "member")),

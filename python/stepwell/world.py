@@ -26,14 +26,14 @@ class World:
     Args:
         system: the system to step. Its parameters are copied: changing an array of parameters later has no effect.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block, a writeable C-contiguous float64 array of shape (*block, *batch).
+        v: velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
         dt: the step, in units of time, above zero.
         t0: time of step 0.
         start_step: number of the first step.
         start: how to start a method that has several ways; see ``method(…).starts``.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
-        force: what is added to v̇ in every stage: wind, or the push of a player. A C-contiguous float64 array of the shape of v,
+        force: what is added to v̇ in every stage: wind, or the push of a player. A C-contiguous array of the dtype and shape of v,
             yours to write to: each call of ``step`` reads it once and takes it as constant over its steps. In the units of v per
             unit of time: for bodies a force per mass, that is an acceleration.
         carry: what the method carries in place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
@@ -41,6 +41,7 @@ class World:
         carried_by: the method of that carry, from the ``resume`` of a run or a world. Any other method is then refused.
         dt_before: the step so far, likewise. Another ``dt`` is then refused.
         fused: compute each step with fused multiply-adds; see ``integrate``.
+        dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -82,22 +83,29 @@ class World:
         carried_by: str | None = None,
         dt_before: float | None = None,
         fused: bool = False,
+        dtype: Any = "float64",
     ) -> None:
         how = find_method(method)
         system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
         dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        single = _checks.is_single(dtype)
+        kind: Any = np.float32 if single else np.float64
+        if single:
+            from . import _single  # only such worlds need it
+
+            dt = _single.step(system, how, "direct", dt)
         goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
         batch = _checks.shape_of("y", y)[len(system.y_shape) :]
-        v = np.empty((0, *batch)) if velocities(system, v) is not v else v
-        v = _checks.in_place("v", v, (*system.v_shape, *batch))
-        y = _checks.in_place("y", y, (*system.y_shape, *batch))
+        v = np.empty((0, *batch), np.dtype(kind)) if velocities(system, v) is not v else v
+        v = _checks.in_place("v", v, (*system.v_shape, *batch), dtype=kind)
+        y = _checks.in_place("y", y, (*system.y_shape, *batch), dtype=kind)
         if np.shares_memory(v, y):
             raise ArgumentError("v and y: expected two arrays to step in place, got arrays that share memory")
         if force is not None:
             forced(system)
-            force = _checks.in_place("force", force, v.shape, "to read before the steps", written=False)
+            force = _checks.in_place("force", force, v.shape, "to read before the steps", written=False, dtype=kind)
             if np.shares_memory(force, v) or np.shares_memory(force, y):
                 raise ArgumentError("force: expected an array of its own, got one that shares memory with v or y")
         if _checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
@@ -110,16 +118,20 @@ class World:
             carry = _checks.numbers("carry", carry)
             if carry.shape != v.shape:
                 raise ShapeError(f"carry: expected the shape of v, {v.shape}, got {carry.shape}")
-            carry = np.ascontiguousarray(carry).reshape(-1)
+            carry = np.ascontiguousarray(carry, dtype=kind).reshape(-1)
         stepped = system
         if (control := a_control(control)) is not None:
             if _checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
-            stepped = system.controlled(control, v, y, dt)
+            stepped = system.controlled(control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt)
             fits_together(stepped, how)
             stepped = stepped.stepped_by(how)
+        if single:
+            _single.check_control(stepped)
+            _single.check_inputs(stepped, abs(t0) + first * dt)
         stepped.check_time(abs(t0) + first * dt)
-        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=_checks.flag("fused", fused), force=force)
+        fused = _checks.flag("fused", fused)
+        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         # Views: the core knows rows, not axes.
         watched = None if force is None else force.reshape(-1)
         loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry, watched)
@@ -166,6 +178,8 @@ class World:
             state["start"] = self._start
         if self._fused:
             state["fused"] = True
+        if self._y.dtype == np.float32:
+            state["dtype"] = "float32"
         if self._system.keeper is not None:
             state["control"] = self._system.keeper
         if self._force is not None:

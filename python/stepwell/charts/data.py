@@ -111,6 +111,7 @@ class Curve(Value):
         by: ``"step"`` or ``"tolerance"``, by which the points differ.
         times: for a peer, the measured time per unit of simulated time at each point, in a single run.
         fused: whether it was computed with fused multiply-adds.
+        dtype: ``"float64"`` or ``"float32"``, in which it was computed.
     """
 
     method: Method | Peer
@@ -121,10 +122,11 @@ class Curve(Value):
     by: str = "step"
     times: tuple[Timing, ...] = ()
     fused: bool = False
+    dtype: str = "float64"
 
     @property
     def name(self) -> str:
-        """The method's name, followed by "tolerance" or "fused" where that is so: ``"merson, tolerance"``, ``"rk4, fused"``."""
+        """The method's name, followed by "tolerance", "fused" or "float32" where that is so: ``"rk4, fused"``."""
         return f"{self.method.name}{self._kind}"
 
     @property
@@ -135,7 +137,7 @@ class Curve(Value):
     @property
     def _kind(self) -> str:
         tolerance = ", tolerance" if self.by == "tolerance" and isinstance(self.method, Method) else ""
-        return tolerance + (", fused" if self.fused else "")
+        return tolerance + (", fused" if self.fused else "") + ("" if self.dtype == "float64" else f", {self.dtype}")
 
     def time(self, i: int, cost: str) -> Timing:
         """Measured nanoseconds per unit of simulated time at point ``i``, with a ``cost`` of ``"batch"`` or ``"single"``."""

@@ -76,12 +76,12 @@ def refusal(scene: Scene, method: Method) -> str | None:
     return None
 
 
-def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = False) -> Point:
+def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = False, dtype: str = "float64") -> Point:
     """Run the scene with a fixed step and measure its errors."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DivergenceWarning)
         warnings.simplefilter("ignore", AccuracyWarning)
-        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused)
+        run = scene.run(method, dt, steps=steps, every=max(1, steps // SAMPLES), fused=fused, dtype=dtype)
     state_error, end_error, energy_error = _errors(scene, run)
     amplitude = scene.amplitude(run)
     half = len(amplitude) // 2
@@ -233,7 +233,9 @@ def phase_error(scene: Scene, v: Array, y: Array, t: float) -> float:
     return (shift / period + 0.5) % 1.0 - 0.5 if abs(shift) > 0.5 * period else shift / period
 
 
-def largest_stable_step(scene: Scene, method: Method, points: Sequence[Point], fused: bool = False) -> float:
+def largest_stable_step(
+    scene: Scene, method: Method, points: Sequence[Point], fused: bool = False, dtype: str = "float64"
+) -> float:
     """The step at which the method falls off, within 0.1 %: below it every rung of ``points`` is stable.
 
     ``points`` go from the largest step to the smallest. Infinite if all are stable, 0 if not even the last one is.
@@ -246,7 +248,7 @@ def largest_stable_step(scene: Scene, method: Method, points: Sequence[Point], f
     low = max((dt for dt, _ in ladder if dt < high), default=0.0)
     while low > 0.0 and high > 1.001 * low:
         middle = math.sqrt(low * high)
-        point = assess(scene, method, middle, scene.steps_for(middle), fused)
+        point = assess(scene, method, middle, scene.steps_for(middle), fused, dtype)
         low, high = (low, middle) if point.unstable else (middle, high)
     return low
 
@@ -256,7 +258,9 @@ def members_of(scene: Scene) -> int:
     return max(8, min(MEMBERS, NUMBERS // max(1, scene.v.size, scene.y.size)))
 
 
-def step_times(scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False) -> dict[str, Timing]:
+def step_times(
+    scene: Scene, methods: Sequence[Method], members: int | None = None, fused: bool = False, dtype: str = "float64"
+) -> dict[str, Timing]:
     """Nanoseconds per step of one member of a batch, by method.
 
     The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve. The
@@ -267,12 +271,14 @@ def step_times(scene: Scene, methods: Sequence[Method], members: int | None = No
         methods: by which.
         members: of the batch; ``members_of`` the scene if None, and 0 for a run without a batch.
         fused: with fused multiply-adds.
+        dtype: in float64 or float32.
     """
     v, y, members = _batch(scene, members)
+    how: Any = {"threads": 1, "fused": fused, "dtype": dtype}
 
     def timed(method: Method, steps: int) -> tuple[float, int]:
         begin = time.perf_counter()
-        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, threads=1, fused=fused)
+        integrate(scene.system, method, v=v, y=y, dt=TIMED_STEP * scene.dt, steps=steps, **how)
         return time.perf_counter() - begin, steps
 
     # A step of many bodies alone takes long enough.

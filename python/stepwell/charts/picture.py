@@ -64,13 +64,18 @@ def draw(chart: WorkPrecision, error: str, time: str) -> Figure:
 
 
 def look_of(chart: WorkPrecision, curve: Curve) -> dict[str, Any]:
-    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted; fused it is dotted, and small."""
+    """Keywords for a line: by tolerance a method's marker is hollow and its line dash-dotted; fused it is dotted, and small.
+
+    In float32 it is dashed.
+    """
     if isinstance(curve.method, Peer):
         others = [each.method.name for each in chart.curves if isinstance(each.method, Peer)]
         return peer_look(others.index(curve.method.name))
     own = look(curve.method)
     if curve.fused:
         own |= {"linestyle": ":", "markersize": 0.6 * own.get("markersize", 6.0)}
+    if curve.dtype == "float32":
+        own |= {"linestyle": (0, (1, 3)) if curve.fused else "--", "markersize": 0.6 * own.get("markersize", 6.0), "alpha": 0.8}
     return own | {"markerfacecolor": "white", "linestyle": "-."} if curve.by == "tolerance" else own
 
 
@@ -194,7 +199,7 @@ def with_way(cheapest: Sequence[str], ways: Sequence[str]) -> str:
         return title
     kinds = first.split(", ")[1:]
     step = "with a tolerance" if "tolerance" in kinds else "with fixed steps"
-    return f"{title} {step}{', fused,' if 'fused' in kinds else ''}"
+    return f"{title} {step}{', fused,' if 'fused' in kinds else ''}{', float32,' if 'float32' in kinds else ''}"
 
 
 def _spreads(axes: Axes, chart: WorkPrecision, time: str) -> None:

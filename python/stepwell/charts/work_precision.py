@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable
 
@@ -28,6 +29,9 @@ EXTRA_RUNGS = 2
 #: The most steps of a run of the ladder; more would take minutes.
 MAX_STEPS = 2_000_000
 
+#: The numbers of the curves of a chart.
+DTYPES = ("float64", "float32", "both")
+
 #: For blocks of more numbers than this it is divided by the square of the ratio, as the number of pairs of bodies grows.
 SMALL_BLOCK = 16
 
@@ -46,6 +50,7 @@ def work_precision(
     tolerances: Iterable[float] | None = None,
     peers: Iterable[Peer | Callable[[Scene, Array, float], Solved]] = (),
     fused: bool | str = False,
+    dtype: str = "float64",
     progress: Callable[[float], object] | None = None,
 ) -> WorkPrecision:
     """Run a scene by many methods with many steps and tolerances, and measure errors, stability and cost.
@@ -68,6 +73,8 @@ def work_precision(
         peers: other programs, such as ``peers.scipy("DOP853")``; see ``stepwell.charts.peers``.
         fused: compute with fused multiply-adds; ``"both"`` for a curve of each, "rk4" and "rk4, fused". A scene whose step is too
             long to be fused is refused.
+        dtype: ``"float64"``, ``"float32"``, or ``"both"`` for a curve of each, "rk4" and "rk4, float32". Curves by tolerance are
+            computed in float64. A scene that float32 does not go with is refused.
         progress: is called with the fraction that is done.
 
     Returns:
@@ -94,6 +101,7 @@ def work_precision(
     ways = (
         (False, True) if isinstance(fused, str) and _checks.known("fused", fused, ("both",)) else (_checks.flag("fused", fused),)
     )
+    dtypes = [name for name in ("float64", "float32") if _checks.known("dtype", dtype, DTYPES) in (name, "both")]
     progress = _checks.callback("progress", progress)
     scene, floor = chartable(whole)
     ladder = _ladder(scene) if numbers is None else numbers
@@ -107,15 +115,15 @@ def work_precision(
 
     def done() -> None:
         if progress is not None:
-            in_all = len(ways) * (len(able) + len(adaptive)) + len(others)
+            in_all = len(ways) * (len(dtypes) * len(able) + len(adaptive)) + len(others)
             progress((len(curves) + len(refused) - len(chosen) + len(able)) / in_all)
 
-    for way in ways:
-        batch, single = measure.step_times(scene, able, None, way), measure.step_times(scene, able, 0, way)
+    for kind, way in itertools.product(dtypes, ways):
+        batch, single = (measure.step_times(scene, able, members, way, kind) for members in (None, 0))
         for method in able:
-            points = tuple(measure.assess(scene, method, scene.horizon / n, n, way) for n in ladder)
-            edge = measure.largest_stable_step(scene, method, points, way)
-            curves.append(Curve(method, points, edge, batch[method.name], single[method.name], fused=way))
+            points = tuple(measure.assess(scene, method, scene.horizon / n, n, way, kind) for n in ladder)
+            edge = measure.largest_stable_step(scene, method, points, way, kind)
+            curves.append(Curve(method, points, edge, batch[method.name], single[method.name], fused=way, dtype=kind))
             done()
     for way in ways:
         batch, single = measure.tried_times(scene, adaptive, None, way), measure.tried_times(scene, adaptive, 0, way)

@@ -41,6 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--panel", action="store_true", help="one picture and one table of all scenes")
     parser.add_argument("--fused", action="store_true", help="also with fused multiply-adds, a second curve of each method")
+    parser.add_argument("--float32", action="store_true", help="also in float32, a further curve of each method")
     parser.add_argument("--error", choices=ERRORS, default=ERRORS[0], help="which error the pictures show (default: %(default)s)")
     show.json_option(parser)
 
@@ -59,7 +60,8 @@ def command(args: argparse.Namespace) -> None:
     done: list[tuple[WorkPrecision, list[str]]] = []
     for one in chosen:
         with nullcontext(None) if args.json else show.progress(one.title) as told:
-            chart = work_precision(one, methods, fused="both" if args.fused else False, progress=told)
+            ways: Any = {"fused": "both" if args.fused else False, "dtype": "both" if args.float32 else "float64"}
+            chart = work_precision(one, methods, **ways, progress=told)
         if args.panel:
             done.append((chart, []))
             continue

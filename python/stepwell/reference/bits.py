@@ -20,6 +20,11 @@ def _asked(name: str, given: Any, *more: Any) -> Any:
     return np.frompyfunc(lambda each, *rest: getattr(each, name)(*rest), 1 + len(more), 1)(given, *more)
 
 
+def is_single(x: Any) -> bool:
+    """Whether these are symbols of a tape of float32."""
+    return bool(_objects(x)) and any(getattr(each, "single", False) for each in np.asarray(x).flat)
+
+
 def _bits(x: Any) -> Any:
     return np.asarray(x, dtype=np.float64).view(np.uint64)
 
@@ -77,5 +82,5 @@ def shift_down(x: Any, places: int) -> Any:
 def turn_sign(x: Any, y: Any) -> Any:
     """X, its sign turned where the lowest bit of y is set."""
     if _objects(x, y):
-        return _asked("xor_bits", x, _asked("shift_up", y, 63))
+        return _asked("xor_bits", x, _asked("shift_up", y, 31 if is_single(y) else 63))
     return _number(_bits(x) ^ (_bits(y) << np.uint64(63)))

@@ -17,14 +17,14 @@ from .types import Array
 # ---- where
 
 
-def fused(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
+def fused(tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False) -> tuple[list[Operation], list[int]]:
     """The same tape with fused multiply-adds, and the lines of the roots on it.
 
     ``roots`` are the lines of the next state, and all others are needed for them. First increments are multiplied last. Then a
     product is fused into the sum or the difference of which it is a term if nothing else reads it and it depends on the state.
     Of two such products the one of the higher rank is fused.
     """
-    tape, roots = increments_last(tape, roots)
+    tape, roots = increments_last(tape, roots, single=single)
     rank = ranks(tape)
     reads = [0] * len(tape)
     for line in [*roots, *(line for operation in tape for line in operation.of)]:
@@ -156,31 +156,42 @@ MEANING: dict[str, Callable[..., Any]] = {
 }
 
 
+def listed(tape: Any, symbols: Sequence[Any]) -> tuple[list[Operation], list[int]]:
+    """What these symbols are made of on a tape that lists its operations, and their lines."""
+    operations, roots = tape.operations(symbols)
+    return [Operation(name, tuple(of), given) for name, of, given in operations], roots
+
+
 class Evaluated:
     """A tape, to be evaluated for many members at once.
 
     Args:
-        tape: its operations.
+        tape: its operations, fused where they are to be.
         roots: the lines whose values are returned.
         numbers: of each parameter, by its number on the tape, what it is for every member.
         tables: the sampled inputs.
+        meaning: of each operation.
     """
 
     def __init__(
-        self, tape: Sequence[Operation], roots: Sequence[int], numbers: Mapping[int, Any], tables: Sequence[Any]
+        self,
+        tape: Sequence[Operation],
+        roots: Sequence[int],
+        numbers: Mapping[int, Any],
+        tables: Sequence[Any],
+        meaning: Mapping[str, Callable[..., Any]] = MEANING,
     ) -> None:
-        self.tape, self.roots, self.numbers, self.tables = tape, roots, numbers, tables
+        self.tape, self.roots, self.numbers, self.tables, self.meaning = tape, roots, numbers, tables, meaning
 
     @classmethod
     def traced(
         cls, tape: Any, symbols: Sequence[Any], numbers: Mapping[int, Any], tables: Sequence[Any], *, fuse: bool
     ) -> "Evaluated":
         """For symbols on a tape that lists its operations, with fused multiply-adds if that is wanted."""
-        operations, roots = tape.operations(symbols)
-        listed = [Operation(name, tuple(of), given) for name, of, given in operations]
+        operations, roots = listed(tape, symbols)
         if fuse:
-            listed, roots = fused(listed, roots)
-        return cls(listed, roots, numbers, tables)
+            operations, roots = fused(operations, roots)
+        return cls(operations, roots, numbers, tables)
 
     def __call__(self, state: Sequence[Array], t: Any, h: float) -> list[Any]:
         """The values of the roots for these rows of the state, at time t with the step h."""
@@ -200,6 +211,6 @@ class Evaluated:
                 case "sample":
                     made = self.tables[given].sample(*operands)
                 case _:
-                    made = MEANING[name](*operands, given)
+                    made = self.meaning[name](*operands, given)
             values.append(made)
         return [values[line] for line in self.roots]

@@ -23,8 +23,10 @@ class Increment(NamedTuple):
 class Rewriting:
     """A tape that is written anew, line by line."""
 
-    def __init__(self, tape: Sequence[Operation], roots: Sequence[int]) -> None:
+    def __init__(self, tape: Sequence[Operation], roots: Sequence[int], single: bool = False) -> None:
         self.tape = tape
+        #: How constants are written: of 32 bits, or of 64.
+        self.bits, self.float = ("<I", "<f") if single else ("<Q", "<d")
         self.rank = ranks(tape)
         self.reads = [0] * len(tape)
         for line in [*roots, *(line for operation in tape for line in operation.of)]:
@@ -45,7 +47,7 @@ class Rewriting:
 
     def number(self, x: float) -> int:
         """The line of a number."""
-        return self.write("constant", given=struct.unpack("<Q", struct.pack("<d", x))[0])
+        return self.write("constant", given=struct.unpack(self.bits, struct.pack(self.float, x))[0])
 
     def signed(self, line: int) -> tuple[bool, int]:
         """Whether there is a minus before a value of the old tape, and the rest of it: (|c|·factor)·x."""
@@ -71,7 +73,7 @@ class Rewriting:
         """An increment times what is known before the step: numbers go to c, all else to the factor."""
         name, _, given = self.tape[p]
         if name == "constant":
-            return increment._replace(c=increment.c * struct.unpack("<d", struct.pack("<Q", given))[0])
+            return increment._replace(c=increment.c * struct.unpack(self.float, struct.pack(self.bits, given))[0])
         return increment._replace(factor=self.write("multiply", self.plain(p), increment.factor))
 
     def product(self, line: int) -> int | Increment:
@@ -162,8 +164,12 @@ def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]
     return made, place
 
 
-def increments_last(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
+def increments_last(
+    tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False
+) -> tuple[list[Operation], list[int]]:
     """The same tape with increments multiplied last, and the lines of the roots on it; all lines are needed for the roots.
+
+    ``single`` is whether numbers have 32 bits.
 
     A product of what depends on the step but not on the state, and of what depends on the state, is an increment. A change of
     sign, a product with a number, and a product with something else that is known before the step change c and the factor. The
@@ -172,7 +178,7 @@ def increments_last(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[li
     """
     tape, place = negated_sums(tape)
     tape, roots = needed(tape, [place[root] for root in roots])
-    work = Rewriting(tape, roots)
+    work = Rewriting(tape, roots, single)
     work.run()
     places = [work.plain(root) for root in roots]
     return needed(work.made, places)

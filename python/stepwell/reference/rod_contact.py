@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import bits
-from .contact import ROUNDING, Change, Place, Step, Surface, Vector, dot, magnitudes
+from .contact import Change, Place, Step, Surface, Vector, dot, magnitudes, rounding
 from .elimination import Factors, factored, solved
 from .joined import Column, Joined, added, groups
 
@@ -162,7 +162,7 @@ class RodContacts:
         for ends, length in zip(self.rods.rods, self.rods.lengths, strict=True):
             if i in ends:
                 size = size + length
-        slack = place.slack + ROUNDING * size
+        slack = place.slack + rounding(y1) * size
         return place._replace(slack=slack, near=place.near | bits.at_most(place.distance, slack))
 
     def struck(self, contacts: list[Contact], v: list[Vector]) -> tuple[list[Vector], list[Any], list[Any], list[Any]]:

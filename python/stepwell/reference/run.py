@@ -35,7 +35,7 @@ def run(
     Returns:
         The slots at the end; both slots at ``saves``, step counts in ascending order; ``first_bad`` of this and earlier runs.
     """
-    kept = np.empty((len(saves), *v.shape)), np.empty((len(saves), *y.shape))
+    kept = np.empty((len(saves), *v.shape), v.dtype), np.empty((len(saves), *y.shape), y.dtype)
     done = 0
     if saves[0] == 0:
         kept[0][0], kept[1][0], done = v, y, 1

@@ -30,6 +30,8 @@ def sin(x: Array) -> Array:
     """Sin x."""
     if np.iscomplexobj(x):  # an infinitesimal imaginary part is multiplied by the derivative
         return sin(x.real) + 1j * (x.imag * cos(x.real))
+    if bits.is_single(x):
+        return _single(x, 0.0)
     y = x * PER_HALF_TURN + MAGIC
     n = y - MAGIC
     return _half_turn((x - n * PI[0]) - n * PI[1], y)
@@ -40,9 +42,30 @@ def cos(x: Array) -> Array:
     """Cos x, which is the sine a quarter of a turn further."""
     if np.iscomplexobj(x):
         return cos(x.real) - 1j * (x.imag * sin(x.real))
+    if bits.is_single(x):
+        return _single(x, 0.5)
     y = (x * PER_HALF_TURN + 0.5) + MAGIC
     n = (y - MAGIC) - 0.5
     return _half_turn((x - n * PI[0]) - n * PI[1], y)
+
+
+#: The same for float32, where the first two parts of π have 13 bits each.
+SINGLE_MAGIC = 12582912.0
+SINGLE_PI = (3.1416015625, -8.909031748771667e-06, 1.215420125655342e-10)
+SINGLE_S = (-0.16666656732559204, 0.008333008736371994, -0.00019806012278422713, 2.5987430944951484e-06)
+
+
+def _single(x: Array, turned: float) -> Array:
+    """Sin(x + turned·π) of symbols of float32."""
+    y = x * PER_HALF_TURN
+    y = (y + turned if turned else y) + SINGLE_MAGIC
+    n = y - SINGLE_MAGIC
+    n = n - turned if turned else n
+    r = ((x - n * SINGLE_PI[0]) - n * SINGLE_PI[1]) - n * SINGLE_PI[2]
+    z = r * r
+    s = r + (r * z) * (SINGLE_S[0] + z * (SINGLE_S[1] + z * (SINGLE_S[2] + z * SINGLE_S[3])))
+    signed: Array = bits.turn_sign(s, y)
+    return signed
 
 
 def _half_turn(r: Array, y: Array) -> Array:

@@ -205,7 +205,7 @@ class Aircraft(OwnSystem):
 
     def _kept_by(self, control: Any) -> Aircraft:
         kept = super()._kept_by(control)
-        kept._core = None  # its rates have another term
+        kept._core = kept._single = None  # its rates have another term
         return kept
 
     # ---- attitudes

@@ -181,10 +181,11 @@ class System(Fixed, Value, ABC):
         """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
         return False
 
-    def parameters(self, batch: Shape, *, series: bool = False) -> Given:
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
         """The parameters of this system, of its surfaces, its control and its friction, in the form that the core takes.
 
-        A system of own equations tells more of them to a method that needs the ``series`` of a solution.
+        A system of own equations tells more of them to a method that needs the ``series`` of a solution. ``single`` is whether
+        steps are computed in float32; the parameters are the same, operations among them are not.
         """
         return flat(self.all_given(batch), batch)
 

@@ -15,6 +15,8 @@ from ..reference.signal import Constant, Held, Sine
 
 #: Beyond this angle the spacing of floating-point numbers is too coarse to locate a time within a period.
 LAST_ANGLE = 2.0**50
+#: The same of float32, where such an angle is as far from its neighbours.
+LAST_SINGLE_ANGLE = 2.0**21
 
 
 class Sinusoid(Fixed, Value):

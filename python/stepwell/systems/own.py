@@ -26,7 +26,7 @@ from .inputs import Input, Sampled, Sinusoid
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_with_functions", "_bounds", "_met")
+FOUND_LATER = ("_core", "_single", "_with_functions", "_bounds", "_met")
 #: Of how many shapes of states it is remembered what they are of.
 MOST_MET = 256
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
@@ -63,7 +63,9 @@ class OwnSystem(System):
         self.batch = _checks.batch_shape({f"{definition.name}: {name}": shape for name, shape in batches.items()})
         self.second_order = definition.order == 2 and definition.blocks == 1
         self.equations: Equations | None = None
+        #: The operations of the function, and those in float32.
         self._core: Any = None
+        self._single: Any = None
         #: The same rates as ``_core``, and what series must know of the functions in them.
         self._with_functions: tuple[Any, Any] | None = None
         #: The same system for blocks of these shapes, and for states of these, which may have batch axes.
@@ -92,7 +94,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_with_functions": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
@@ -169,7 +171,7 @@ class OwnSystem(System):
             for name, value in self.parameters_given.items()
         }
         equations = Equations(definition, v_shape, y_shape, shapes)
-        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _bounds={}, _met={})
+        bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single=None, _bounds={}, _met={})
         bound._trace()
         self._bounds[v_shape, y_shape] = bound
         return bound
@@ -228,12 +230,24 @@ class OwnSystem(System):
                 made[name] = value
         return made if self.push is None else made | self.push.given()
 
-    def parameters(self, batch: Shape, *, series: bool = False) -> Given:
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> Given:
         """The operations of the function, and parameters by name, as the core takes them; for ``series`` with derivatives."""
         bound = self._retraced()
-        rates = bound._series_rates() if series else bound._core
+        rates = bound._in_single() if single else bound._series_rates() if series else bound._core
         given = {name: value for name, value in bound.given(batch).items() if name != RATES and not callable(value)}
         return [(RATES, rates), *flat(given | ({} if self.control is None else self.control.given()), batch)]
+
+    def _in_single(self) -> Any:
+        """The operations of the function in float32. Invariants are not among them."""
+        if self._single is None:
+            equations = self.equations
+            assert equations is not None
+            tape = _core.Tape(single=True)
+            tracer = Tracer(self, tape)
+            v, y, _ = tracer.state()
+            dv, dy = (tracer.flat(rate) for rate in tracer.scaled(tape.step()).rates(tape.time(), v, y))
+            self._single = tape.equations(dv if equations.v_shape != (0,) else [], None if equations.second_order else dy)
+        return self._single
 
     @property
     def chooses(self) -> bool:
@@ -312,6 +326,7 @@ class OwnSystem(System):
         pushed = isinstance(control, Control)
         kept = changed(
             known,
+            _single=None,
             _bounds={},
             _met={},
             _free=known,

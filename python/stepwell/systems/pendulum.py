@@ -11,7 +11,7 @@ from .._checks import Array, Shape
 from ..reference import trig
 from ..reference.systems.pendulum import Pendulum as Reference
 from .base import System, shown
-from .inputs import LAST_ANGLE, Input, as_input, signal
+from .inputs import LAST_ANGLE, LAST_SINGLE_ANGLE, Input, as_input, signal
 
 
 class Pendulum(System):
@@ -63,12 +63,11 @@ class Pendulum(System):
 
     def doubt(self, y: Array) -> str | None:
         """A message if an angle is too large for its sine to be known."""
+        last = LAST_SINGLE_ANGLE if y.dtype == np.float32 else LAST_ANGLE
         with np.errstate(invalid="ignore"):
-            beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > LAST_ANGLE)])
+            beyond = np.abs(y[np.isfinite(y) & (np.abs(y) > last)])
         return (
-            f"an angle grew to {beyond.max():.3g} rad, and beyond {LAST_ANGLE:.3g} rad its sine means nothing"
-            if beyond.size
-            else None
+            f"an angle grew to {beyond.max():.3g} rad, and beyond {last:.3g} rad its sine means nothing" if beyond.size else None
         )
 
     def energy(self, v: Array, y: Array) -> Array:

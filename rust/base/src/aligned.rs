@@ -6,43 +6,44 @@
 use std::ops::{Deref, DerefMut};
 
 const LINE: usize = 64;
-const NUMBERS: usize = LINE / size_of::<f64>();
 
 /// So many numbers, all zero at first.
 #[derive(Debug, Default)]
-pub struct Aligned {
-    numbers: Vec<f64>,
+pub struct Aligned<T = f64> {
+    numbers: Vec<T>,
     first: usize,
     count: usize,
 }
 
-impl Aligned {
+impl<T: Copy + Default> Aligned<T> {
+    const IN_A_LINE: usize = LINE / size_of::<T>();
+
     /// So many zeros.
-    pub fn new(count: usize) -> Aligned {
-        let numbers = vec![0.0; count + NUMBERS - 1];
-        let first = numbers.as_ptr().align_offset(LINE).min(NUMBERS - 1);
+    pub fn new(count: usize) -> Aligned<T> {
+        let numbers = vec![T::default(); count + Self::IN_A_LINE - 1];
+        let first = numbers.as_ptr().align_offset(LINE).min(Self::IN_A_LINE - 1);
         Aligned { numbers, first, count }
     }
 
     /// These numbers.
-    pub fn from(numbers: &[f64]) -> Aligned {
+    pub fn from(numbers: &[T]) -> Aligned<T> {
         let mut aligned = Aligned::new(numbers.len());
         aligned.copy_from_slice(numbers);
         aligned
     }
 }
 
-impl Deref for Aligned {
-    type Target = [f64];
+impl<T> Deref for Aligned<T> {
+    type Target = [T];
     #[inline]
-    fn deref(&self) -> &[f64] {
+    fn deref(&self) -> &[T] {
         &self.numbers[self.first..self.first + self.count]
     }
 }
 
-impl DerefMut for Aligned {
+impl<T> DerefMut for Aligned<T> {
     #[inline]
-    fn deref_mut(&mut self) -> &mut [f64] {
+    fn deref_mut(&mut self) -> &mut [T] {
         &mut self.numbers[self.first..self.first + self.count]
     }
 }

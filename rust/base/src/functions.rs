@@ -34,6 +34,9 @@ const S: [f64; 8] = [
 /// sin x
 #[inline(always)]
 pub fn sin<N: Number>(x: N) -> N {
+    if N::is_single() {
+        return single_sin(x);
+    }
     let y = x * N::of(PER_HALF_TURN) + N::of(MAGIC);
     let n = y - N::of(MAGIC);
     half_turn((x - n * N::of(PI[0])) - n * N::of(PI[1]), y).marked(Function::Sin, x)
@@ -42,6 +45,9 @@ pub fn sin<N: Number>(x: N) -> N {
 /// cos x, which is the sine a quarter of a turn further. Series of sines need it.
 #[inline(always)]
 pub fn cos<N: Number>(x: N) -> N {
+    if N::is_single() {
+        return single_cos(x);
+    }
     let y = (x * N::of(PER_HALF_TURN) + N::of(0.5)) + N::of(MAGIC);
     let n = (y - N::of(MAGIC)) - N::of(0.5);
     half_turn((x - n * N::of(PI[0])) - n * N::of(PI[1]), y).marked(Function::Cos, x)
@@ -93,6 +99,9 @@ const TWO_52: u64 = 0x4330_0000_0000_0000;
 /// ln x
 #[inline(always)]
 pub fn log<N: Number>(x: N) -> N {
+    if N::is_single() {
+        return single_log(x);
+    }
     let l = |i: usize| N::of(L[i]);
     let u = x.add_bits(TO_ONE);
     let k = u.shift_down(52).or_bits(TWO_52) - N::of(4_503_599_627_370_496.0 + 1023.0);
@@ -102,4 +111,55 @@ pub fn log<N: Number>(x: N) -> N {
     let r = z * (l(0) + z * (l(1) + z * (l(2) + z * (l(3) + z * (l(4) + z * (l(5) + z * l(6)))))));
     let half = N::of(0.5) * f * f;
     (k * N::of(LN2[0]) - ((half - (s * (half + r) + k * N::of(LN2[1]))) - f)).marked(Function::Log, x)
+}
+
+// ---- numbers of 32 bits: the same ways, with shorter polynomials
+
+/// 1.5·2²³
+const SINGLE_MAGIC: f64 = 12582912.0;
+/// π: two parts of 13 bits, so that their products with n are exact for n < 2¹¹, and the rest.
+const SINGLE_PI: [f64; 3] = [3.1416015625, -8.909031748771667e-06, 1.215420125655342e-10];
+/// As `S`; the error is 5e-9 at most.
+const SINGLE_S: [f64; 4] = [-0.16666656732559204, 0.008333008736371994, -0.00019806012278422713, 2.5987430944951484e-06];
+
+/// sin x
+fn single_sin<N: Number>(x: N) -> N {
+    let y = x * N::of(PER_HALF_TURN) + N::of(SINGLE_MAGIC);
+    single_half_turn(x, y, y - N::of(SINGLE_MAGIC))
+}
+
+/// cos x
+fn single_cos<N: Number>(x: N) -> N {
+    let y = (x * N::of(PER_HALF_TURN) + N::of(0.5)) + N::of(SINGLE_MAGIC);
+    single_half_turn(x, y, (y - N::of(SINGLE_MAGIC)) - N::of(0.5))
+}
+
+/// sin(x − nπ); its sign turns if the integer in the low bits of y is odd.
+fn single_half_turn<N: Number>(x: N, y: N, n: N) -> N {
+    let s = |i: usize| N::of(SINGLE_S[i]);
+    let r = ((x - n * N::of(SINGLE_PI[0])) - n * N::of(SINGLE_PI[1])) - n * N::of(SINGLE_PI[2]);
+    let z = r * r;
+    let sine = r + (r * z) * (s(0) + z * (s(1) + z * (s(2) + z * s(3))));
+    sine.xor_bits(y.shift_up(31))
+}
+
+/// ln 2 in two parts; the first has 15 bits, so that its product with k is exact.
+const SINGLE_LN2: [f64; 2] = [0.693145751953125, 1.428606765330187e-06];
+/// As `L`.
+const SINGLE_L: [f64; 4] = [0.6666666269302368, 0.40000972151756287, 0.2849878966808319, 0.2427894026041031];
+const SINGLE_HALF_ROOT: u64 = 0x3F35_0400;
+const SINGLE_TO_ONE: u64 = 0x3F80_0000 - SINGLE_HALF_ROOT;
+const SINGLE_MANTISSA: u64 = 0x007F_FFFF;
+const TWO_23: u64 = 0x4B00_0000;
+
+fn single_log<N: Number>(x: N) -> N {
+    let l = |i: usize| N::of(SINGLE_L[i]);
+    let u = x.add_bits(SINGLE_TO_ONE);
+    let k = u.shift_down(23).or_bits(TWO_23) - N::of(8_388_608.0 + 127.0);
+    let f = u.and_bits(SINGLE_MANTISSA).add_bits(SINGLE_HALF_ROOT) - N::of(1.0);
+    let s = f / (N::of(2.0) + f);
+    let z = s * s;
+    let r = z * (l(0) + z * (l(1) + z * (l(2) + z * l(3))));
+    let half = N::of(0.5) * f * f;
+    k * N::of(SINGLE_LN2[0]) - ((half - (s * (half + r) + k * N::of(SINGLE_LN2[1]))) - f)
 }

@@ -38,6 +38,10 @@ pub trait Number:
     /// The result of a comparison.
     type Truth: Copy + BitAnd<Output = Self::Truth> + BitOr<Output = Self::Truth> + Not<Output = Self::Truth>;
 
+    /// Whether it is computed with 32 bits: functions of bits and constants of their own size are other ones then.
+    fn is_single() -> bool {
+        false
+    }
     /// A constant.
     fn of(x: f64) -> Self;
     /// √x

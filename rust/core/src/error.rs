@@ -58,6 +58,20 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A step that is too long for one tape, which numbers of 32 bits need.
+    #[error("dtype: a step of about {operations} operations is too long; float32 goes with steps of up to {most}")]
+    TooLongForSingle {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
+    /// What is not computed with numbers of 32 bits.
+    #[error("dtype: float32 does not go with {of}; use float64")]
+    NotSingle {
+        /// What was asked for.
+        of: &'static str,
+    },
     /// Adaptive steps under a control whose push depends on the step, of a system too long for one tape.
     #[error(
         "control: with a tolerance a step that is too long for one list of operations goes with a projection or the printed form only"

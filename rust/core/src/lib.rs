@@ -23,6 +23,7 @@ pub mod method;
 pub mod number;
 pub mod pace;
 pub mod program;
+pub mod real;
 pub mod run;
 pub mod series;
 pub mod series_pace;

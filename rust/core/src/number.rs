@@ -10,6 +10,7 @@ use std::{
 pub use stepwell_base::number::{Function, Number};
 
 use crate::{
+    real::Precision,
     series,
     tape::{Id, Op, Tape},
 };
@@ -118,15 +119,19 @@ pub(crate) fn operation(id: Id) -> Op {
     TAPE.with_borrow(|tape| tape.op(id))
 }
 
+/// A constant of bits, as [`Precision::pattern`] has it.
 fn bits(bits: u64) -> Id {
-    write(Op::Const(bits))
+    TAPE.with_borrow_mut(|tape| tape.bits_of(bits))
 }
 
 impl Number for Symbol {
     type Truth = SymbolTruth;
 
+    fn is_single() -> bool {
+        TAPE.with_borrow(|tape| tape.precision()) == Precision::Single
+    }
     fn of(x: f64) -> Symbol {
-        Symbol(bits(x.to_bits()))
+        Symbol(TAPE.with_borrow_mut(|tape| tape.constant(x)))
     }
     fn sqrt(self) -> Symbol {
         Symbol::new(Op::Sqrt(self.0))

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{error::Error, number::Number, systems::equations::Equations};
+use crate::{error::Error, number::Number, real::Real, systems::equations::Equations};
 
 /// The numbers of one parameter or input, for every member.
 #[derive(Clone, Copy, Debug)]
@@ -22,13 +22,13 @@ impl Row<'_> {
         }
     }
 
-    /// The values for the members from `first`; what is past the `count`-th repeats the last.
-    pub fn fill(&self, first: usize, count: usize, lanes: &mut [f64]) {
+    /// The values for the members from `first`, rounded to the precision of the lanes; what is past the `count`-th repeats the last.
+    pub fn fill<T: Real>(&self, first: usize, count: usize, lanes: &mut [T]) {
         match self.0 {
-            [one] => lanes.fill(*one),
+            [one] => lanes.fill(T::of(*one)),
             many => {
-                lanes[..count].copy_from_slice(&many[first..first + count]);
-                lanes[count..].fill(many[first + count - 1]);
+                lanes.iter_mut().zip(&many[first..first + count]).for_each(|(lane, x)| *lane = T::of(*x));
+                lanes[count..].fill(T::of(many[first + count - 1]));
             }
         }
     }

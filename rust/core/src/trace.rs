@@ -19,6 +19,7 @@ use crate::{
     number::{Number, Symbol, record},
     pace::{Attempted, Pace, Stretched, attempt},
     program::Program,
+    real::{Precision, Real},
     run::stage::Stage,
     series_pace,
     spec::{Given, Parameters},
@@ -63,26 +64,28 @@ pub struct Scene {
     pub record: Vec<String>,
     /// Whether steps are computed with fused multiply-adds: see [`fuse`]. Recorded quantities are not.
     pub fused: bool,
+    /// The numbers that steps are computed with.
+    pub precision: Precision,
 }
 
 /// The tapes of a scene.
-pub struct Tapes {
+pub struct Tapes<T: Real = f64> {
     /// One step, or one attempt, of the whole state. Attempts by a series return its coefficients behind the state.
-    pub step: Stage,
+    pub step: Stage<T>,
     /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not where
     /// operations are fused, for the attempt may fuse what made the coefficients.
-    pub by_terms: Option<Stage>,
+    pub by_terms: Option<Stage<T>>,
     /// Of attempts: the pace behind the state, as it is at the start: see [`Pace::begun`]. Its operations are never fused.
-    pub begin: Option<Stage>,
+    pub begin: Option<Stage<T>>,
     /// Turns velocities into what the method carries.
-    pub start: Option<Stage>,
+    pub start: Option<Stage<T>>,
     /// Turns what the method carries into velocities.
-    pub finish: Option<Stage>,
+    pub finish: Option<Stage<T>>,
     /// A step that also returns the velocities before it, after the next state, for a run that saves all of them; None if the state has
     /// them already.
-    pub shown: Option<Stage>,
+    pub shown: Option<Stage<T>>,
     /// The recorded numbers, behind v and y.
-    pub record: Option<Stage>,
+    pub record: Option<Stage<T>>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
     /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
@@ -105,6 +108,8 @@ pub struct Traced {
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
+    /// The same for numbers of 32 bits.
+    singles: OnceLock<Arc<Tapes<f32>>>,
     /// By what is known of rates.
     courses: Mutex<Vec<(Facts, Arc<Courses>)>>,
 }
@@ -304,9 +309,9 @@ fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>,
 }
 
 /// Traces an attempt by coefficients that stand behind the state and the pace, where they stay.
-fn trace_by_terms(given: &Given, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
+fn trace_by_terms(tape: Tape, given: &Given, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(given)?;
-    Ok(record(Tape::default(), || {
+    Ok(record(tape, || {
         let (state, first) = (shape.v + shape.y, shape.v + shape.y + Pace::<Symbol>::NUMBERS);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
         let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
@@ -398,7 +403,7 @@ fn started(how: &How, choice: usize) -> How {
 }
 
 /// Cuts a tape.
-pub(crate) fn cut(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage {
+pub(crate) fn cut<T: Real>(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
     Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
 }
 
@@ -454,6 +459,9 @@ impl Scene {
             if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
+            if self.precision == Precision::Single {
+                self.fits_single(operations.1)?;
+            }
             let (mut tally, mut carries) = (0, false);
             if let How::Method { name, .. } = &self.how {
                 watch::check(&self.given, shape)?;
@@ -472,6 +480,7 @@ impl Scene {
                 recorded: recorded(&self.given, &self.record)?,
                 operations,
                 tapes: OnceLock::new(),
+                singles: OnceLock::new(),
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
@@ -502,11 +511,17 @@ impl Traced {
 
     /// The tapes of all that a run needs.
     pub fn tapes(&self) -> Result<Arc<Tapes>, Error> {
-        if let Some(tapes) = self.tapes.get() {
+        self.tapes_of()
+    }
+
+    /// The same, for numbers of the scene's precision.
+    pub fn tapes_of<T: Traceable>(&self) -> Result<Arc<Tapes<T>>, Error> {
+        let known = T::known(self);
+        if let Some(tapes) = known.get() {
             return Ok(Arc::clone(tapes));
         }
         let tapes = Arc::new(self.scene.trace()?);
-        Ok(Arc::clone(self.tapes.get_or_init(|| tapes)))
+        Ok(Arc::clone(known.get_or_init(|| tapes)))
     }
 
     /// The rates as tapes of their own.
@@ -537,34 +552,70 @@ impl Traced {
     }
 }
 
+/// Numbers whose tapes are kept.
+pub trait Traceable: Real {
+    /// Where.
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<Self>>>;
+}
+
+impl Traceable for f64 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f64>>> {
+        &traced.tapes
+    }
+}
+
+impl Traceable for f32 {
+    fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<f32>>> {
+        &traced.singles
+    }
+}
+
 impl Scene {
+    /// An error if a step of so many operations cannot be computed with numbers of 32 bits.
+    fn fits_single(&self, operations: usize) -> Result<(), Error> {
+        if operations > MAX_TAPE_OPERATIONS {
+            return Err(Error::TooLongForSingle { operations, most: MAX_TAPE_OPERATIONS });
+        }
+        let of = match (&self.how, self.given.tables.first()) {
+            (How::Attempts { .. }, _) => "adaptive steps",
+            (How::Matrix { .. }, _) => "the matrix form",
+            (_, Some(_)) => "sampled inputs",
+            _ if self.given.watched.is_some() => "events",
+            _ if has_series(&self.how)? => "the series of a solution",
+            _ => return Ok(()),
+        };
+        Err(Error::NotSingle { of })
+    }
+
     /// Traces all that a run needs, anew.
-    pub fn trace(&self) -> Result<Tapes, Error> {
-        let steps = trace_step(Tape::default(), &self.given, &self.how)?;
+    pub fn trace<T: Real>(&self) -> Result<Tapes<T>, Error> {
+        debug_assert!(T::PRECISION == self.precision, "the tapes of a scene have its precision");
+        let new = || Tape::new(T::PRECISION);
+        let steps = trace_step(new(), &self.given, &self.how)?;
         let fused = |tape: Tape, next: Vec<Id>| if self.fused { fuse(&tape, &next) } else { (tape, next) };
         let (mut start, mut finish) = (None, None);
         if let How::Method { name, choice } = &self.how {
             let method = method(name)?;
             for (slot, program) in [(&mut start, method.start(*choice)), (&mut finish, method.finish(*choice))] {
                 if let Some(program) = program {
-                    let (tape, next) = trace_slot(Tape::default(), &self.given, &program)?;
+                    let (tape, next) = trace_slot(new(), &self.given, &program)?;
                     *slot = Some(fused(tape, next));
                 }
             }
         }
         let begin = match &self.how {
-            How::Attempts { name, .. } => Some(cut(&self.given, &trace_begin(Tape::default(), &self.given, method(name)?)?)),
+            How::Attempts { name, .. } => Some(cut(&self.given, &trace_begin(new(), &self.given, method(name)?)?)),
             _ => None,
         };
         let mut quantities = None;
         if !self.record.is_empty() {
-            quantities = Some(cut(&self.given, &trace_record(Tape::default(), &self.given, &self.record)?));
+            quantities = Some(cut(&self.given, &trace_record(new(), &self.given, &self.record)?));
         }
         let written = steps.tape.written(steps.next.iter().copied());
         let series_evaluations = steps.tape.series_evaluations();
         let (mut next, mut by_terms) = (steps.next, None);
         if !steps.terms.is_empty() && !self.fused {
-            by_terms = Some(cut(&self.given, &trace_by_terms(&self.given, steps.shape, steps.terms.len())?));
+            by_terms = Some(cut(&self.given, &trace_by_terms(new(), &self.given, steps.shape, steps.terms.len())?));
             next.extend(steps.terms);
         }
         let step = fused(steps.tape, next);

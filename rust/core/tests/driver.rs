@@ -87,7 +87,7 @@ fn a_batch_of_any_size_is_its_members() {
     };
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
     let whole = pendulums(385);
-    let tile = |members: usize| whole.lanes(&whole.traced().unwrap(), machine(1), members, 1e9).unwrap();
+    let tile = |members: usize| whole.lanes::<f64>(&whole.traced().unwrap(), machine(1), members, 1e9).unwrap();
     let edges = [tile(385), tile(8)].into_iter().flat_map(|tile| [tile - 1, tile, tile + 1, 2 * tile + 1]);
     let sizes = [1, 2, 7, 8, 9, 16, 17, 31, 32, 33, 64, 191, 192, 193, 200, 224, 225, 384];
     for members in sizes.into_iter().chain(edges).filter(|members| (1..=385).contains(members)) {

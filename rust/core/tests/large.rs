@@ -17,6 +17,7 @@ use stepwell_core::{
     },
     method,
     pace::Pace,
+    real::Precision,
     run::{
         Machine,
         adaptive::{AdaptiveBatch, AdaptiveLanes},
@@ -170,7 +171,13 @@ fn made(group: &mut dyn Group, spec: &Spec, member: usize, count: usize, state: 
 fn scene(given: &Given, how: How) -> Scene {
     let kind = system::kind(&given.system).unwrap();
     let record = if matches!(how, How::Method { .. }) { (kind.quantities)(given) } else { Vec::new() };
-    Scene { given: given.clone(), how, record: record.into_iter().map(|(name, _)| name.to_owned()).collect(), fused: false }
+    Scene {
+        given: given.clone(),
+        how,
+        record: record.into_iter().map(|(name, _)| name.to_owned()).collect(),
+        fused: false,
+        precision: Precision::Double,
+    }
 }
 
 /// Panics unless the rows of several members are those of their own runs.
@@ -337,7 +344,8 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
         given.rows.retain(|(_, rows)| !rows.is_empty());
         let parameters = numbers(13 * (given.parameters() + 9), n as u64);
         let spec = spec(&given, &parameters, 13);
-        let traced = Scene { given, how: how.clone(), record: Vec::new(), fused: false }.traced().unwrap();
+        let traced =
+            Scene { given, how: how.clone(), record: Vec::new(), fused: false, precision: Precision::Double }.traced().unwrap();
         let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
         let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
         let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();

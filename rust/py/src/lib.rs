@@ -5,7 +5,7 @@ mod tape;
 mod world;
 
 use numpy::{
-    PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
+    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
     PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
@@ -14,9 +14,10 @@ use stepwell_core::{
     isa::Level,
     method::{Fact, Record},
     program::{Entry, Program},
+    real::Precision,
     run::{
         Machine,
-        batch::{self, Arrays, Plan},
+        batch::{self, Arrays, Plan, Steppable},
         chosen,
         stage::Clock,
     },
@@ -101,22 +102,34 @@ struct PlanOf {
 
 /// What a run begins with and what it fills: see `Arrays` in `engine.py`.
 #[derive(FromPyObject)]
-struct ArraysOf<'py> {
+struct ArraysOf<'py, T: Element + 'py> {
     v: Bound<'py, PyArray2<f64>>,
     y: Bound<'py, PyArray2<f64>>,
     carried: bool,
-    saved_v: PyReadwriteArrayDyn<'py, f64>,
-    saved_y: PyReadwriteArrayDyn<'py, f64>,
-    recorded: Option<PyReadwriteArrayDyn<'py, f64>>,
-    tally: Option<PyReadwriteArray1<'py, f64>>,
-    carry: Option<PyReadwriteArrayDyn<'py, f64>>,
+    saved_v: PyReadwriteArrayDyn<'py, T>,
+    saved_y: PyReadwriteArrayDyn<'py, T>,
+    recorded: Option<PyReadwriteArrayDyn<'py, T>>,
+    tally: Option<PyReadwriteArray1<'py, T>>,
+    carry: Option<PyReadwriteArrayDyn<'py, T>>,
     first_bad: PyReadwriteArray1<'py, i64>,
 }
 
 /// Makes a run from the rows of `v` and `y`, each of one number or one per member, and fills the arrays of saved states. Returns whether
 /// some member diverged, now or before.
 #[pyfunction]
-fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>) -> PyResult<bool> {
+fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, arrays: Bound<'_, PyAny>) -> PyResult<bool> {
+    match model.precision {
+        Precision::Double => run_with::<f64>(py, model, plan, arrays.extract()?),
+        Precision::Single => run_with::<f32>(py, model, plan, arrays.extract()?),
+    }
+}
+
+fn run_with<T: Steppable + Element>(
+    py: Python<'_>,
+    model: &ModelSpec,
+    plan: PlanOf,
+    mut arrays: ArraysOf<'_, T>,
+) -> PyResult<bool> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
     let plan_of_core = Plan {
@@ -144,7 +157,7 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, mut arrays: ArraysOf<'_>
 }
 
 /// The numbers of an array; none if there is no array.
-fn filled<'a, D: Dimension>(array: &'a mut Option<PyReadwriteArray<'_, f64, D>>) -> PyResult<&'a mut [f64]> {
+fn filled<'a, T: Element, D: Dimension>(array: &'a mut Option<PyReadwriteArray<'_, T, D>>) -> PyResult<&'a mut [T]> {
     array.as_mut().map_or(Ok(&mut []), |array| Ok(array.as_slice_mut()?))
 }
 

@@ -10,6 +10,7 @@ use pyo3::{
 use stepwell_core::{
     controls::force,
     error::Error,
+    real::Precision,
     run::Model,
     spec::{Given, Row, Spec, Table},
     systems::equations,
@@ -55,6 +56,11 @@ pub fn core_error(error: Error) -> PyErr {
         _ => "ArgumentError",
     };
     error_of(name, error.to_string())
+}
+
+/// That of 32 bits, or that of 64.
+pub fn precision(single: bool) -> Precision {
+    if single { Precision::Single } else { Precision::Double }
 }
 
 /// The rates of a user's own system.
@@ -119,6 +125,7 @@ pub struct ModelSpec {
     record: Vec<String>,
     fused: bool,
     order: u32,
+    pub precision: Precision,
 }
 
 /// The parameters, borrowed for a run.
@@ -145,9 +152,10 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 #[pymethods]
 impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
-    /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps.
+    /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether steps are computed with
+    /// numbers of 32 bits.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false))]
     #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn new(
         py: Python<'_>,
@@ -158,6 +166,7 @@ impl ModelSpec {
         record: Vec<String>,
         fused: bool,
         order: u32,
+        single: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
         let (mut rows, mut tables) = (Vec::new(), Vec::new());
@@ -185,7 +194,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record, fused, order }
+        ModelSpec { given: names, how, rows, tables, record, fused, order, precision: precision(single) }
     }
 }
 
@@ -228,6 +237,10 @@ impl ModelSpec {
                 .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
                 .collect::<PyResult<_>>()?,
         };
-        Ok(Model { spec, scene: Scene { given: self.given.clone(), how, record: self.record.clone(), fused: self.fused } })
+        let Self { given, record, fused, precision, .. } = self;
+        Ok(Model {
+            spec,
+            scene: Scene { given: given.clone(), how, record: record.clone(), fused: *fused, precision: *precision },
+        })
     }
 }

@@ -9,6 +9,7 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
+    real::Precision,
     systems::equations::{self, Invariant},
     tape::{self, Id, Op, fuse::fuse, print},
     trace,
@@ -16,7 +17,7 @@ use stepwell_core::{
 
 use crate::{
     kinds_of,
-    model::{Equations, ModelSpec, core_error},
+    model::{Equations, ModelSpec, core_error, precision},
 };
 
 type Shared = Arc<Mutex<tape::Tape>>;
@@ -100,7 +101,7 @@ impl Symbol {
     }
 
     fn with_bits(&self, bits: u64, op: impl FnOnce(Id, Id) -> Op) -> Symbol {
-        let bits = lock(&self.tape).push(Op::Const(bits));
+        let bits = lock(&self.tape).bits_of(bits);
         self.on(|id| op(id, bits))
     }
 }
@@ -191,7 +192,13 @@ impl Symbol {
     }
     /// A number on the tape of this symbol.
     fn number(&self, x: f64) -> Symbol {
-        self.on(|_| Op::Const(x.to_bits()))
+        let id = lock(&self.tape).constant(x);
+        Symbol { tape: Arc::clone(&self.tape), id }
+    }
+    /// Whether numbers of its tape have 32 bits.
+    #[getter]
+    fn single(&self) -> bool {
+        lock(&self.tape).precision() == Precision::Single
     }
     /// Bits moved up.
     fn shift_up(&self, places: u32) -> Symbol {
@@ -208,15 +215,18 @@ impl Symbol {
         Err(no_truth())
     }
     fn __repr__(&self) -> String {
-        print::line(self.id, lock(&self.tape).op(self.id))
+        let tape = lock(&self.tape);
+        print::line(self.id, tape.op(self.id), tape.precision())
     }
 }
 
 #[pymethods]
 impl Tape {
+    /// For numbers of 64 bits, or of 32.
     #[new]
-    fn new() -> Tape {
-        Tape(Shared::default())
+    #[pyo3(signature = (*, single=false))]
+    fn new(single: bool) -> Tape {
+        Tape(Shared::new(Mutex::new(tape::Tape::new(precision(single)))))
     }
 
     /// A number of the state at the start of the step.
@@ -246,7 +256,8 @@ impl Tape {
 
     /// A number.
     fn number(&self, x: f64) -> Symbol {
-        self.leaf(Op::Const(x.to_bits()))
+        let id = lock(&self.0).constant(x);
+        Symbol { tape: Arc::clone(&self.0), id }
     }
 
     /// A sampled input at a time.
@@ -282,7 +293,7 @@ impl Tape {
         }
         let needed = tape.needed([of.id]);
         let lines = tape.ops().iter().enumerate().filter(|(id, _)| needed[*id]);
-        Ok(lines.map(|(id, op)| print::line(id as Id, *op) + "\n").collect())
+        Ok(lines.map(|(id, op)| print::line(id as Id, *op, tape.precision()) + "\n").collect())
     }
 
     /// The operations that these values are made of, and nothing else, in order: the name of each, the places of its operands, and what

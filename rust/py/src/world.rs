@@ -5,11 +5,16 @@ use std::sync::{
     atomic::{AtomicI64, Ordering::Relaxed},
 };
 
-use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
-use pyo3::{buffer::PyBuffer, prelude::*, types::PyInt};
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use pyo3::{
+    buffer::{Element as PyElement, PyBuffer},
+    prelude::*,
+    types::PyInt,
+};
 use stepwell_core::{
     isa::Level,
-    run::{Machine, stage::Clock, world},
+    real::Precision,
+    run::{Machine, batch::Steppable, stage::Clock, world},
 };
 
 use crate::{
@@ -18,16 +23,16 @@ use crate::{
 };
 
 /// How the arrays are reached.
-enum Arrays {
+enum Arrays<T: Of> {
     /// A few numbers are copied in and out, which takes a third of the time of borrowing the arrays for writing.
-    Few { buffers: (PyBuffer<f64>, PyBuffer<f64>), copies: (Vec<f64>, Vec<f64>) },
+    Few { buffers: (PyBuffer<T>, PyBuffer<T>), copies: (Vec<T>, Vec<T>) },
     /// Many are stepped where they are.
-    Many { v: Py<PyArrayDyn<f64>>, y: Py<PyArrayDyn<f64>> },
+    Many { v: Py<PyArrayDyn<T>>, y: Py<PyArrayDyn<T>> },
 }
 
-impl Arrays {
+impl<T: Of> Arrays<T> {
     /// Does something with them.
-    fn with<R>(&mut self, py: Python<'_>, act: impl FnOnce(&mut [f64], &mut [f64]) -> PyResult<R>) -> PyResult<R> {
+    fn with<R>(&mut self, py: Python<'_>, act: impl FnOnce(&mut [T], &mut [T]) -> PyResult<R>) -> PyResult<R> {
         match self {
             Arrays::Few { buffers, copies: (v, y) } => {
                 buffers.0.copy_to_slice(py, v)?;
@@ -46,24 +51,24 @@ impl Arrays {
 }
 
 /// The array of the force, which the caller changes.
-enum ForceArray {
+enum ForceArray<T: Of> {
     /// A few numbers are copied.
-    Few { buffer: PyBuffer<f64>, copy: Vec<f64> },
+    Few { buffer: PyBuffer<T>, copy: Vec<T> },
     /// Many are read where they are.
-    Many(Py<PyArray1<f64>>),
+    Many(Py<PyArray1<T>>),
 }
 
-impl ForceArray {
-    fn new(py: Python<'_>, array: Py<PyArray1<f64>>) -> PyResult<ForceArray> {
+impl<T: Of> ForceArray<T> {
+    fn new(py: Python<'_>, array: Py<PyArray1<T>>) -> PyResult<ForceArray<T>> {
         let numbers = array.bind(py).len()?;
         if numbers > COPIED_NUMBERS {
             return Ok(ForceArray::Many(array));
         }
-        Ok(ForceArray::Few { buffer: PyBuffer::get(array.bind(py))?, copy: vec![0.0; numbers] })
+        Ok(ForceArray::Few { buffer: PyBuffer::get(array.bind(py))?, copy: vec![T::default(); numbers] })
     }
 
     /// Gives the world what is in the array now.
-    fn read(&mut self, py: Python<'_>, world: &mut world::World) -> PyResult<()> {
+    fn read(&mut self, py: Python<'_>, world: &mut world::World<T>) -> PyResult<()> {
         match self {
             ForceArray::Few { buffer, copy } => {
                 buffer.copy_to_slice(py, copy)?;
@@ -80,22 +85,60 @@ const COPIED_NUMBERS: usize = 256;
 /// Steps above this are no longer exact as floating-point numbers.
 const LAST_STEP: i64 = 1 << 53;
 
+/// Numbers of which the arrays of a world are made.
+trait Of: Steppable + Element + PyElement {}
+impl<T: Steppable + Element + PyElement> Of for T {}
+
+/// A loop over arrays of float64 or of float32.
+enum Loops {
+    Double(Loop<f64>),
+    Single(Loop<f32>),
+}
+
 /// A prepared loop. It holds both arrays.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct World {
-    loop_: Mutex<Loop>,
+    loop_: Mutex<Loops>,
     clock: Clock,
     /// The step number, for other threads to read while it is being stepped.
     step: AtomicI64,
 }
 
-struct Loop {
-    world: world::World,
-    arrays: Arrays,
-    force: Option<ForceArray>,
+struct Loop<T: Of> {
+    world: world::World<T>,
+    arrays: Arrays<T>,
+    force: Option<ForceArray<T>>,
 }
 
-impl Loop {
+impl<T: Of> Loop<T> {
+    /// Over these arrays.
+    fn new(
+        py: Python<'_>,
+        mut world: world::World<T>,
+        v: Py<PyArrayDyn<T>>,
+        y: Py<PyArrayDyn<T>>,
+        carry: Option<PyReadonlyArray1<T>>,
+        force: Option<Py<PyArray1<T>>>,
+    ) -> PyResult<Loop<T>> {
+        let sizes = world.sizes();
+        let (mut v_now, mut y_now) = (v.bind(py).try_readwrite().map_err(in_use)?, y.bind(py).try_readwrite().map_err(in_use)?);
+        let (v_now, y_now) = (v_now.as_slice_mut()?, y_now.as_slice_mut()?);
+        if (v_now.len(), y_now.len()) != sizes {
+            return Err(argument_error("v and y must be of the system's shape".to_owned()));
+        }
+        if let Some(carry) = carry {
+            world.carry_on(carry.as_slice()?, v_now, y_now);
+        }
+        let force = force.map(|array| ForceArray::new(py, array)).transpose()?;
+        let arrays = if sizes.0.max(sizes.1) <= COPIED_NUMBERS {
+            let buffers = (PyBuffer::get(v.bind(py))?, PyBuffer::get(y.bind(py))?);
+            Arrays::Few { buffers, copies: (vec![T::default(); sizes.0], vec![T::default(); sizes.1]) }
+        } else {
+            Arrays::Many { v, y }
+        };
+        Ok(Loop { world, arrays, force })
+    }
+
     /// `n` steps; long calls let other threads run and check for Ctrl-C.
     fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64) -> PyResult<()> {
         let Loop { world, arrays, force } = self;
@@ -139,35 +182,31 @@ impl World {
         py: Python<'_>,
         model: &ModelSpec,
         plan: WorldPlan,
-        v: Py<PyArrayDyn<f64>>,
-        y: Py<PyArrayDyn<f64>>,
-        carry: Option<PyReadonlyArray1<f64>>,
-        force: Option<Py<PyArray1<f64>>>,
+        v: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        carry: Option<&Bound<'_, PyAny>>,
+        force: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let WorldPlan { t0, dt, choice, first, members } = plan;
         let (clock, machine) =
             (Clock { t0, h: dt }, Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 });
         let rows = model.rows(py)?;
         let tables = model.tables(py)?;
+        let precision = model.precision;
         let model = model.model(model.started(choice), &rows, &tables)?;
-        let mut world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
-        let sizes = world.sizes();
-        let (mut v_now, mut y_now) = (v.bind(py).try_readwrite().map_err(in_use)?, y.bind(py).try_readwrite().map_err(in_use)?);
-        let (v_now, y_now) = (v_now.as_slice_mut()?, y_now.as_slice_mut()?);
-        if (v_now.len(), y_now.len()) != sizes {
-            return Err(argument_error("v and y must be of the system's shape".to_owned()));
+        macro_rules! over {
+            ($kind:ident) => {{
+                let world = world::World::new(&model, clock, machine, members, first).map_err(core_error)?;
+                let carry = carry.map(|carry| carry.extract()).transpose()?;
+                let force = force.map(|force| force.extract()).transpose()?;
+                Loops::$kind(Loop::new(py, world, v.extract()?, y.extract()?, carry, force)?)
+            }};
         }
-        if let Some(carry) = carry {
-            world.carry_on(carry.as_slice()?, v_now, y_now);
-        }
-        let force = force.map(|array| ForceArray::new(py, array)).transpose()?;
-        let arrays = if sizes.0.max(sizes.1) <= COPIED_NUMBERS {
-            let buffers = (PyBuffer::get(v.bind(py))?, PyBuffer::get(y.bind(py))?);
-            Arrays::Few { buffers, copies: (vec![0.0; sizes.0], vec![0.0; sizes.1]) }
-        } else {
-            Arrays::Many { v, y }
+        let made = match precision {
+            Precision::Double => over!(Double),
+            Precision::Single => over!(Single),
         };
-        Ok(World { loop_: Mutex::new(Loop { world, arrays, force }), clock, step: AtomicI64::new(first) })
+        Ok(World { loop_: Mutex::new(made), clock, step: AtomicI64::new(first) })
     }
 
     /// `n` steps, in place.
@@ -185,13 +224,22 @@ impl World {
                 py.import("stepwell._checks")?.getattr("count")?.call1(("n", n, 0, most))?.extract()?
             }
         };
-        self.alone(|of| of.advance(py, n, &self.step))
+        self.alone(|of| match of {
+            Loops::Double(of) => of.advance(py, n, &self.step),
+            Loops::Single(of) => of.advance(py, n, &self.step),
+        })
     }
 
     /// The carry, by rows; None if the next step begins with v itself.
-    fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        let carry = self.alone(|Loop { world, arrays, .. }| arrays.with(py, |v, y| Ok(world.carry(v, y))))?;
-        Ok(carry.map(|carry| carry.into_pyarray(py)))
+    fn carry<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        fn of<'py, T: Of>(py: Python<'py>, Loop { world, arrays, .. }: &mut Loop<T>) -> PyResult<Option<Bound<'py, PyAny>>> {
+            let carry = arrays.with(py, |v, y| Ok(world.carry(v, y)))?;
+            Ok(carry.map(|carry| carry.into_pyarray(py).into_any()))
+        }
+        self.alone(|loops| match loops {
+            Loops::Double(own) => of(py, own),
+            Loops::Single(own) => of(py, own),
+        })
     }
 
     /// The time at which the world stands.
@@ -209,7 +257,7 @@ impl World {
 
 impl World {
     /// Does something unless another thread is stepping the world. Waiting could deadlock: that thread may be waiting for the GIL.
-    fn alone<R>(&self, act: impl FnOnce(&mut Loop) -> PyResult<R>) -> PyResult<R> {
+    fn alone<R>(&self, act: impl FnOnce(&mut Loops) -> PyResult<R>) -> PyResult<R> {
         match self.loop_.try_lock() {
             Ok(mut of) => act(&mut of),
             Err(TryLockError::WouldBlock) => {

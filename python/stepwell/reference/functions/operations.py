@@ -86,7 +86,7 @@ def elementary(f: F) -> F:
         if one_by_one(given):
             return np.frompyfunc(of_anything, len(given), 1)(*given)
         if (symbol := symbol_of(given)) is not None:
-            value = f(*(lifted(symbol, *pair) for pair in zip(names, given, strict=True)))
+            value = _of_symbols(symbol, f)(*(lifted(symbol, *pair) for pair in zip(names, given, strict=True)))
             return (
                 value if f.__name__ in UNMARKED else mark(NAMES.get(f.__name__, f.__name__), value, *given, function=of_anything)
             )
@@ -95,6 +95,15 @@ def elementary(f: F) -> F:
             return f(*(np.atleast_1d(each) for each in arrays)).reshape(shape)[()]
 
     return of_anything  # type: ignore[return-value]
+
+
+def _of_symbols(symbol: Any, f: Callable[..., Any]) -> Callable[..., Any]:
+    """The function for symbols of the precision of this one."""
+    if not getattr(symbol, "single", False):
+        return f
+    from .single import version  # it is made of the operations below
+
+    return version(f.__name__, f)
 
 
 def _bits(x: Any) -> Any:

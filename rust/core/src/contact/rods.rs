@@ -5,7 +5,7 @@
 use super::{
     joined::{Column, Joined, add},
     meet::{Change, Rest, Step, bounce},
-    surface::{Place, ROUNDING, Surface, dot, magnitude},
+    surface::{Place, Surface, dot, magnitude, rounding},
 };
 use crate::{
     elimination::Factors,
@@ -127,7 +127,7 @@ impl<N: Number> RodContacts<N> {
         let mut place = surface.place(y0, y1);
         let size = y1.iter().map(|y| magnitude(*y)).reduce(|sum, next| sum + next).unwrap_or(N::of(0.0));
         let at_it = self.links.ends.iter().zip(&self.links.lengths).filter(|(ends, _)| ends.contains(&i));
-        place.slack += N::of(ROUNDING) * at_it.fold(size, |size, (_, length)| size + *length);
+        place.slack += rounding::<N>() * at_it.fold(size, |size, (_, length)| size + *length);
         place.near = place.near | place.distance.at_most(place.slack);
         place
     }

@@ -7,7 +7,15 @@ use crate::{
 };
 
 /// A distance is known to within so many times the numbers that it is computed from: eight roundings.
-pub const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
+const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// The same for numbers of 32 bits.
+const SINGLE_ROUNDING: f64 = 1.0 / (1u64 << 21) as f64;
+
+/// That of these numbers.
+pub fn rounding<N: Number>() -> N {
+    N::of(if N::is_single() { SINGLE_ROUNDING } else { ROUNDING })
+}
 
 /// What happens to a point that met a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +146,7 @@ impl<N: Number> Surface<N> {
             Form::Plane { normal, offset } => {
                 let distance = dot(y, normal) - *offset;
                 let sizes = y.iter().zip(normal).map(|(y, n)| magnitude(*y * *n)).reduce(|sum, next| sum + next);
-                let slack = N::of(ROUNDING) * (sizes.unwrap_or(N::of(0.0)) + magnitude(*offset));
+                let slack = rounding::<N>() * (sizes.unwrap_or(N::of(0.0)) + magnitude(*offset));
                 let before = dot(y0, normal) - *offset;
                 Place { near: distance.at_most(slack), normal: normal.clone(), distance, before, slack }
             }
@@ -148,7 +156,7 @@ impl<N: Number> Surface<N> {
                 let (a, b, square) = (dot(&along, &along), dot(&from0, &along), dot(&from0, &from0));
                 let c = square - *radius * *radius;
                 let sizes = centre.iter().map(|c| magnitude(*c)).reduce(|sum, next| sum + next);
-                let slack = N::of(ROUNDING) * (*radius + sizes.unwrap_or(zero));
+                let slack = rounding::<N>() * (*radius + sizes.unwrap_or(zero));
                 let disc = b * b - a * c;
                 let root = N::choose(zero.below(disc), disc, zero).sqrt();
                 let (part, hits) = if *is_inside {

@@ -6,6 +6,7 @@
 use super::shape::Shape;
 use crate::{
     isa::Level,
+    real::Precision,
     tape::{Op, split::Body},
 };
 
@@ -18,21 +19,27 @@ const MAX_ROW_BYTES: usize = 12 << 10;
 
 /// The shape for a run of so many members; none if the level has no machine code.
 pub fn choose(body: &Body, level: Level, members: usize) -> Option<Shape> {
-    (level > Level::Baseline).then(|| fastest(body, level, members))
+    is_written(body, level).then(|| fastest(body, level, members))
+}
+
+/// Whether there is machine code of this precision. That of NEON is for numbers of 64 bits only.
+fn is_written(body: &Body, level: Level) -> bool {
+    level > Level::Baseline && (level, body.precision) != (Level::Neon, Precision::Single)
 }
 
 /// The shape for rows of so many numbers, each a number of a long block; none if they are not whole vectors.
-pub fn choose_long(_body: &Body, level: Level, lanes: usize) -> Option<Shape> {
+pub fn choose_long(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
+    let bytes = body.precision.bytes();
     let width = match level {
         _ if lanes == 1 => 1,
-        Level::Avx512 => 8,
-        Level::Neon => 2,
-        _ => 4,
+        Level::Avx512 => 64 / bytes,
+        Level::Neon => 16 / bytes,
+        _ => 32 / bytes,
     };
-    let fits = level > Level::Baseline && lanes.is_multiple_of(width);
+    let fits = is_written(body, level) && lanes.is_multiple_of(width);
     let vectors = lanes / width;
     let block_vectors = [4, 2, 1].into_iter().find(|n| vectors.is_multiple_of(*n))?;
-    fits.then_some(Shape { level, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })
+    fits.then_some(Shape { level, bytes, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })
 }
 
 /// The shape for several steps of this body in one call, over rows of a given number of lanes; None as above. As many vectors are
@@ -45,11 +52,12 @@ pub fn choose_trail(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
 }
 
 fn fastest(body: &Body, level: Level, members: usize) -> Shape {
+    let bytes = body.precision.bytes();
     let width = match (level, members) {
         (_, 0..=1) => 1,
-        (Level::Avx512, 5..) => 8,
-        (Level::Neon, _) => 2,
-        _ => 4,
+        (Level::Avx512, _) if members * bytes > 32 => 64 / bytes,
+        (Level::Neon, _) => 16 / bytes,
+        _ => 32 / bytes,
     };
     let vectors = members.div_ceil(width).max(1);
     let changed = (0..body.next.len()).filter(|s| !body.keeps(*s)).count().max(1);
@@ -62,7 +70,7 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
         let block_vectors = evenly(vectors, (most / changed).clamp(1, 20));
         // Several blocks share what is done once for a tile, which may take longer than a few steps do.
         let blocks = blocks(body, width, block_vectors).min(vectors / block_vectors).max(1);
-        return Shape { level, width, block_vectors, interleaved, blocks, resident: true };
+        return Shape { level, bytes, width, block_vectors, interleaved, blocks, resident: true };
     }
     let most = (MAX_CODE_OPERATIONS / body.work()).max(1);
     let interleaving = interleaving(body, level).min(most);
@@ -70,18 +78,18 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
         // Two vectors in a turn, one after the other: the second begins while the first ends. State that has a register stays there.
         let block_vectors = evenly(vectors, most.min(2));
         let blocks = blocks(body, width, block_vectors).min(vectors.div_ceil(block_vectors));
-        return Shape { level, width, block_vectors, interleaved: 1, blocks, resident: block_vectors > 1 };
+        return Shape { level, bytes, width, block_vectors, interleaved: 1, blocks, resident: block_vectors > 1 };
     }
     let block_vectors = evenly(vectors, interleaving);
     let blocks = blocks(body, width, block_vectors).min(vectors.div_ceil(block_vectors));
     // Out-of-order execution overlaps short steps by itself.
     let interleaved = if body.work() < SHORT_STEP_OPERATIONS { block_vectors.min(3) } else { block_vectors };
-    Shape { level, width, block_vectors, interleaved, blocks, resident: false }
+    Shape { level, bytes, width, block_vectors, interleaved, blocks, resident: false }
 }
 
 /// How many blocks a tile may have so that its rows stay in the cache.
 fn blocks(body: &Body, width: usize, block_vectors: usize) -> usize {
-    let row = 8 * width * block_vectors * (body.next.len() + body.rows);
+    let row = body.precision.bytes() * width * block_vectors * (body.next.len() + body.rows);
     (MAX_ROW_BYTES / row).clamp(1, 4)
 }
 

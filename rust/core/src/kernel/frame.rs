@@ -5,12 +5,12 @@ use crate::tape::split::Body;
 /// What a kernel is called with: the start of each thing it may touch. The layout is known to the writers.
 #[repr(C)]
 pub(super) struct Arguments {
-    pub state: *mut f64,
-    pub rows: *const f64,
-    pub pool: *const f64,
+    pub state: *mut u8,
+    pub rows: *const u8,
+    pub pool: *const u8,
     pub per_step: *const u64,
-    pub held: *const f64,
-    pub scratch: *mut f64,
+    pub held: *const u8,
+    pub scratch: *mut u8,
     pub steps: u64,
     /// How the caller rounds, and how numbers are rounded here: to nearest, subnormal numbers as they are, no traps.
     pub rounding: [u32; 2],

@@ -8,7 +8,8 @@ use std::cell::Cell;
 use super::{Kernel, Tile, check};
 use crate::{
     isa::{Level, Task, with_isa},
-    tape::{Id, Op, eval, split::Body},
+    real::Real,
+    tape::{Id, Op, split::Body},
 };
 
 /// A body with a place in the scratch for each value.
@@ -115,36 +116,36 @@ fn is_made(op: Op) -> bool {
     !matches!(op, Op::State(_) | Op::Row(_) | Op::Uniform(_) | Op::Const(_))
 }
 
-impl Kernel for Interpreter {
+impl<T: Real> Kernel<T> for Interpreter {
     fn lanes(&self) -> usize {
         self.lanes
     }
 
-    fn pool(&self, uniforms: &[f64]) -> Vec<f64> {
+    fn pool(&self, uniforms: &[T]) -> Vec<T> {
         uniforms.to_vec()
     }
 
-    fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
+    fn run(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         check(&self.body, self.lanes, tile);
         assert!(tile.pool.len() >= self.body.uniforms, "pool");
-        // From the start of a line of the cache on, so that no vector lies across two: at most 7 numbers are before it.
-        let enough = self.rows * self.lanes + 7;
+        // From the start of a line of the cache on, so that no vector lies across two: fewer numbers than a line has are before it.
+        let enough = self.rows * self.lanes + 64 / size_of::<T>() - 1;
         if scratch.len() < enough {
-            scratch.resize(enough, 0.0);
+            scratch.resize(enough, T::default());
         }
-        let start = (scratch.as_ptr() as usize).wrapping_neg() % 64 / size_of::<f64>();
+        let start = (scratch.as_ptr() as usize).wrapping_neg() % 64 / size_of::<T>();
         let scratch = &mut scratch[start..];
         with_isa!(self.level, |isa| isa.run(Run { of: self, tile, scratch }));
     }
 }
 
-struct Run<'a, 'b> {
+struct Run<'a, 'b, T> {
     of: &'a Interpreter,
-    tile: &'a mut Tile<'b>,
-    scratch: &'a mut [f64],
+    tile: &'a mut Tile<'b, T>,
+    scratch: &'a mut [T],
 }
 
-impl Task for Run<'_, '_> {
+impl<T: Real> Task for Run<'_, '_, T> {
     #[inline(always)]
     fn run(self) {
         let Run { of, tile, scratch } = self;
@@ -155,7 +156,7 @@ impl Task for Run<'_, '_> {
             match *op {
                 Op::Row(i) => to.copy_from_slice(&tile.rows[i as usize * lanes..][..lanes]),
                 Op::Uniform(i) => to.fill(tile.pool[i as usize]),
-                Op::Const(bits) => to.fill(f64::from_bits(bits)),
+                Op::Const(bits) => to.fill(T::from_pattern(bits)),
                 _ => {}
             }
         }
@@ -163,7 +164,7 @@ impl Task for Run<'_, '_> {
             let entries = &tile.per_step[(step * of.body.per_step).min(tile.per_step.len())..];
             for Step { op, to, of } in &of.steps {
                 match *op {
-                    Op::PerStep(i) => scratch[*to..*to + lanes].fill(f64::from_bits(entries[i as usize])),
+                    Op::PerStep(i) => scratch[*to..*to + lanes].fill(T::from_pattern(entries[i as usize])),
                     Op::Held(i) => {
                         let from = entries[i as usize] as usize;
                         scratch[*to..*to + lanes].copy_from_slice(&tile.held[from..from + lanes]);
@@ -171,8 +172,8 @@ impl Task for Run<'_, '_> {
                     Op::Gather(_) => {
                         for l in 0..lanes {
                             // An index out of range comes from a NaN; its result is discarded.
-                            let place = scratch[of[0] + l] as usize + l;
-                            scratch[*to + l] = tile.held.get(place).copied().unwrap_or(f64::NAN);
+                            let place = scratch[of[0] + l].wide() as usize + l;
+                            scratch[*to + l] = tile.held.get(place).copied().unwrap_or(T::NAN);
                         }
                     }
                     op => apply(op, scratch, *to, *of, lanes),
@@ -191,23 +192,22 @@ const TOGETHER: usize = 8;
 
 /// An operation over rows of the scratch. Each kind has a loop of its own, which is vector code.
 #[inline(always)]
-fn apply(op: Op, scratch: &mut [f64], to: usize, [a, b, c]: [usize; 3], lanes: usize) {
+fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], lanes: usize) {
     // Cells, because the place of an operand may be that of the result.
     let cells = Cell::from_mut(scratch).as_slice_of_cells();
     let row = |at: usize| cells[at..at + lanes].as_chunks::<TOGETHER>();
     let ((to, to_end), (a, a_end), (b, b_end), (c, c_end)) = (row(to), row(a), row(b), row(c));
-    let bits = |x: &Cell<f64>| x.get().to_bits();
     macro_rules! each {
         ($($kind:pat => $same:expr),* $(,)?) => {
             match op {
                 $($kind => {
                     for (((to, a), b), c) in to.iter().zip(a).zip(b).zip(c) {
-                        let made: [u64; TOGETHER] =
-                            std::array::from_fn(|l| eval::apply($same, bits(&a[l]), bits(&b[l]), bits(&c[l])));
-                        to.iter().zip(made).for_each(|(to, made)| to.set(f64::from_bits(made)));
+                        let made: [T; TOGETHER] =
+                            std::array::from_fn(|l| T::apply($same, a[l].get(), b[l].get(), c[l].get()));
+                        to.iter().zip(made).for_each(|(to, made)| to.set(made));
                     }
                     for (((to, a), b), c) in to_end.iter().zip(a_end).zip(b_end).zip(c_end) {
-                        to.set(f64::from_bits(eval::apply($same, bits(a), bits(b), bits(c))));
+                        to.set(T::apply($same, a.get(), b.get(), c.get()));
                     }
                 })*
                 // Not a wild card: the compiler asks for a line for each new operation.

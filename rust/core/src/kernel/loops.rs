@@ -254,7 +254,7 @@ impl<'a, M: Machine> Writer<'a, M> {
 
     /// To the rows of a block so many further on.
     fn move_on(&mut self, blocks: i32) {
-        let bytes = (self.shape.width * self.shape.block_vectors * 8) as i32 * blocks;
+        let bytes = (self.shape.width * self.shape.block_vectors * self.shape.bytes) as i32 * blocks;
         if self.shape.blocks > 1 {
             let sources = &self.plan.sources;
             let reads = |kind: fn(&Source) -> bool| sources.iter().any(kind);

@@ -29,7 +29,7 @@ pub mod writer {
     };
 }
 
-use crate::tape::split::Body;
+use crate::{real::Real, tape::split::Body};
 
 /// How machine code goes through a tile, whatever the CPU: see the writer's `Shape`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,36 +48,36 @@ pub struct Layout {
 
 /// The data of a kernel. Rows are `lanes` numbers long, one for each member, and follow each other.
 #[derive(Debug)]
-pub struct Tile<'a> {
+pub struct Tile<'a, T = f64> {
     /// A row for each number of the state, changed in place.
-    pub state: &'a mut [f64],
+    pub state: &'a mut [T],
     /// A row for each number of the members that stays.
-    pub rows: &'a [f64],
+    pub rows: &'a [T],
     /// Numbers that are the same for all: what [`Kernel::pool`] made of them.
-    pub pool: &'a [f64],
+    pub pool: &'a [T],
     /// How many steps to make.
     pub steps: usize,
     /// So many entries for each step as the body says: the bits of a number, or, for what is held, the place of the first number of a
     /// row in `held`.
     pub per_step: &'a [u64],
     /// Rows of sampled inputs.
-    pub held: &'a [f64],
+    pub held: &'a [T],
 }
 
 /// Steps of a tile.
-pub trait Kernel: Send + Sync {
+pub trait Kernel<T: Real = f64>: Send + Sync {
     /// How long rows are.
     fn lanes(&self) -> usize;
 
     /// The numbers that are the same for all, as this kernel wants them.
-    fn pool(&self, uniforms: &[f64]) -> Vec<f64>;
+    fn pool(&self, uniforms: &[T]) -> Vec<T>;
 
     /// Makes the steps. `scratch` is the kernel's to use and grows as needed.
     ///
     /// # Panics
     ///
     /// If the tile's slices are shorter than its body says.
-    fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>);
+    fn run(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>);
 
     /// How long its machine code is, in bytes; zero if it is interpreted.
     fn bytes(&self) -> usize {
@@ -97,7 +97,8 @@ pub trait Kernel: Send + Sync {
 
 /// Panics unless a tile has the rows that a body reads. Machine code relies on it.
 #[inline]
-pub fn check(body: &Body, lanes: usize, tile: &Tile) {
+pub fn check<T: Real>(body: &Body, lanes: usize, tile: &Tile<T>) {
+    assert!(body.precision == T::PRECISION, "precision");
     assert!(tile.state.len() >= body.next.len() * lanes, "state");
     assert!(tile.rows.len() >= body.rows * lanes, "rows");
     assert!(tile.per_step.len() >= body.per_step.saturating_mul(tile.steps), "steps");

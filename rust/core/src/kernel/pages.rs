@@ -7,6 +7,7 @@ use super::{
     Tile, check,
     frame::{Arguments, Frame},
 };
+use crate::real::Real;
 
 /// The rounding that Rust and C start with.
 const TO_NEAREST: u32 = 0x1F80;
@@ -81,7 +82,7 @@ impl Pages {
     ///
     /// If the tile is smaller than its frame says.
     #[allow(unsafe_code, reason = "calls what was written at run time")]
-    pub fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
+    pub fn run<T: Real>(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         let frame = &self.frame;
         check(&frame.body, frame.lanes, tile);
         assert!(tile.pool.len() >= frame.pool, "pool");
@@ -89,21 +90,21 @@ impl Pages {
             return;
         }
         let copied = if frame.aligned_pool && !(tile.pool.as_ptr() as usize).is_multiple_of(32) { frame.pool } else { 0 };
-        // The vector's start is a multiple of 8 bytes, so that at most 7 numbers are before the next multiple of 64.
-        let enough = frame.scratch + copied + 7;
+        // The vector's start is a multiple of a number's size, so that fewer numbers than 64 bytes have are before the next multiple of 64.
+        let enough = frame.scratch + copied + 64 / size_of::<T>() - 1;
         if scratch.len() < enough {
-            scratch.resize(enough, 0.0);
+            scratch.resize(enough, T::default());
         }
-        let start = (scratch.as_ptr() as usize).wrapping_neg() % 64 / 8;
+        let start = (scratch.as_ptr() as usize).wrapping_neg() % 64 / size_of::<T>();
         let (own, pool) = scratch[start..].split_at_mut(frame.scratch);
         pool[..copied].copy_from_slice(&tile.pool[..copied]);
         let mut arguments = Arguments {
-            state: tile.state.as_mut_ptr(),
-            rows: tile.rows.as_ptr(),
-            pool: if copied > 0 { pool.as_ptr() } else { tile.pool.as_ptr() },
+            state: tile.state.as_mut_ptr().cast(),
+            rows: tile.rows.as_ptr().cast(),
+            pool: if copied > 0 { pool.as_ptr().cast() } else { tile.pool.as_ptr().cast() },
             per_step: tile.per_step.as_ptr(),
-            held: tile.held.as_ptr(),
-            scratch: own.as_mut_ptr(),
+            held: tile.held.as_ptr().cast(),
+            scratch: own.as_mut_ptr().cast(),
             steps: tile.steps as u64,
             rounding: [0, TO_NEAREST],
         };

@@ -175,7 +175,7 @@ impl<D: Copy> Plan<D> {
 }
 
 fn is_two(body: &Body, id: Id) -> bool {
-    body.ops[id as usize] == Op::Const(2f64.to_bits())
+    body.ops[id as usize] == Op::Const(body.precision.bits_of(2.0))
 }
 
 /// Whether there are more products than sums. Some CPUs have units for sums beside those for products; 2·x is x + x in every bit.
@@ -194,7 +194,7 @@ pub fn is_sound(body: &Body) -> bool {
             Op::Row(i) => (i as usize) < body.rows,
             Op::Uniform(i) => (i as usize) < body.uniforms,
             Op::PerStep(i) | Op::Held(i) => (i as usize) < body.per_step,
-            Op::ShiftUp(_, places) | Op::ShiftDown(_, places) => places < 64,
+            Op::ShiftUp(_, places) | Op::ShiftDown(_, places) => (places as usize) < 8 * body.precision.bytes(),
             Op::Param(_) | Op::Step | Op::Time | Op::Sample(..) | Op::Gather(_) => false,
             _ => true,
         };
@@ -215,7 +215,8 @@ pub fn masks(body: &Body) -> Vec<bool> {
     for op in &body.ops {
         let is = |id: Id| masks[id as usize];
         let mask = match *op {
-            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) | Op::Const(0 | u64::MAX) => true,
+            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) | Op::Const(0) => true,
+            Op::Const(bits) => bits == body.precision.all_bits(),
             Op::And(a, b) | Op::Or(a, b) | Op::Xor(a, b) => is(a) && is(b),
             Op::Copy(a) => is(a),
             _ => false,

@@ -10,7 +10,7 @@ use super::{
     interpret::Interpreter,
     writer::{self, Shape},
 };
-use crate::{isa::Level, tape::split::Body};
+use crate::{isa::Level, real::Real, tape::split::Body};
 
 /// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an operation
 /// takes about as long.
@@ -34,7 +34,7 @@ fn interpreted_lanes(body: &Body, members: usize) -> usize {
         return members.max(1);
     }
     let [fewest, most] = INTERPRETED_LANES;
-    let row = INTERPRETED_BYTES / size_of::<f64>() / Interpreter::new(body, 1, Level::Baseline).rows().max(1);
+    let row = INTERPRETED_BYTES / body.precision.bytes() / Interpreter::new(body, 1, Level::Baseline).rows().max(1);
     let turns = members.div_ceil(row.clamp(fewest, most));
     members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
 }
@@ -51,35 +51,35 @@ pub enum By {
 }
 
 /// A body, over tiles of one length.
-pub struct Runner {
+pub struct Runner<T: Real = f64> {
     body: Body,
     lanes: usize,
     interpreter: Interpreter,
     /// The shape of its machine code; none where there is no machine code.
     shape: Option<Shape>,
-    written: OnceLock<Option<Box<dyn Kernel>>>,
-    packed: OnceLock<Option<Box<dyn Kernel>>>,
+    written: OnceLock<Option<Box<dyn Kernel<T>>>>,
+    packed: OnceLock<Option<Box<dyn Kernel<T>>>>,
     /// The work interpreted so far, as [`INTERPRETATIONS_PER_WRITE`] counts it.
     done: AtomicU64,
     /// The steps made by machine code before packing was tried.
     steps: AtomicU64,
 }
 
-impl Runner {
+impl<T: Real> Runner<T> {
     /// For a run of so many members.
-    pub fn new(body: &Body, level: Level, members: usize) -> Runner {
+    pub fn new(body: &Body, level: Level, members: usize) -> Runner<T> {
         let shape = writer::choose(body, level, members);
         let lanes = shape.as_ref().map_or_else(|| interpreted_lanes(body, members), Shape::lanes);
         Runner::shaped(body, level, lanes, shape)
     }
 
     /// For rows of so many lanes, each a number of a long block.
-    pub fn long(body: &Body, level: Level, lanes: usize) -> Runner {
+    pub fn long(body: &Body, level: Level, lanes: usize) -> Runner<T> {
         Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
     /// With a shape that was chosen before; interpreted if there is none.
-    pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner {
+    pub fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner<T> {
         let interpreter = Interpreter::new(body, lanes, level.of_loops());
         let packed = OnceLock::new();
         if !shape.is_some_and(|shape: Shape| shape.packs()) {
@@ -118,7 +118,7 @@ impl Runner {
     }
 
     /// What makes so many more steps.
-    pub fn kernel(&self, steps: usize) -> (&dyn Kernel, By) {
+    pub fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, By) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {
             let packed = match self.packed.get() {
@@ -137,23 +137,23 @@ impl Runner {
     }
 
     /// The fastest machine code, written now if it was not before; none where none can be.
-    pub fn write(&self) -> Option<&dyn Kernel> {
+    pub fn write(&self) -> Option<&dyn Kernel<T>> {
         let written = self.write_lanes()?;
         Some(self.pack().unwrap_or(written))
     }
 
-    fn write_lanes(&self) -> Option<&dyn Kernel> {
+    fn write_lanes(&self) -> Option<&dyn Kernel<T>> {
         let write = || {
             let written = writer::write(&self.body, self.shape?)?;
-            Some(Box::new(written) as Box<dyn Kernel>)
+            Some(Box::new(written) as Box<dyn Kernel<T>>)
         };
         self.written.get_or_init(write).as_deref()
     }
 
-    fn pack(&self) -> Option<&dyn Kernel> {
+    fn pack(&self) -> Option<&dyn Kernel<T>> {
         let write = || {
             let written = writer::write_if_it_gains(&self.body, self.shape?)?;
-            Some(Box::new(written) as Box<dyn Kernel>)
+            Some(Box::new(written) as Box<dyn Kernel<T>>)
         };
         self.packed.get_or_init(write).as_deref()
     }

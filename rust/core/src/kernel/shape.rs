@@ -8,7 +8,9 @@ use crate::{isa::Level, tape::split::Body};
 pub struct Shape {
     /// The instructions: of AVX2, AVX-512 or NEON.
     pub level: Level,
-    /// Numbers in a vector: 1, or 2 (NEON), 4 (AVX2, AVX-512), 8 (AVX-512).
+    /// The size of a number in bytes: 8 or 4.
+    pub bytes: usize,
+    /// Numbers in a vector: 1, or 16 (NEON), 32 (AVX2, AVX-512) or 64 bytes of them (AVX-512).
     pub width: usize,
     /// Vectors of a block: those that one turn of the loop steps.
     pub block_vectors: usize,
@@ -33,9 +35,10 @@ impl Shape {
         Layout { width, block_vectors, blocks, resident, registers: self.registers() }
     }
 
-    /// Whether the numbers of one member may be lanes of vectors: there is one member, and the CPU has a writer for it.
+    /// Whether the numbers of one member may be lanes of vectors: there is one member, numbers have 64 bits, and the CPU has a writer for
+    /// it.
     pub fn packs(&self) -> bool {
-        self.lanes() == 1 && self.resident && matches!(self.level, Level::Avx2 | Level::Avx512)
+        self.lanes() == 1 && self.bytes == 8 && self.resident && matches!(self.level, Level::Avx2 | Level::Avx512)
     }
 
     /// How many vector registers there are.
@@ -47,7 +50,7 @@ impl Shape {
     pub(super) fn pool_copies(&self) -> usize {
         match (self.level, self.width) {
             (Level::Avx512, _) => 1,
-            (Level::Avx2, 1) => 2,
+            (Level::Avx2, 1) => 16 / self.bytes,
             (_, width) => width,
         }
     }
@@ -56,14 +59,17 @@ impl Shape {
     pub(super) fn is_possible(&self, body: &Body, most_operations: usize) -> bool {
         let is_known = match self.level {
             Level::Baseline => false,
-            Level::Neon => matches!(self.width, 1 | 2),
-            Level::Avx2 => matches!(self.width, 1 | 4),
-            Level::Avx512 => matches!(self.width, 1 | 4 | 8),
+            // There are no instructions on single numbers of 32 bits for all operations.
+            Level::Neon if self.bytes == 4 => false,
+            Level::Neon => self.width == 1 || self.width * self.bytes == 16,
+            Level::Avx2 => self.width == 1 || self.width * self.bytes == 32,
+            Level::Avx512 => self.width == 1 || matches!(self.width * self.bytes, 32 | 64),
         };
         let bytes = |sizes: &[usize]| sizes.iter().try_fold(8usize, |a, b| a.checked_mul(*b)).is_some_and(|n| n < 1 << 31);
         let lanes = [self.width, self.block_vectors, self.blocks];
         let rows = body.next.len().max(body.rows).max(1);
         is_known
+            && self.bytes == body.precision.bytes()
             && self.block_vectors > 0
             && self.interleaved > 0
             && self.blocks > 0

@@ -65,7 +65,7 @@ impl<M: Machine> Writer<'_, M> {
     }
 
     fn bytes(&self) -> i32 {
-        8 * self.shape.width as i32
+        (self.shape.bytes * self.shape.width) as i32
     }
 
     /// Writes code for vectors as long as a value is.
@@ -82,7 +82,7 @@ impl<M: Machine> Writer<'_, M> {
 
     fn in_row(&self, base: Base, row: u32, value: Value) -> Place {
         let vector = value as usize % self.shape.block_vectors;
-        Place::new(base, (row as usize * self.shape.lanes() * 8) as i32 + vector as i32 * self.bytes())
+        Place::new(base, (row as usize * self.shape.lanes() * self.shape.bytes) as i32 + vector as i32 * self.bytes())
     }
 
     /// Where a value is in memory.
@@ -101,7 +101,7 @@ impl<M: Machine> Writer<'_, M> {
             (_, Source::Row(i)) => self.in_row(Base::Rows, i, value),
             (_, Source::Pool(i)) => {
                 let copies = self.shape.pool_copies();
-                Place { one: copies == 1, ..Place::new(Base::Pool, (i as usize * copies * 8) as i32) }
+                Place { one: copies == 1, ..Place::new(Base::Pool, (i as usize * copies * self.shape.bytes) as i32) }
             }
             (_, Source::PerStep(i)) => Place { one: true, ..Place::new(Base::PerStep, i as i32 * 8) },
             (_, Source::Held(i)) => Place { held: Some(i), ..self.in_row(Base::Held, 0, value) },

@@ -11,7 +11,7 @@ use super::{
     shape::Shape,
     x86,
 };
-use crate::{isa::Level, tape::split::Body};
+use crate::{isa::Level, real::Real, tape::split::Body};
 
 /// Machine code for a CPU that this machine may not have.
 #[derive(Clone, Debug)]
@@ -26,14 +26,16 @@ pub struct Assembled {
     pub spills: usize,
     /// Where the operations of one member are lanes of vectors: what that gains.
     pub packing: Option<Verdict>,
-    constants: Vec<f64>,
+    /// The bits of each.
+    constants: Vec<u64>,
 }
 
 impl Assembled {
     /// The numbers that are the same for all, as the code wants them.
-    pub fn pool(&self, uniforms: &[f64]) -> Vec<f64> {
-        let numbers = self.constants.iter().chain(&uniforms[..self.frame.body.uniforms]);
-        numbers.flat_map(|x| std::iter::repeat_n(*x, self.shape.pool_copies())).collect()
+    pub fn pool<T: Real>(&self, uniforms: &[T]) -> Vec<T> {
+        let constants = self.constants.iter().map(|bits| T::from_pattern(*bits));
+        let numbers = constants.chain(uniforms[..self.frame.body.uniforms].iter().copied());
+        numbers.flat_map(|x| std::iter::repeat_n(x, self.shape.pool_copies())).collect()
     }
 }
 
@@ -63,12 +65,11 @@ fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape)
     let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));
     let frame = Frame {
         pool: (plan.constants.len() + body.uniforms) * shape.pool_copies(),
-        scratch: ((homes + spills) * slot).next_multiple_of(8),
+        scratch: ((homes + spills) * slot).next_multiple_of(64 / shape.bytes),
         aligned_pool: shape.pool_copies() > 1,
         ..Frame::new(body, shape.lanes())
     };
-    let constants = plan.constants.iter().map(|bits| f64::from_bits(*bits)).collect();
-    Some(Assembled { code, frame, shape, spills, packing: None, constants })
+    Some(Assembled { code, frame, shape, spills, packing: None, constants: plan.constants })
 }
 
 /// A kernel as machine code of this machine.
@@ -99,7 +100,8 @@ pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
 
 /// Writes a kernel for a single member, whose numbers are lanes of these vectors. None as above, or if they are no such vectors.
 pub fn write_packed(body: &Body, level: Level, packed: &Packed) -> Option<Written> {
-    let shape = Shape { level, width: 1, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
+    let shape =
+        Shape { level, bytes: body.precision.bytes(), width: 1, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
     if !level.here() || !shape.packs() || !is_sound(body) || !packed.is_sound(body) {
         return None;
     }
@@ -133,16 +135,16 @@ impl Written {
     }
 }
 
-impl Kernel for Written {
+impl<T: Real> Kernel<T> for Written {
     fn lanes(&self) -> usize {
         self.shape().lanes()
     }
 
-    fn pool(&self, uniforms: &[f64]) -> Vec<f64> {
+    fn pool(&self, uniforms: &[T]) -> Vec<T> {
         self.assembled.pool(uniforms)
     }
 
-    fn run(&self, tile: &mut Tile, scratch: &mut Vec<f64>) {
+    fn run(&self, tile: &mut Tile<T>, scratch: &mut Vec<T>) {
         self.pages.run(tile, scratch);
     }
 

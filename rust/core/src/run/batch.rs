@@ -5,11 +5,16 @@ use std::{sync::Arc, time::Instant};
 use super::{
     Machine, Model,
     columns::{Columns, cut},
-    group::Group,
+    group::{Group, Lanes},
     stage::Clock,
     workers::{self, POLL, Stop, Workers},
 };
-use crate::{error::Error, spec::Row, trace::Traced};
+use crate::{
+    error::Error,
+    real::Real,
+    spec::Row,
+    trace::{Traceable, Traced},
+};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
@@ -45,17 +50,17 @@ impl Plan<'_> {
 
 /// What a run fills: arrays of rows of one number per member.
 #[derive(Debug)]
-pub struct Arrays<'a> {
+pub struct Arrays<'a, T = f64> {
     /// What is kept of v, one block per kept step.
-    pub saved_v: &'a mut [f64],
+    pub saved_v: &'a mut [T],
     /// What is kept of y.
-    pub saved_y: &'a mut [f64],
+    pub saved_y: &'a mut [T],
     /// What is recorded beside each saved state.
-    pub recorded: &'a mut [f64],
+    pub recorded: &'a mut [T],
     /// What the systems added up, and what is watched, rows of one number per member; empty if not asked for.
-    pub tally: &'a mut [f64],
+    pub tally: &'a mut [T],
     /// The v slot at the end; empty if not asked for.
-    pub carry: &'a mut [f64],
+    pub carry: &'a mut [T],
     /// Per member, the number of the first step that is not finite, or −1; members that have one are not checked.
     pub first_bad: &'a mut [i64],
 }
@@ -85,15 +90,54 @@ const RETRACE_INTERVALS: i64 = 16;
 /// Numbers × steps below which a second thread costs more time than it saves.
 const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
 
+/// Numbers that groups step.
+pub trait Steppable: Traceable {
+    /// A group for a run of so many members, and of so many steps of members in all.
+    fn group(
+        model: &Model,
+        traced: &Traced,
+        machine: Machine,
+        members: usize,
+        clock: &Clock,
+        steps: f64,
+    ) -> Result<Box<dyn Group<Self>>, Error>;
+}
+
+impl Steppable for f64 {
+    fn group(
+        model: &Model,
+        traced: &Traced,
+        machine: Machine,
+        members: usize,
+        clock: &Clock,
+        steps: f64,
+    ) -> Result<Box<dyn Group>, Error> {
+        model.group(traced, machine, members, clock, steps)
+    }
+}
+
+impl Steppable for f32 {
+    fn group(
+        model: &Model,
+        traced: &Traced,
+        machine: Machine,
+        members: usize,
+        clock: &Clock,
+        _steps: f64,
+    ) -> Result<Box<dyn Group<f32>>, Error> {
+        Ok(Box::new(Lanes::<f32>::new(traced, &model.spec, machine.level, members, clock)?))
+    }
+}
+
 /// One thread's share of the members, as slices of every row.
-struct Part<'a> {
+struct Part<'a, T> {
     first: usize,
     count: usize,
-    saved_v: Columns<'a, f64>,
-    saved_y: Columns<'a, f64>,
-    recorded: Columns<'a, f64>,
-    tally: Columns<'a, f64>,
-    carry: Columns<'a, f64>,
+    saved_v: Columns<'a, T>,
+    saved_y: Columns<'a, T>,
+    recorded: Columns<'a, T>,
+    tally: Columns<'a, T>,
+    carry: Columns<'a, T>,
     first_bad: &'a mut [i64],
 }
 
@@ -103,7 +147,7 @@ pub(crate) fn expect(what: &'static str, expected: usize, got: usize) -> Result<
 
 /// Makes the run. The monitor is called on the caller's thread some dozens of times a second with the fraction that is done;
 /// when it returns false, the run ends soon.
-pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
+pub fn run<T: Steppable>(plan: &Plan, arrays: Arrays<T>, monitor: &mut dyn FnMut(f64) -> bool) -> Result<(), Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
     let (p, q) = (traced.shape.v, traced.shape.y);
@@ -129,7 +173,7 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     }
 
     let total = plan.total();
-    let lanes = plan.model.lanes(&traced, plan.machine, b, total)?;
+    let lanes = plan.model.lanes::<T>(&traced, plan.machine, b, total)?;
     let groups = b.div_ceil(lanes);
     let work = (p + q) as f64 * b as f64 * plan.steps as f64;
     let threads = plan.machine.threads_for(groups, work >= MIN_NUMBER_STEPS_FOR_THREADS);
@@ -167,37 +211,37 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
 
 /// Both slots and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded quantities.
 #[derive(Default)]
-struct Good {
-    v: Vec<f64>,
-    y: Vec<f64>,
-    tally: Vec<f64>,
-    carried: Vec<f64>,
-    recorded: Vec<f64>,
+struct Good<T> {
+    v: Vec<T>,
+    y: Vec<T>,
+    tally: Vec<T>,
+    carried: Vec<T>,
+    recorded: Vec<T>,
     /// The state before a trail.
-    before: Vec<f64>,
+    before: Vec<T>,
 }
 
 /// One thread's groups, and where it stands.
-struct Worker<'a> {
+struct Worker<'a, T: Real> {
     plan: &'a Plan<'a>,
     traced: &'a Arc<Traced>,
     machine: Machine,
     /// For as many members as there are, and for those that fill no group of these, with their number.
-    full: Option<Box<dyn Group>>,
-    rest: Option<(usize, Box<dyn Group>)>,
-    good: Good,
+    full: Option<Box<dyn Group<T>>>,
+    rest: Option<(usize, Box<dyn Group<T>>)>,
+    good: Good<T>,
     stop: &'a Stop,
 }
 
-impl<'a> Worker<'a> {
+impl<'a, T: Steppable> Worker<'a, T> {
     fn new(plan: &'a Plan<'a>, traced: &'a Arc<Traced>, machine: Machine, stop: &'a Stop) -> Self {
         Worker { plan, traced, machine, full: None, rest: None, good: Good::default(), stop }
     }
 
     /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
-    fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group, Error> {
-        let make = |members| -> Result<_, Error> {
-            let mut group = self.plan.model.group(self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
+    fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group<T>, Error> {
+        let make = |members| -> Result<Box<dyn Group<T>>, Error> {
+            let mut group = T::group(&self.plan.model, self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
             group.set_stop_flag(self.stop);
             Ok(group)
         };
@@ -215,9 +259,9 @@ impl<'a> Worker<'a> {
         Ok(self.rest.insert((left, rest)).1.as_mut())
     }
 
-    fn part(&mut self, mut part: Part, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
+    fn part(&mut self, mut part: Part<T>, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
         let (plan, carries, members) = (self.plan, self.traced.carries, part.count);
-        let lanes = plan.model.lanes(self.traced, self.machine, plan.members, plan.total())?;
+        let lanes = plan.model.lanes::<T>(self.traced, self.machine, plan.members, plan.total())?;
         let mut from = 0;
         while from < members {
             let mut good = std::mem::take(&mut self.good);
@@ -243,22 +287,22 @@ struct Checks {
 }
 
 /// One group's run.
-struct Job<'a, 'b> {
+struct Job<'a, 'b, T: Real> {
     plan: &'a Plan<'a>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
-    group: &'a mut dyn Group,
-    part: &'a mut Part<'b>,
+    group: &'a mut dyn Group<T>,
+    part: &'a mut Part<'b, T>,
     from: usize,
     count: usize,
-    good: &'a mut Good,
+    good: &'a mut Good<T>,
     /// The step of the state that is remembered there.
     checked: i64,
 }
 
 /// Copies the rows of a group into those from the `at`-th on, as far as there are any.
 #[inline]
-fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f64], lanes: usize) {
+fn put<T: Copy>(rows: &mut Columns<T>, at: usize, from: usize, count: usize, slot: &[T], lanes: usize) {
     let all = (slot.len() / lanes).min(rows.rows().saturating_sub(at));
     if all == 0 {
         return;
@@ -281,7 +325,7 @@ fn put(rows: &mut Columns<f64>, at: usize, from: usize, count: usize, slot: &[f6
     }
 }
 
-impl Job<'_, '_> {
+impl<T: Real> Job<'_, '_, T> {
     /// Whether it ran to its end.
     fn run(&mut self, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
         let (plan, lanes) = (self.plan, self.group.lanes());
@@ -364,11 +408,11 @@ impl Job<'_, '_> {
         let recorded = self.group.recorded();
         if recorded > 0 {
             let rows = &mut self.good.recorded;
-            rows.resize(recorded * lanes, 0.0);
+            rows.resize(recorded * lanes, T::default());
             self.group.record(rows);
             put(&mut self.part.recorded, i * recorded, self.from, self.count, rows, lanes);
         }
-        let diverged = self.carries && self.any_new(f64::INFINITY);
+        let diverged = self.carries && self.any_new(T::INFINITY);
         self.unfinish();
         if diverged {
             self.retrace(k);
@@ -390,8 +434,8 @@ impl Job<'_, '_> {
         }
         let (v, y) = self.group.advance_on_trail(k).split_at(steps * p * lanes);
         let first_bad = &self.part.first_bad[from..from + count];
-        let is_new = |row: &[f64]| row.iter().zip(first_bad).any(|(x, first_bad)| *first_bad < 0 && !x.is_finite());
-        if self.carries && !all_below(v, f64::INFINITY) && v.chunks_exact(lanes).any(is_new) {
+        let is_new = |row: &[T]| row.iter().zip(first_bad).any(|(x, first_bad)| *first_bad < 0 && !x.is_below(T::INFINITY));
+        if self.carries && !all_below(v, T::INFINITY) && v.chunks_exact(lanes).any(is_new) {
             let (v, y) = self.group.slots_mut();
             let (old_v, others) = self.good.before.split_at(v.len());
             let (old_y, old_tally) = others.split_at(y.len());
@@ -429,23 +473,23 @@ impl Job<'_, '_> {
     }
 
     /// Whether a member that was finite so far has a number in its slots that is not below this size.
-    fn any_new(&self, size: f64) -> bool {
+    fn any_new(&self, size: T) -> bool {
         let (v, y) = self.group.slots();
         // Members are searched one by one only if some number is not below.
         !(all_below(v, size) && all_below(y, size)) && (0..self.count).any(|l| self.is_new(l, size))
     }
 
-    fn is_new(&self, l: usize, size: f64) -> bool {
+    fn is_new(&self, l: usize, size: T) -> bool {
         let lanes = self.group.lanes();
         let (v, y) = self.group.slots();
-        let all_below = |slot: &[f64]| slot.iter().skip(l).step_by(lanes).all(|x| is_below(*x, size));
+        let all_below = |slot: &[T]| slot.iter().skip(l).step_by(lanes).all(|x| x.is_below(size));
         self.part.first_bad[self.from + l] < 0 && !(all_below(v) && all_below(y))
     }
 
     /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a method's carry
-    /// may be infinite and later finite again, but only if its numbers are [`HUGE`].
+    /// may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
     fn is_suspect(&self) -> bool {
-        let most = if self.carries { HUGE * self.plan.clock.h.min(1.0) } else { f64::INFINITY };
+        let most = if self.carries { T::of(T::HUGE.wide() * self.plan.clock.h.min(1.0)) } else { T::INFINITY };
         self.any_new(most)
     }
 
@@ -505,29 +549,19 @@ impl Job<'_, '_> {
     /// Notes the members with a number in the slots that is not finite after step `k`.
     fn note(&mut self, k: i64) {
         for l in 0..self.count {
-            if self.is_new(l, f64::INFINITY) {
+            if self.is_new(l, T::INFINITY) {
                 self.part.first_bad[self.from + l] = k;
             }
         }
     }
 }
 
-/// Whether a number is smaller than a size; a NaN is not.
-fn is_below(x: f64, size: f64) -> bool {
-    x.abs() < size
-}
-
 /// Whether all numbers are smaller. All numbers of a chunk are compared, which is vector code.
-fn all_below(numbers: &[f64], size: f64) -> bool {
-    numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & is_below(*x, size)))
+fn all_below<T: Real>(numbers: &[T], size: T) -> bool {
+    numbers.chunks(64).all(|chunk| chunk.iter().fold(true, |all, x| all & x.is_below(size)))
 }
 
-fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
+fn keep<T: Copy>(to: &mut Vec<T>, numbers: &[T]) {
     to.clear();
     to.extend_from_slice(numbers);
 }
-
-/// Where slots are larger than this, or than this times the step if that is less than 1, the velocities of a method with a carry are
-/// checked after every step. The difference of two coordinates divided by the step overflows only beyond 2¹⁰²³ times the step. To miss
-/// that between two checks, it would have to grow by 2⁶⁰ and shrink again within [`DIVERGENCE_CHECK_INTERVAL`] steps.
-const HUGE: f64 = f64::from_bits((1023 + 960) << 52);

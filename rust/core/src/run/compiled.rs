@@ -10,10 +10,12 @@ use crate::{
         pack::{self, Verdict},
         writer,
     },
+    real::{Precision, Real},
     tape::{
         Counts,
         split::{Body, Split},
     },
+    trace::Tapes,
 };
 
 /// A step that is one tape, and its kernel.
@@ -79,8 +81,15 @@ impl Model<'_> {
         if !matches!(self.way(&traced, machine, members, f64::INFINITY), Way::Tape) {
             return Ok(None);
         }
+        match self.scene.precision {
+            Precision::Double => self.compiled_for::<f64>(machine, members),
+            Precision::Single => self.compiled_for::<f32>(machine, members),
+        }
+    }
+
+    fn compiled_for<T: Real>(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let began = Instant::now();
-        let tapes = self.scene.trace()?;
+        let tapes: Tapes<T> = self.scene.trace()?;
         let trace = began.elapsed();
         let split = &tapes.step.split;
         let began = Instant::now();

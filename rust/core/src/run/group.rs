@@ -10,16 +10,17 @@ use super::{
 use crate::{
     error::Error,
     isa::Level,
+    real::Real,
     spec::Spec,
     system::Shape,
-    trace::{Tapes, Traced},
+    trace::{Tapes, Traceable, Traced},
 };
 
 /// Members stepped together.
 ///
 /// `v` and `y` are rows of [`Group::lanes`] numbers, one row per number of a member's block. The `v` slot holds what the
 /// method carries between steps: the velocity, unless its record names another carry.
-pub trait Group: Send + Sync {
+pub trait Group<T: Real = f64>: Send + Sync {
     /// How many members it steps together.
     fn lanes(&self) -> usize;
 
@@ -27,7 +28,7 @@ pub trait Group: Send + Sync {
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);
 
     /// Takes the force from outside for the members from `first`, for the steps to come.
-    fn set_force(&mut self, _force: &Force, _first: usize, _count: usize) {}
+    fn set_force(&mut self, _force: &Force<T>, _first: usize, _count: usize) {}
 
     /// Compiles now instead of after some interpreted steps: for real-time loops.
     fn compile_now(&mut self) {}
@@ -36,10 +37,10 @@ pub trait Group: Send + Sync {
     fn set_stop_flag(&mut self, _stop: &Stop) {}
 
     /// Both slots.
-    fn slots(&self) -> (&[f64], &[f64]);
+    fn slots(&self) -> (&[T], &[T]);
 
     /// Both slots, to write.
-    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]);
+    fn slots_mut(&mut self) -> (&mut [T], &mut [T]);
 
     /// Turns velocities in the `v` slot into what the method carries, at step `k`.
     fn start(&mut self, k: i64);
@@ -55,7 +56,7 @@ pub trait Group: Send + Sync {
 
     /// Makes that many steps from step `k`, a multiple of their number. Returns the velocities before each step, then the coordinates
     /// before each step.
-    fn advance_on_trail(&mut self, _k: i64) -> &[f64] {
+    fn advance_on_trail(&mut self, _k: i64) -> &[T] {
         &[]
     }
 
@@ -66,30 +67,30 @@ pub trait Group: Send + Sync {
     fn recorded(&self) -> usize;
 
     /// Records the present state, whose v slot is finished: rows of lanes.
-    fn record(&mut self, rows: &mut [f64]);
+    fn record(&mut self, rows: &mut [T]);
 
     /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
-    fn tally(&self) -> &[f64];
+    fn tally(&self) -> &[T];
 
     /// The same sums, to write.
-    fn tally_mut(&mut self) -> &mut [f64];
+    fn tally_mut(&mut self) -> &mut [T];
 }
 
 /// A stage outside the steps (start, finish or record), over a state of its own.
-struct SideStage {
-    prepared: PreparedStage,
+struct SideStage<T: Real> {
+    prepared: PreparedStage<T>,
     /// The state, followed by the results of the stage.
-    state: Vec<f64>,
+    state: Vec<T>,
 }
 
-impl SideStage {
-    fn new(stage: &Stage, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> SideStage {
+impl<T: Real> SideStage<T> {
+    fn new(stage: &Stage<T>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> SideStage<T> {
         let prepared = PreparedStage::with(stage, stage.kit_of(level, lanes), spec, clock, f64::INFINITY);
-        SideStage { prepared, state: vec![0.0; stage.split.body.next.len() * lanes] }
+        SideStage { prepared, state: vec![T::default(); stage.split.body.next.len() * lanes] }
     }
 
     /// Runs the stage once over a state, and returns that with the results.
-    fn run(&mut self, stage: &Stage, clock: &Clock, k: i64, from: &[f64]) -> &[f64] {
+    fn run(&mut self, stage: &Stage<T>, clock: &Clock, k: i64, from: &[T]) -> &[T] {
         let shared = from.len().min(self.state.len());
         self.state[..shared].copy_from_slice(&from[..shared]);
         self.prepared.advance(stage, clock, k, 1, &mut self.state);
@@ -98,34 +99,34 @@ impl SideStage {
 }
 
 /// Members of a system whose whole step is one tape.
-pub struct Lanes {
-    tapes: Arc<Tapes>,
+pub struct Lanes<T: Real = f64> {
+    tapes: Arc<Tapes<T>>,
     shape: Shape,
     recorded: usize,
     level: Level,
     clock: Clock,
-    step: PreparedStage,
+    step: PreparedStage<T>,
     /// A step that also returns the velocities, for a run that saves all of them.
-    shown: Option<PreparedStage>,
-    start: Option<SideStage>,
-    finish: Option<SideStage>,
-    record: Option<SideStage>,
-    state: Aligned,
+    shown: Option<PreparedStage<T>>,
+    start: Option<SideStage<T>>,
+    finish: Option<SideStage<T>>,
+    record: Option<SideStage<T>>,
+    state: Aligned<T>,
 }
 
-impl Lanes {
+impl<T: Traceable> Lanes<T> {
     /// For a run of so many members.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes, Error> {
-        let tapes = traced.tapes()?;
+    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes<T>, Error> {
+        let tapes = traced.tapes_of::<T>()?;
         Lanes::with(traced, tapes.step.kit(level, members), spec, level, clock)
     }
 
-    fn with(traced: &Traced, kit: Arc<Kit>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes, Error> {
-        let tapes = traced.tapes()?;
+    fn with(traced: &Traced, kit: Arc<Kit<T>>, spec: &Spec, level: Level, clock: &Clock) -> Result<Lanes<T>, Error> {
+        let tapes = traced.tapes_of::<T>()?;
         let step = PreparedStage::with(&tapes.step, kit, spec, clock, f64::INFINITY);
         let lanes = step.lanes();
         let numbers = traced.shape.v + traced.shape.y + traced.tally;
-        let side = |stage: &Option<Stage>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
+        let side = |stage: &Option<Stage<T>>| stage.as_ref().map(|stage| SideStage::new(stage, spec, level, lanes, clock));
         Ok(Lanes {
             state: Aligned::new(numbers * lanes),
             level,
@@ -142,7 +143,7 @@ impl Lanes {
     }
 
     /// The stages outside the steps.
-    fn side_stages(&mut self) -> impl Iterator<Item = (&mut SideStage, &Stage)> {
+    fn side_stages(&mut self) -> impl Iterator<Item = (&mut SideStage<T>, &Stage<T>)> {
         let Lanes { tapes, start, finish, record, .. } = self;
         let all = [(start, &tapes.start), (finish, &tapes.finish), (record, &tapes.record)];
         all.into_iter().filter_map(|(side, stage)| Some((side.as_mut()?, stage.as_ref()?)))
@@ -155,7 +156,7 @@ impl Lanes {
     }
 }
 
-impl Group for Lanes {
+impl<T: Traceable> Group<T> for Lanes<T> {
     fn lanes(&self) -> usize {
         self.step.lanes()
     }
@@ -165,10 +166,10 @@ impl Group for Lanes {
         for (side, stage) in self.side_stages() {
             side.prepared.prepare(stage, spec, first, count);
         }
-        self.tally_mut().fill(0.0);
+        self.tally_mut().fill(T::default());
     }
 
-    fn set_force(&mut self, force: &Force, first: usize, count: usize) {
+    fn set_force(&mut self, force: &Force<T>, first: usize, count: usize) {
         self.step.set_force(&self.tapes.step, force, first, count);
         for (side, stage) in self.side_stages() {
             side.prepared.set_force(stage, force, first, count);
@@ -180,12 +181,12 @@ impl Group for Lanes {
         self.side_stages().for_each(|(side, _)| side.prepared.compile_now());
     }
 
-    fn slots(&self) -> (&[f64], &[f64]) {
+    fn slots(&self) -> (&[T], &[T]) {
         let (v, y) = self.sizes();
         self.state[..v + y].split_at(v)
     }
 
-    fn slots_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+    fn slots_mut(&mut self) -> (&mut [T], &mut [T]) {
         let (v, y) = self.sizes();
         self.state[..v + y].split_at_mut(v)
     }
@@ -215,7 +216,7 @@ impl Group for Lanes {
         steps
     }
 
-    fn advance_on_trail(&mut self, k: i64) -> &[f64] {
+    fn advance_on_trail(&mut self, k: i64) -> &[T] {
         match (&mut self.shown, &self.tapes.shown) {
             (Some(shown), Some(stage)) => shown.advance_on_trail(stage, &self.clock, k, &mut self.state),
             _ => self.step.advance_on_trail(&self.tapes.step, &self.clock, k, &mut self.state),
@@ -234,7 +235,7 @@ impl Group for Lanes {
         self.recorded
     }
 
-    fn record(&mut self, rows: &mut [f64]) {
+    fn record(&mut self, rows: &mut [T]) {
         let (v, y) = self.sizes();
         if let (Some(side), Some(stage)) = (&mut self.record, &self.tapes.record) {
             let made = side.run(stage, &self.clock, 0, &self.state[..v + y]);
@@ -242,12 +243,12 @@ impl Group for Lanes {
         }
     }
 
-    fn tally(&self) -> &[f64] {
+    fn tally(&self) -> &[T] {
         let (v, y) = self.sizes();
         &self.state[v + y..]
     }
 
-    fn tally_mut(&mut self) -> &mut [f64] {
+    fn tally_mut(&mut self) -> &mut [T] {
         let (v, y) = self.sizes();
         &mut self.state[v + y..]
     }

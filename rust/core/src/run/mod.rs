@@ -32,9 +32,10 @@ use crate::{
         matrix::Matrix,
         tapes::{self, TapeRates},
     },
+    real::Precision,
     spec::Spec,
     system,
-    trace::{How, Scene, Traced},
+    trace::{How, Scene, Traceable, Traced},
 };
 
 /// The system to step and the way to step it.
@@ -90,7 +91,8 @@ impl Model<'_> {
         let (rates, step) = traced.operations;
         let single = members == 1;
         // Operations are fused on the tape of the whole step, and friction needs the state at its start.
-        if self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
+        let is_single = self.scene.precision == Precision::Single;
+        if is_single || self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {
@@ -119,9 +121,9 @@ impl Model<'_> {
     }
 
     /// How many members a group steps together in a run of so many, and of so many steps of members in all.
-    pub fn lanes(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<usize, Error> {
+    pub fn lanes<T: Traceable>(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<usize, Error> {
         Ok(match self.way(traced, machine, members, steps) {
-            Way::Tape => traced.tapes()?.step.kit(machine.level, members).runner.lanes(),
+            Way::Tape => traced.tapes_of::<T>()?.step.kit(machine.level, members).runner.lanes(),
             Way::Rates(lanes) => lanes,
             Way::Long(_) | Way::Matrix => 1,
         })

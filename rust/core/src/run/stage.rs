@@ -11,25 +11,29 @@ use crate::{
         runner::{By, Runner},
         writer,
     },
-    spec::{Row, Spec},
+    real::Real,
+    spec::Spec,
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
 };
 
 /// A cut tape with its kernels, which are made when they are first asked for and kept.
-pub struct Stage {
+pub struct Stage<T: Real = f64> {
     /// The tape.
     pub split: Split,
     /// By the number of members that they are for.
-    kits: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
+    kits: Kits<T>,
     /// Those for rows of a length that something else has set.
-    long: Mutex<Vec<(Level, usize, Arc<Kit>)>>,
+    long: Kits<T>,
 }
 
+/// Kits, each for a level and a number.
+type Kits<T> = Mutex<Vec<(Level, usize, Arc<Kit<T>>)>>;
+
 /// What makes the steps of a stage, and what is computed before them, over rows of one length.
-pub struct Kit {
+pub struct Kit<T: Real = f64> {
     /// The hot loop.
-    pub runner: Runner,
+    pub runner: Runner<T>,
     /// Once a run.
     run: Interpreter,
     /// Once for each member.
@@ -37,16 +41,16 @@ pub struct Kit {
     /// Once for each member that takes a lane by itself.
     single: Interpreter,
     /// Once for each step.
-    step: Runner,
+    step: Runner<T>,
     /// Once for each time that comes alone.
-    moment: Runner,
+    moment: Runner<T>,
     /// Several steps at once; none where that does not pay.
-    trail: OnceLock<Option<Trail>>,
+    trail: OnceLock<Option<Trail<T>>>,
 }
 
 /// Several steps in one call that also return the states between, for a run that saves them all: see [`Body::trail`].
-struct Trail {
-    runner: Runner,
+struct Trail<T: Real> {
+    runner: Runner<T>,
     steps: usize,
 }
 
@@ -57,8 +61,8 @@ const TRAIL_NUMBERS: usize = 1 << 14;
 /// The fewest and the most steps of a trail. They divide the number of steps of a table.
 const TRAIL_STEPS: [usize; 2] = [4, 64];
 
-impl Trail {
-    fn new(split: &Split, level: Level, lanes: usize, numbers: Numbers) -> Option<Trail> {
+impl<T: Real> Trail<T> {
+    fn new(split: &Split, level: Level, lanes: usize, numbers: Numbers) -> Option<Trail<T>> {
         let [least, most] = TRAIL_STEPS;
         let shape = writer::choose_trail(&split.body, level, lanes);
         let vectors = shape.map_or(1, |shape| shape.layout().block_vectors);
@@ -82,8 +86,8 @@ pub struct Numbers {
     pub y: usize,
 }
 
-impl Kit {
-    fn new(split: &Split, level: Level, runner: Runner) -> Arc<Kit> {
+impl<T: Real> Kit<T> {
+    fn new(split: &Split, level: Level, runner: Runner<T>) -> Arc<Kit<T>> {
         Arc::new(Kit {
             run: Interpreter::new(&split.run, 1, Level::Baseline),
             member: Interpreter::new(&split.member, runner.lanes(), level),
@@ -96,9 +100,9 @@ impl Kit {
     }
 }
 
-impl Stage {
+impl<T: Real> Stage<T> {
     /// Of a tape that was cut.
-    pub fn new(split: Split) -> Stage {
+    pub fn new(split: Split) -> Stage<T> {
         Stage { split, kits: Mutex::default(), long: Mutex::default() }
     }
 
@@ -109,25 +113,19 @@ impl Stage {
     }
 
     /// What makes its steps in a run of so many members.
-    pub fn kit(&self, level: Level, members: usize) -> Arc<Kit> {
+    pub fn kit(&self, level: Level, members: usize) -> Arc<Kit<T>> {
         // Some more or fewer of many members are no reason for another tile.
         let members = if members > MANY_MEMBERS { usize::MAX } else { members };
         self.kept(&self.kits, level, members, |body| Runner::new(body, level, members))
     }
 
     /// What makes its steps over rows of so many lanes.
-    pub fn kit_of(&self, level: Level, lanes: usize) -> Arc<Kit> {
+    pub fn kit_of(&self, level: Level, lanes: usize) -> Arc<Kit<T>> {
         self.kept(&self.long, level, lanes, |body| Runner::long(body, level, lanes))
     }
 
     /// What was made before for such a number, or what is made now.
-    fn kept(
-        &self,
-        kits: &Mutex<Vec<(Level, usize, Arc<Kit>)>>,
-        level: Level,
-        number: usize,
-        make: impl Fn(&Body) -> Runner,
-    ) -> Arc<Kit> {
+    fn kept(&self, kits: &Kits<T>, level: Level, number: usize, make: impl Fn(&Body) -> Runner<T>) -> Arc<Kit<T>> {
         // A thread that panicked while it held the lock has left a list that is whole: entries are made before they are put in.
         let mut kits = kits.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, _, known)) = kits.iter().find(|(at, known, _)| (*at, *known) == (level, number)) {
@@ -166,18 +164,18 @@ impl Clock {
 
 /// A force from outside that changes between steps: rows of one number for each member.
 #[derive(Clone, Copy, Debug)]
-pub struct Force<'a> {
+pub struct Force<'a, T = f64> {
     /// The rows, one for each number of v.
-    pub numbers: &'a [f64],
+    pub numbers: &'a [T],
     /// How long a row is.
     pub members: usize,
     /// The number of the first row among all parameters.
     pub place: usize,
 }
 
-impl Force<'_> {
+impl<T> Force<'_, T> {
     /// A row.
-    pub fn row(&self, i: usize) -> &[f64] {
+    pub fn row(&self, i: usize) -> &[T] {
         &self.numbers[i * self.members..][..self.members]
     }
 }
@@ -186,50 +184,50 @@ impl Force<'_> {
 const MOST_ENTRIES: usize = 1 << 16;
 
 /// A stage with its kernel and the parameters and inputs of some members: all that its hot loop reads.
-pub struct PreparedStage {
-    kit: Arc<Kit>,
+pub struct PreparedStage<T: Real = f64> {
+    kit: Arc<Kit<T>>,
     /// What is the same for all members, in the order of [`Split::given`].
-    given: Vec<f64>,
+    given: Vec<T>,
     /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
-    given_pool: Vec<f64>,
+    given_pool: Vec<T>,
     given_for: Option<By>,
     /// The uniforms of the hot loop.
-    uniforms: Vec<f64>,
+    uniforms: Vec<T>,
     /// The same as the kernel wants them, and whether that kernel is machine code.
-    pool: Aligned,
+    pool: Aligned<T>,
     pool_for: Option<By>,
-    rows: Aligned,
-    held: Aligned,
+    rows: Aligned<T>,
+    held: Aligned<T>,
     /// Where in `held` the samples of each input begin.
     inputs: Vec<usize>,
     /// Samples that all members have in common.
-    common: Vec<Vec<f64>>,
+    common: Vec<Vec<T>>,
     /// Tables of steps, by their first step.
     tables: Vec<(i64, Vec<u64>)>,
     /// How many of them are kept at most, and which makes place next.
     most_tables: usize,
     oldest: usize,
     /// The times of the steps of a table.
-    times: Vec<f64>,
+    times: Vec<T>,
     /// The entries of one time, and the values that entries are made of.
     moment: Vec<u64>,
-    values: Vec<f64>,
-    raw: Vec<f64>,
-    scratch: Vec<f64>,
+    values: Vec<T>,
+    raw: Vec<T>,
+    scratch: Vec<T>,
     /// A state with a trail of states behind it, and the pool of its kernel.
-    trail: Aligned,
-    trail_pool: Aligned,
+    trail: Aligned<T>,
+    trail_pool: Aligned<T>,
     trail_pool_for: Option<By>,
 }
 
-impl PreparedStage {
+impl<T: Real> PreparedStage<T> {
     /// For a run of so many members. `budget` is the most attempts of a member, for those.
-    pub fn new(stage: &Stage, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> PreparedStage {
+    pub fn new(stage: &Stage<T>, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> PreparedStage<T> {
         PreparedStage::with(stage, stage.kit(level, members), spec, clock, budget)
     }
 
     /// With a kernel that was chosen already.
-    pub fn with(stage: &Stage, kit: Arc<Kit>, spec: &Spec, clock: &Clock, budget: f64) -> PreparedStage {
+    pub fn with(stage: &Stage<T>, kit: Arc<Kit<T>>, spec: &Spec, clock: &Clock, budget: f64) -> PreparedStage<T> {
         let (split, lanes) = (&stage.split, kit.runner.lanes());
         let last = |input: u32| spec.tables[input as usize].samples.len() as f64 - 1.0;
         let before = |input: u32| spec.tables[..input as usize].iter().map(|table| table.samples.len()).sum::<usize>();
@@ -243,12 +241,12 @@ impl PreparedStage {
             Given::First(input) => (before(input) * lanes) as f64,
             Given::Lanes => lanes as f64,
         };
-        let given: Vec<f64> = split.given.iter().map(number).collect();
-        let mut uniforms = vec![0.0; split.run.next.len()];
+        let given: Vec<T> = split.given.iter().map(|given| T::of(number(given))).collect();
+        let mut uniforms = vec![T::default(); split.run.next.len()];
         let mut scratch = Vec::new();
         let tile = &mut Tile { state: &mut uniforms, rows: &[], pool: &given, steps: 1, per_step: &[], held: &[] };
         kit.run.run(tile, &mut scratch);
-        let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| row.at(0)).collect()).collect();
+        let common = spec.tables.iter().map(|table| table.samples.iter().map(|row| T::of(row.at(0))).collect()).collect();
         PreparedStage {
             given,
             given_pool: Vec::new(),
@@ -266,7 +264,7 @@ impl PreparedStage {
             times: Vec::new(),
             moment: Vec::new(),
             values: Vec::new(),
-            raw: vec![0.0; split.params.len() * lanes],
+            raw: vec![T::default(); split.params.len() * lanes],
             scratch,
             trail: Aligned::new(0),
             trail_pool: Aligned::new(0),
@@ -281,7 +279,7 @@ impl PreparedStage {
     }
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last.
-    pub fn prepare(&mut self, stage: &Stage, spec: &Spec, first: usize, count: usize) {
+    pub fn prepare(&mut self, stage: &Stage<T>, spec: &Spec, first: usize, count: usize) {
         let lanes = self.lanes();
         for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
             spec.rows[*param as usize].fill(first, count, raw);
@@ -291,11 +289,13 @@ impl PreparedStage {
     }
 
     /// Takes the force for the members that were prepared.
-    pub fn set_force(&mut self, stage: &Stage, force: &Force, first: usize, count: usize) {
+    pub fn set_force(&mut self, stage: &Stage<T>, force: &Force<T>, first: usize, count: usize) {
         let (lanes, rows) = (self.lanes(), force.numbers.len() / force.members);
         for (raw, param) in self.raw.chunks_exact_mut(lanes).zip(&stage.split.params) {
             if let Some(i) = (*param as usize).checked_sub(force.place).filter(|i| *i < rows) {
-                Row(force.row(i)).fill(first, count, raw);
+                let row = &force.row(i)[first..first + count];
+                raw[..count].copy_from_slice(row);
+                raw[count..].fill(row[count - 1]);
             }
         }
         self.find_rows();
@@ -309,21 +309,21 @@ impl PreparedStage {
     }
 
     /// Takes the parameters of a member into one lane.
-    pub fn prepare_lane(&mut self, stage: &Stage, spec: &Spec, lane: usize, member: usize) {
+    pub fn prepare_lane(&mut self, stage: &Stage<T>, spec: &Spec, lane: usize, member: usize) {
         let split = &stage.split;
-        let raw: Vec<f64> = split.params.iter().map(|param| spec.rows[*param as usize].at(member)).collect();
-        let mut made = vec![0.0; split.member.next.len()];
+        let raw: Vec<T> = split.params.iter().map(|param| T::of(spec.rows[*param as usize].at(member))).collect();
+        let mut made = vec![T::default(); split.member.next.len()];
         let tile = &mut Tile { state: &mut made, rows: &raw, pool: &self.given, steps: 1, per_step: &[], held: &[] };
         self.kit.single.run(tile, &mut self.scratch);
         let lanes = self.lanes();
         for (row, number) in self.rows.chunks_exact_mut(lanes).zip(made) {
             row[lane] = number;
         }
-        self.take_samples(stage, spec, |row, to| to[lane] = row.at(member));
+        self.take_samples(stage, spec, |row, to| to[lane] = T::of(row.at(member)));
     }
 
     /// Fills the rows of samples of inputs of which members have their own.
-    fn take_samples(&mut self, stage: &Stage, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [f64])) {
+    fn take_samples(&mut self, stage: &Stage<T>, spec: &Spec, take: impl Fn(&crate::spec::Row, &mut [T])) {
         let lanes = self.lanes();
         let of_members =
             stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_))) || stage.split.given.contains(&Given::Lanes);
@@ -351,7 +351,7 @@ impl PreparedStage {
     }
 
     /// So many steps of a state from step `k`.
-    pub fn advance(&mut self, stage: &Stage, clock: &Clock, k: i64, n: usize, state: &mut [f64]) {
+    pub fn advance(&mut self, stage: &Stage<T>, clock: &Clock, k: i64, n: usize, state: &mut [T]) {
         if stage.split.entries.is_empty() {
             self.steps(n, &[], state);
             return;
@@ -369,14 +369,14 @@ impl PreparedStage {
     }
 
     /// How many steps a trail has; none if there is no trail.
-    pub fn trail(&self, stage: &Stage, level: Level, numbers: Numbers) -> usize {
+    pub fn trail(&self, stage: &Stage<T>, level: Level, numbers: Numbers) -> usize {
         let make = || Trail::new(&stage.split, level, self.lanes(), numbers);
         self.kit.trail.get_or_init(make).as_ref().map_or(0, |trail| trail.steps)
     }
 
     /// Makes the steps of a trail from step `k`, a multiple of their number. Returns the velocities before each step, then the
     /// coordinates before each step.
-    pub fn advance_on_trail(&mut self, stage: &Stage, clock: &Clock, k: i64, state: &mut [f64]) -> &[f64] {
+    pub fn advance_on_trail(&mut self, stage: &Stage<T>, clock: &Clock, k: i64, state: &mut [T]) -> &[T] {
         let kit = Arc::clone(&self.kit);
         let Some(Some(trail)) = kit.trail.get() else { return &[] };
         let numbers = state.len();
@@ -409,20 +409,20 @@ impl PreparedStage {
 
     /// One step of a state at a time.
     #[inline]
-    pub fn advance_at(&mut self, stage: &Stage, t: f64, state: &mut [f64]) {
+    pub fn advance_at(&mut self, stage: &Stage<T>, t: f64, state: &mut [T]) {
         if stage.split.entries.is_empty() {
             self.steps(1, &[], state);
             return;
         }
         let mut table = std::mem::take(&mut self.moment);
         let kit = Arc::clone(&self.kit);
-        self.fill(stage, &kit.moment, &[t], &mut table);
+        self.fill(stage, &kit.moment, &[T::of(t)], &mut table);
         self.steps(1, &table, state);
         self.moment = table;
     }
 
     #[inline]
-    fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [f64]) {
+    fn steps(&mut self, steps: usize, per_step: &[u64], state: &mut [T]) {
         let (kernel, by) = self.kit.runner.kernel(steps);
         if self.pool_for != Some(by) {
             self.pool = Aligned::from(&kernel.pool(&self.uniforms));
@@ -433,7 +433,7 @@ impl PreparedStage {
     }
 
     /// The table of [`STEPS_AT_ONCE`] steps from step `first`, by its place among those that are kept.
-    fn table(&mut self, stage: &Stage, clock: &Clock, first: i64) -> usize {
+    fn table(&mut self, stage: &Stage<T>, clock: &Clock, first: i64) -> usize {
         if let Some(at) = self.tables.iter().position(|(from, _)| *from == first) {
             return at;
         }
@@ -448,7 +448,7 @@ impl PreparedStage {
         // What is there already is filled anew: a step of a world allocates nothing.
         let (mut times, mut table) = (std::mem::take(&mut self.times), std::mem::take(&mut self.tables[at].1));
         times.clear();
-        times.extend((first..first + STEPS_AT_ONCE).map(|k| clock.at(k)));
+        times.extend((first..first + STEPS_AT_ONCE).map(|k| T::of(clock.at(k))));
         let kit = Arc::clone(&self.kit);
         self.fill(stage, &kit.step, &times, &mut table);
         (self.times, self.tables[at].1) = (times, table);
@@ -456,9 +456,9 @@ impl PreparedStage {
     }
 
     /// The entries of steps at these times, as many as the interpreter has lanes.
-    fn fill(&mut self, stage: &Stage, step: &Runner, times: &[f64], table: &mut Vec<u64>) {
+    fn fill(&mut self, stage: &Stage<T>, step: &Runner<T>, times: &[T], table: &mut Vec<u64>) {
         let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
-        self.values.resize(entries.len() * steps, 0.0); // all of them are written anew
+        self.values.resize(entries.len() * steps, T::default()); // all of them are by anew
         let (kernel, by) = step.kernel(1);
         if self.given_for != Some(by) {
             (self.given_pool, self.given_for) = (kernel.pool(&self.given), Some(by));
@@ -471,14 +471,14 @@ impl PreparedStage {
             let places = table[e..].iter_mut().step_by(entries.len());
             let each = places.zip(values);
             match *entry {
-                Entry::Value => each.for_each(|(place, value)| *place = value.to_bits()),
+                Entry::Value => each.for_each(|(place, value)| *place = value.pattern()),
                 Entry::Sample(input) => {
                     let samples = &self.common[input as usize];
-                    each.for_each(|(place, value)| *place = samples[*value as usize].to_bits());
+                    each.for_each(|(place, value)| *place = samples[value.wide() as usize].pattern());
                 }
                 Entry::Row(input) => {
                     let first = self.inputs[input as usize];
-                    each.for_each(|(place, value)| *place = (first + *value as usize * lanes) as u64);
+                    each.for_each(|(place, value)| *place = (first + value.wide() as usize * lanes) as u64);
                 }
             }
         }

@@ -4,29 +4,30 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use super::{
     Machine, Model,
+    batch::Steppable,
     group::Group,
     stage::{Clock, Force},
     workers::{self, GoOn, Stop, Workers},
 };
-use crate::{controls::force::NAME, error::Error};
+use crate::{controls::force::NAME, error::Error, real::Real};
 
-struct Share {
-    group: Box<dyn Group>,
+struct Share<T> {
+    group: Box<dyn Group<T>>,
     first: usize,
     count: usize,
     /// Both slots before the step that is being made, if that can be stopped, and before the one that was made last.
-    before: [(Vec<f64>, Vec<f64>); 2],
+    before: [(Vec<T>, Vec<T>); 2],
 }
 
-impl Share {
-    fn load(&mut self, v: &[f64], y: &[f64], members: usize) {
+impl<T: Real> Share<T> {
+    fn load(&mut self, v: &[T], y: &[T], members: usize) {
         let (share, lanes) = ((self.first, self.count), self.group.lanes());
         let (v_slot, y_slot) = self.group.slots_mut();
         load(v, members, share, v_slot, lanes);
         load(y, members, share, y_slot, lanes);
     }
 
-    fn store(&self, v: &mut [f64], y: &mut [f64], members: usize) {
+    fn store(&self, v: &mut [T], y: &mut [T], members: usize) {
         let (share, lanes) = ((self.first, self.count), self.group.lanes());
         let (v_slot, y_slot) = self.group.slots();
         store(v, members, share, v_slot, lanes);
@@ -35,14 +36,14 @@ impl Share {
 }
 
 /// Everything that a step needs, made once; a step allocates nothing and checks nothing.
-pub struct World {
+pub struct World<T = f64> {
     clock: Clock,
-    shares: Vec<Share>,
+    shares: Vec<Share<T>>,
     members: usize,
     sizes: (usize, usize),
     carries: bool,
     /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
-    written: (Vec<f64>, Vec<f64>),
+    written: (Vec<T>, Vec<T>),
     /// Whether the slots belong to the arrays as last written.
     is_written: bool,
     step: i64,
@@ -56,7 +57,7 @@ pub struct World {
 /// How often a world will be stepped is unknown; kernels are chosen for many steps.
 const UNKNOWN_STEPS: f64 = f64::INFINITY;
 
-fn load(array: &[f64], members: usize, share: (usize, usize), slot: &mut [f64], lanes: usize) {
+fn load<T: Copy>(array: &[T], members: usize, share: (usize, usize), slot: &mut [T], lanes: usize) {
     let (first, count) = share;
     for (row, slot) in array.chunks_exact(members).zip(slot.chunks_exact_mut(lanes)) {
         slot[..count].copy_from_slice(&row[first..first + count]);
@@ -65,18 +66,18 @@ fn load(array: &[f64], members: usize, share: (usize, usize), slot: &mut [f64], 
     }
 }
 
-fn store(array: &mut [f64], members: usize, share: (usize, usize), slot: &[f64], lanes: usize) {
+fn store<T: Copy>(array: &mut [T], members: usize, share: (usize, usize), slot: &[T], lanes: usize) {
     let (first, count) = share;
     for (row, slot) in array.chunks_exact_mut(members).zip(slot.chunks_exact(lanes)) {
         row[first..first + count].copy_from_slice(&slot[..count]);
     }
 }
 
-fn equal_bits(array: &[f64], written: &[f64]) -> bool {
-    array.iter().zip(written).all(|(a, w)| a.to_bits() == w.to_bits())
+fn equal_bits<T: Real>(array: &[T], written: &[T]) -> bool {
+    array.iter().zip(written).all(|(a, w)| a.pattern() == w.pattern())
 }
 
-impl World {
+impl<T: Steppable> World<T> {
     /// Prepares the groups of all members.
     pub fn new(model: &Model, clock: Clock, machine: Machine, members: usize, step: i64) -> Result<Self, Error> {
         let traced = model.traced()?;
@@ -86,9 +87,9 @@ impl World {
         let mut shares = Vec::new();
         let mut first = 0;
         while first < members {
-            let whole = members - first >= model.lanes(&traced, machine, members, UNKNOWN_STEPS)?;
+            let whole = members - first >= model.lanes::<T>(&traced, machine, members, UNKNOWN_STEPS)?;
             let mut group =
-                model.group(&traced, machine, if whole { members } else { members - first }, &clock, UNKNOWN_STEPS)?;
+                T::group(model, &traced, machine, if whole { members } else { members - first }, &clock, UNKNOWN_STEPS)?;
             let count = (members - first).min(group.lanes());
             group.prepare(&model.spec, first, count);
             group.compile_now();
@@ -105,7 +106,7 @@ impl World {
         }
         let sizes = (traced.shape.v * members, traced.shape.y * members);
         let carries = traced.carries;
-        let written = if carries { (vec![0.0; sizes.0], vec![0.0; sizes.1]) } else { Default::default() };
+        let written = if carries { (vec![T::default(); sizes.0], vec![T::default(); sizes.1]) } else { Default::default() };
         let force = model.spec.given.place(NAME);
         Ok(World { clock, shares, members, sizes, carries, written, is_written: false, step, steps_between_checks, stop, force })
     }
@@ -131,7 +132,7 @@ impl World {
     }
 
     /// Takes the force from outside for the steps to come, as rows of one number per member.
-    pub fn set_force(&mut self, rows: &[f64]) {
+    pub fn set_force(&mut self, rows: &[T]) {
         if let Some(place) = self.force {
             let force = Force { numbers: rows, members: self.members, place };
             self.shares.iter_mut().for_each(|share| share.group.set_force(&force, share.first, share.count));
@@ -139,16 +140,16 @@ impl World {
     }
 
     /// Whether these arrays are not what the slots hold.
-    fn is_moved(&self, v: &[f64], y: &[f64]) -> bool {
+    fn is_moved(&self, v: &[T], y: &[T]) -> bool {
         !(self.is_written && equal_bits(v, &self.written.0) && equal_bits(y, &self.written.1))
     }
 
     /// The carry of the method, as rows of one number per member; none if the next step begins with `v` itself.
-    pub fn carry(&self, v: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+    pub fn carry(&self, v: &[T], y: &[T]) -> Option<Vec<T>> {
         if self.is_moved(v, y) {
             return None;
         }
-        let mut carry = vec![0.0; self.sizes.0];
+        let mut carry = vec![T::default(); self.sizes.0];
         for share in &self.shares {
             store(&mut carry, self.members, (share.first, share.count), share.group.slots().0, share.group.lanes());
         }
@@ -156,7 +157,7 @@ impl World {
     }
 
     /// Continues with the carry that belongs to these arrays.
-    pub fn carry_on(&mut self, carry: &[f64], v: &[f64], y: &[f64]) {
+    pub fn carry_on(&mut self, carry: &[T], v: &[T], y: &[T]) {
         if self.carries && carry.len() == self.sizes.0 {
             let members = self.members;
             self.shares.iter_mut().for_each(|share| share.load(carry, y, members));
@@ -167,7 +168,7 @@ impl World {
     }
 
     /// `n` steps, in place. `v` and `y` are rows of one number per member.
-    pub fn step(&mut self, n: i64, v: &mut [f64], y: &mut [f64]) {
+    pub fn step(&mut self, n: i64, v: &mut [T], y: &mut [T]) {
         let (k, until, members, carries) = (self.step, self.step + n, self.members, self.carries);
         let moved = !carries || self.is_moved(v, y);
         for share in &mut self.shares {
@@ -193,8 +194,8 @@ impl World {
     pub fn step_in_background(
         &mut self,
         n: i64,
-        v: &mut [f64],
-        y: &mut [f64],
+        v: &mut [T],
+        y: &mut [T],
         monitor: &mut dyn FnMut(f64) -> bool,
     ) -> Result<(), Error> {
         self.stop.store(false, Relaxed);
@@ -205,7 +206,7 @@ impl World {
         })
     }
 
-    fn steps(&mut self, n: i64, v: &mut [f64], y: &mut [f64], go_on: GoOn) -> Result<(), Error> {
+    fn steps(&mut self, n: i64, v: &mut [T], y: &mut [T], go_on: GoOn) -> Result<(), Error> {
         let (from, members) = (self.step, self.members);
         if !self.carries || self.is_moved(v, y) {
             self.is_written = false;
@@ -253,7 +254,7 @@ impl World {
     }
 
     /// Writes the states of step `k` to the arrays, unless it was stopped before.
-    fn publish(&mut self, k: i64, v: &mut [f64], y: &mut [f64]) -> bool {
+    fn publish(&mut self, k: i64, v: &mut [T], y: &mut [T]) -> bool {
         let members = self.members;
         if self.carries {
             // The array of the velocities last written stores the carry meanwhile.

@@ -38,7 +38,7 @@ struct Rewriting<'a> {
 /// The same tape, for these values, in which increments are multiplied last; and the values on it.
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = &negated_sums(tape, roots);
-    let made = Tape { written: tape.written, ..Tape::default() };
+    let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut work = Rewriting { tape, facts: Facts::new(tape, roots), made, values: Vec::with_capacity(tape.ops().len()) };
     for (id, op) in tape.ops().iter().enumerate() {
         let value = if work.facts.needed[id] { work.value(*op) } else { Value::Plain(0) };
@@ -51,7 +51,8 @@ pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
 /// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon first, and what
 /// is made of it must not depend on that.
 fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
-    let (mut made, mut place) = (Tape { written: tape.written, ..Tape::default() }, Vec::<Id>::with_capacity(tape.ops().len()));
+    let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
+    let mut place = Vec::<Id>::with_capacity(tape.ops().len());
     for op in tape.ops() {
         let id = match op {
             Op::Sub(a, b) if let Op::Neg(x) = tape.op(*a) => {
@@ -113,7 +114,7 @@ impl Rewriting<'_> {
     /// An increment times what is known before the step.
     fn times(&mut self, of: Increment, p: Id) -> Increment {
         match self.tape.op(p) {
-            Op::Const(bits) => Increment { c: of.c * f64::from_bits(bits), ..of },
+            Op::Const(bits) => Increment { c: of.c * self.tape.precision().number(bits), ..of },
             _ => {
                 let p = self.plain(p);
                 Increment { factor: self.put(Op::Mul(p, of.factor)), ..of }

@@ -16,6 +16,7 @@ pub mod split;
 use std::collections::BTreeSet;
 
 use self::quick::QuickMap;
+use crate::real::Precision;
 
 /// A value on a tape, by the index of its operation.
 pub type Id = u32;
@@ -31,7 +32,7 @@ pub enum Op {
     Step,
     /// The time at the start of the step.
     Time,
-    /// A number, by its bits.
+    /// A number, by its bits; of 32 bits the lower half.
     Const(u64),
     /// A sampled input at a time.
     Sample(u32, Id),
@@ -69,7 +70,7 @@ pub enum Op {
     Or(Id, Id),
     /// Bits of one and not of both.
     Xor(Id, Id),
-    /// The sum of both as whole numbers of 64 bits, without a carry out.
+    /// The sum of both as whole numbers of as many bits, without a carry out.
     AddBits(Id, Id),
     /// Bits moved up by so many places, zeros after them.
     ShiftUp(Id, u32),
@@ -204,6 +205,7 @@ impl Counts {
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
     ops: Vec<Op>,
+    precision: Precision,
     seen: QuickMap<Op, Id>,
     /// Of each value: whether it is surely not −0.
     not_minus_zero: Vec<bool>,
@@ -215,9 +217,17 @@ pub struct Tape {
     series: [usize; 2],
 }
 
-const MINUS_ZERO: u64 = 1 << 63;
-
 impl Tape {
+    /// An empty one, for numbers of a precision.
+    pub fn new(precision: Precision) -> Tape {
+        Tape { precision, ..Tape::default() }
+    }
+
+    /// The numbers that it computes with.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
     /// The operations.
     pub fn ops(&self) -> &[Op] {
         &self.ops
@@ -278,9 +288,14 @@ impl Tape {
         self.of_state[id as usize]
     }
 
-    /// A number.
+    /// A number, rounded to the tape's precision.
     pub fn constant(&mut self, x: f64) -> Id {
-        self.keep(Op::Const(x.to_bits()))
+        self.keep(Op::Const(self.precision.bits_of(x)))
+    }
+
+    /// A constant of bits: see [`Precision::pattern`].
+    pub fn bits_of(&mut self, bits: u64) -> Id {
+        self.keep(Op::Const(self.precision.pattern(bits)))
     }
 
     /// Writes an operation, or finds a value that is equal to its result in every bit.
@@ -319,7 +334,7 @@ impl Tape {
         let id = self.ops.len() as Id;
         let sure = |id: Id| self.not_minus_zero[id as usize];
         let not_minus_zero = match op {
-            Op::Const(bits) => bits != MINUS_ZERO,
+            Op::Const(bits) => bits != self.precision.sign_bit(),
             // A sum is −0 only if both are, a difference only of −0 and +0.
             Op::Add(a, b) => sure(a) || sure(b),
             Op::Sub(a, _) | Op::Sqrt(a) => sure(a),
@@ -342,7 +357,8 @@ impl Tape {
         if let Some(known) = self.fold(op) {
             return self.keep(Const(known));
         }
-        let (zero, one, minus_one) = (Some(0), Some(1f64.to_bits()), Some((-1f64).to_bits()));
+        let [one, minus_one] = [1.0, -1.0].map(|x| Some(self.precision.bits_of(x)));
+        let (zero, minus_zero) = (Some(0), Some(self.precision.sign_bit()));
         match op {
             Neg(a) => match self.op(a) {
                 Neg(x) => x,
@@ -351,7 +367,7 @@ impl Tape {
             Add(a, b) => {
                 // x + −0 is x, and so is x + 0 unless x is −0.
                 for (x, y) in [(a, b), (b, a)] {
-                    if self.bits(y) == Some(MINUS_ZERO) || (self.bits(y) == zero && self.never_minus_zero(x)) {
+                    if self.bits(y) == minus_zero || (self.bits(y) == zero && self.never_minus_zero(x)) {
                         return x;
                     }
                 }
@@ -376,7 +392,7 @@ impl Tape {
                 if self.bits(b) == zero {
                     return a;
                 }
-                if self.bits(a) == Some(MINUS_ZERO) {
+                if self.bits(a) == minus_zero {
                     return self.shorten(Neg(b));
                 }
                 if let Neg(x) = self.op(b) {
@@ -413,7 +429,7 @@ impl Tape {
             Xor(a, b) => self.keep(Xor(a.min(b), a.max(b))),
             AddBits(a, b) => self.keep(AddBits(a.min(b), a.max(b))),
             Select(_, a, b) if a == b => a,
-            Select(truth, a, _) if self.bits(truth) == Some(u64::MAX) => a,
+            Select(truth, a, _) if self.bits(truth) == Some(self.precision.all_bits()) => a,
             Select(truth, _, b) if self.bits(truth) == zero => b,
             Copy(a) => a,
             ShiftUp(a, 0) | ShiftDown(a, 0) => a,
@@ -429,10 +445,10 @@ impl Tape {
         }
         let bits = |id: Id| self.bits(id);
         let (x, y, z) = (bits(a)?, if n > 1 { bits(b)? } else { 0 }, if n > 2 { bits(c)? } else { 0 });
-        let made = eval::apply(op, x, y, z);
+        let made = self.precision.apply(op, x, y, z);
         let is_sum = matches!(op, Op::Add(..) | Op::Sub(..) | Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..));
         let is_number = is_sum || matches!(op, Op::Mul(..) | Op::Div(..) | Op::Sqrt(_) | Op::Floor(_));
-        (!is_number || !f64::from_bits(made).is_nan()).then_some(made)
+        (!is_number || !self.precision.number(made).is_nan()).then_some(made)
     }
 
     /// The same operations in the same places, with some replaced by others of the same operands or earlier ones.
@@ -440,7 +456,15 @@ impl Tape {
         let ops: Vec<Op> = self.ops.iter().enumerate().map(|(id, op)| replace(id as Id, *op)).collect();
         let seen = ops.iter().enumerate().map(|(id, op)| (*op, id as Id)).collect();
         let of_state = self.of_state.clone();
-        Tape { ops, seen, not_minus_zero: vec![false; self.ops.len()], of_state, written: self.written, series: self.series }
+        Tape {
+            ops,
+            seen,
+            not_minus_zero: vec![false; self.ops.len()],
+            of_state,
+            written: self.written,
+            precision: self.precision,
+            series: self.series,
+        }
     }
 
     /// For each value of the tape whether these values need it; they need themselves.

@@ -1,16 +1,17 @@
 //! A tape as text.
 
 use super::{Id, Op};
+use crate::real::Precision;
 
 /// One operation, as a line of a listing.
-pub fn line(id: Id, op: Op) -> String {
+pub fn line(id: Id, op: Op, precision: Precision) -> String {
     use Op::*;
     let is = match op {
         State(i) => format!("state[{i}]"),
         Param(i) => format!("param[{i}]"),
         Step => "h".into(),
         Time => "t".into(),
-        Const(bits) => match f64::from_bits(bits) {
+        Const(bits) => match precision.number(bits) {
             x if x.is_nan() => format!("bits {bits:#018x}"),
             x => format!("{x:?}"),
         },
@@ -85,6 +86,6 @@ pub fn named(op: Op) -> (&'static str, u64) {
 }
 
 /// A listing of operations.
-pub fn listing(ops: &[Op]) -> String {
-    ops.iter().enumerate().map(|(id, op)| line(id as Id, *op) + "\n").collect()
+pub fn listing(ops: &[Op], precision: Precision) -> String {
+    ops.iter().enumerate().map(|(id, op)| line(id as Id, *op, precision) + "\n").collect()
 }

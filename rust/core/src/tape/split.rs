@@ -7,6 +7,7 @@
 use std::hash::Hash;
 
 use super::{Id, Op, Tape, quick::QuickMap};
+use crate::real::Precision;
 
 /// Operations over lanes: the input of the interpreter and of a kernel writer.
 ///
@@ -25,6 +26,8 @@ pub struct Body {
     pub uniforms: usize,
     /// How many entries a step has in the table of the steps: the bits of a number for `PerStep`, for `Held` the place of a row.
     pub per_step: usize,
+    /// The numbers that it computes with.
+    pub precision: Precision,
 }
 
 impl Body {
@@ -58,7 +61,7 @@ impl Body {
         }
         let mut place = vec![0; tape.ops().len()];
         let mut known: QuickMap<Op, Id> = QuickMap::default();
-        let mut body = Body::default();
+        let mut body = Body { precision: tape.precision(), ..Body::default() };
         for id in (0..tape.ops().len()).filter(|id| needed[*id]) {
             let op = leaves[id].unwrap_or_else(|| tape.ops()[id].with(|operand| place[operand as usize]));
             place[id] = *known.entry(op).or_insert_with(|| {
@@ -128,7 +131,7 @@ impl Body {
     /// numbers. If the body of a step has further results, these are the velocities before the step, and the v slot holds the carry.
     #[must_use]
     pub fn trail(&self, steps: usize, state: usize, sizes: [usize; 2]) -> Body {
-        let mut trail = Body::default();
+        let mut trail = Body { precision: self.precision, ..Body::default() };
         let mut leaves: QuickMap<Op, Id> = QuickMap::default();
         let mut leaf = |trail: &mut Body, op: Op| {
             *leaves.entry(op).or_insert_with(|| {
@@ -355,7 +358,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
     let [start, interval, last] = [Given::Start(input), Given::Interval(input), Given::Last(input)].map(|g| tape.keep(fact(g)));
     let since = tape.keep(Op::Sub(t, start));
     let intervals = tape.keep(Op::Div(since, interval));
-    let slack = tape.keep(Op::Const(HOLD_SLACK.to_bits()));
+    let slack = tape.constant(HOLD_SLACK);
     let late = tape.keep(Op::Add(intervals, slack));
     let at = tape.keep(Op::Floor(late));
     let zero = tape.keep(Op::Const(0));
@@ -368,7 +371,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
 /// Looks up samples for each member by itself, where members have times of their own.
 fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
-    let old = std::mem::take(tape);
+    let old = std::mem::replace(tape, Tape::new(tape.precision()));
     let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
     for op in old.ops() {
         let moved = op.with(|operand| place[operand as usize]);
@@ -418,7 +421,7 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> 
         operands[..n].iter().for_each(|id| uses[*id as usize] += 1);
     }
     next.iter().for_each(|id| uses[*id as usize] += 1);
-    let old = std::mem::take(tape);
+    let old = std::mem::replace(tape, Tape::new(tape.precision()));
     let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
     for (id, op) in old.ops().iter().enumerate() {
         let moved = match *op {
@@ -438,7 +441,7 @@ fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> 
 }
 
 impl Tape {
-    /// Adds the operations of another tape, and returns the place of each of its values. Decisions that were made there, such as which
+    /// Adds the operations of another tape of the same precision, and returns the place of each of its values. Decisions that were made there, such as which
     /// products are fused, remain.
     pub fn take_over(&mut self, other: &Tape) -> Vec<Id> {
         let mut place: Vec<Id> = Vec::with_capacity(other.ops().len());

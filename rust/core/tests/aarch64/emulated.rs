@@ -57,7 +57,7 @@ impl Case {
         };
         let assembled = assemble(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
         let case = |steps| {
-            let inputs = Inputs::new(random, &body, shape.lanes(), steps);
+            let inputs = Inputs::<f64>::new(random, &body, shape.lanes(), steps);
             Case { seed, body: body.clone(), assembled: assembled.clone(), inputs }
         };
         STEPS.map(case).into()

@@ -1,6 +1,7 @@
 //! Models of the core, by names and numbers.
 
 use stepwell_core::{
+    real::Precision,
     run::Model,
     spec::{Given, Row, Spec, Table},
     trace::{How, Scene},
@@ -34,7 +35,10 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
 /// A system stepped by a method.
 pub fn model<'a>(spec: Spec<'a>, method: &str) -> Model<'a> {
     let how = How::Method { name: method.to_owned(), choice: 0 };
-    Model { scene: Scene { given: spec.given.clone(), how, record: Vec::new(), fused: false }, spec }
+    Model {
+        scene: Scene { given: spec.given.clone(), how, record: Vec::new(), fused: false, precision: Precision::Double },
+        spec,
+    }
 }
 
 /// Free oscillators in canonical form.

@@ -11,14 +11,16 @@ pub fn read(kernel: &Written, is_fused: bool) -> usize {
     let mut decoder = Decoder::with_ip(64, code, 0, DecoderOptions::NONE);
     let mut starts = Vec::new();
     let mut branches = 0;
-    let row = 8 * frame.lanes as u64;
-    let block = 8 * (shape.width * shape.block_vectors) as u64;
+    let bytes = shape.bytes as u64;
+    let row = bytes * frame.lanes as u64;
+    let block = bytes * (shape.width * shape.block_vectors) as u64;
     let in_rows = |at: u64, size: u64, rows: usize| at / row < rows as u64 && at % row + size <= block;
     loop {
         let i = decoder.decode();
         assert!(!i.is_invalid(), "no instruction at {:#x}", i.ip());
         starts.push(i.ip());
-        assert!(is_known(i.mnemonic()) || is_fused && is_multiply_add(i.mnemonic()), "{i}");
+        let is_single = bytes == 4;
+        assert!(is_known(i.mnemonic(), is_single) || is_fused && is_multiply_add(i.mnemonic(), is_single), "{i}");
         moves += usize::from(matches!(
             i.mnemonic(),
             Mnemonic::Vshufpd
@@ -61,15 +63,15 @@ pub fn read(kernel: &Written, is_fused: bool) -> usize {
         if i.mnemonic() != Mnemonic::Nop && i.op_kinds().any(|kind| kind == OpKind::Memory) {
             let (size, at) = (i.memory_size().size() as u64, i.memory_displacement64());
             let writes = writes(&i);
-            let is_held = i.memory_index() == Register::RAX && i.memory_index_scale() == 8;
+            let is_held = i.memory_index() == Register::RAX && i.memory_index_scale() == shape.bytes as u32;
             assert!(is_held || i.memory_index() == Register::None, "{i}");
             let (inside, may_write) = match (i.memory_base(), is_held) {
                 (Register::RDI, false) => (in_rows(at, size, frame.body.next.len()), true),
                 (Register::RSI, false) => (in_rows(at, size, frame.body.rows), false),
                 (Register::R10, true) => (in_rows(at, size, 1), false),
-                (Register::RDX, false) => (at + size <= 8 * frame.pool as u64, false),
+                (Register::RDX, false) => (at + size <= bytes * frame.pool as u64, false),
                 (Register::R8, false) => (at + size <= 8 * frame.body.per_step as u64, false),
-                (Register::R9, false) => (at + size <= 8 * frame.scratch as u64, true),
+                (Register::R9, false) => (at + size <= bytes * frame.scratch as u64, true),
                 (Register::RBX, false) => (at + size <= 64, at == 56 && size == 4),
                 _ => (false, false),
             };
@@ -102,20 +104,29 @@ fn moves_on(i: &Instruction, block: u64, blocks: u64) {
     }
 }
 
-fn is_multiply_add(mnemonic: Mnemonic) -> bool {
+fn is_multiply_add(mnemonic: Mnemonic, is_single: bool) -> bool {
     let name = format!("{mnemonic:?}");
-    ["Vfmadd", "Vfmsub", "Vfnmadd"].iter().any(|kind| name.starts_with(kind)) && (name.ends_with("pd") || name.ends_with("sd"))
+    ["Vfmadd", "Vfmsub", "Vfnmadd"].iter().any(|kind| name.starts_with(kind))
+        && (name.ends_with(if is_single { "ps" } else { "pd" }) || name.ends_with(if is_single { "ss" } else { "sd" }))
 }
 
 /// What kernels are made of. What is not here is not exact, or not the same on all machines.
-fn is_known(mnemonic: Mnemonic) -> bool {
+fn is_known(mnemonic: Mnemonic, is_single: bool) -> bool {
     use Mnemonic::*;
     #[rustfmt::skip]
-    let known = [
+    let double = [
         Vaddpd, Vaddsd, Vsubpd, Vsubsd, Vmulpd, Vmulsd, Vdivpd, Vdivsd, Vsqrtpd, Vsqrtsd, Vcmppd, Vcmpsd, Vroundpd, Vroundsd,
         Vrndscalepd, Vrndscalesd, Vandpd, Vandnpd, Vorpd, Vxorpd, Vpaddq, Vpsllq, Vpsrlq, Vblendmpd, Vblendvpd, Vpternlogq, Vpmovm2q,
-        Vmovupd, Vmovapd, Vmovsd, Vbroadcastsd, Mov, Add, Dec, Jne, Push, Pop, Ret, Stmxcsr, Ldmxcsr, Vstmxcsr, Vldmxcsr, Vzeroupper, Nop,
+        Vmovupd, Vmovapd, Vmovsd, Vbroadcastsd,
         Vshufpd, Vinsertf128, Vinsertf64x2, Vextractf128, Vextractf64x2, Vpermpd,
     ];
-    known.contains(&mnemonic)
+    #[rustfmt::skip]
+    let single = [
+        Vaddps, Vaddss, Vsubps, Vsubss, Vmulps, Vmulss, Vdivps, Vdivss, Vsqrtps, Vsqrtss, Vcmpps, Vcmpss, Vroundps, Vroundss,
+        Vrndscaleps, Vrndscaless, Vandps, Vandnps, Vorps, Vxorps, Vpaddd, Vpslld, Vpsrld, Vblendmps, Vblendvps, Vpternlogd, Vpmovm2d,
+        Vmovups, Vmovaps, Vmovss, Vbroadcastss,
+    ];
+    #[rustfmt::skip]
+    let both = [Mov, Add, Dec, Jne, Push, Pop, Ret, Stmxcsr, Ldmxcsr, Vstmxcsr, Vldmxcsr, Vzeroupper, Nop];
+    both.contains(&mnemonic) || if is_single { single.contains(&mnemonic) } else { double.contains(&mnemonic) }
 }

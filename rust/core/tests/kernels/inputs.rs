@@ -4,27 +4,28 @@ use crate::random::Random;
 use stepwell_core::{
     isa::Level,
     kernel::{Kernel, Tile, writer::Shape},
+    real::Real,
     tape::{Op, split::Body},
 };
 
 /// Inputs of a kernel.
 #[derive(Clone)]
-pub struct Inputs {
-    pub state: Vec<f64>,
-    pub rows: Vec<f64>,
-    pub uniforms: Vec<f64>,
+pub struct Inputs<T = f64> {
+    pub state: Vec<T>,
+    pub rows: Vec<T>,
+    pub uniforms: Vec<T>,
     pub per_step: Vec<u64>,
-    pub held: Vec<f64>,
+    pub held: Vec<T>,
     pub steps: usize,
 }
 
-impl Inputs {
+impl<T: Real> Inputs<T> {
     /// For a body, over rows of so many lanes.
-    pub fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs {
-        let mut numbers = |n: usize| (0..n).map(|_| random.number()).collect::<Vec<f64>>();
+    pub fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs<T> {
+        let mut numbers = |n: usize| (0..n).map(|_| random.number_of()).collect::<Vec<T>>();
         let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
         let held = numbers(3 * lanes + 5);
-        let mut per_step: Vec<u64> = numbers(body.per_step * steps).into_iter().map(f64::to_bits).collect();
+        let mut per_step: Vec<u64> = numbers(body.per_step * steps).into_iter().map(T::pattern).collect();
         for op in &body.ops {
             if let Op::Held(i) = *op {
                 per_step
@@ -38,7 +39,7 @@ impl Inputs {
     }
 
     /// The state after a kernel has made the steps.
-    pub fn run(&self, kernel: &dyn Kernel, scratch: &mut Vec<f64>) -> Vec<f64> {
+    pub fn run(&self, kernel: &dyn Kernel<T>, scratch: &mut Vec<T>) -> Vec<T> {
         let mut state = self.state.clone();
         let pool = kernel.pool(&self.uniforms);
         kernel.run(
@@ -61,10 +62,10 @@ pub fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
     let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
     let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
     let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
-    Shape { level, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
+    Shape { level, bytes: 8, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
 }
 
 /// The same bits, or both NaN.
-pub fn same(a: f64, b: f64) -> bool {
-    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+pub fn same<T: Real>(a: T, b: T) -> bool {
+    a.pattern() == b.pattern() || (a.wide().is_nan() && b.wide().is_nan())
 }

@@ -18,6 +18,7 @@ use stepwell_core::{
         interpret::Interpreter,
         writer::{Shape, Written, choose, write},
     },
+    real::{Precision, Real},
     tape::{Op, split::Body},
 };
 
@@ -34,8 +35,19 @@ fn widths() -> Vec<(Level, usize)> {
     all.into_iter().filter(|(level, _)| level.here()).collect()
 }
 
+/// The same for numbers of that size: there is no machine code of NEON for those of 32 bits.
+fn widths_of(precision: Precision) -> Vec<(Level, usize)> {
+    match precision {
+        Precision::Double => widths(),
+        Precision::Single => {
+            let twice = |(level, width)| (level, if width > 1 { 2 * width } else { 1 });
+            widths().into_iter().filter(|(level, _)| *level != Level::Neon).map(twice).collect()
+        }
+    }
+}
+
 /// Compares a random body in a random shape with the interpreter; returns on how many inputs.
-fn one_case(seed: u64, read_code: bool) -> usize {
+fn one_case<T: Real>(seed: u64, read_code: bool) -> usize {
     let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95));
     let operations = match random.below(8) {
         0 => 3 + random.below(6),
@@ -44,12 +56,13 @@ fn one_case(seed: u64, read_code: bool) -> usize {
     };
     let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
     let body = random::body(random, operations, states);
-    let (level, width) = random.one_of(&widths());
+    let body = if T::PRECISION == Precision::Single { random::in_single(body) } else { body };
+    let (level, width) = random.one_of(&widths_of(T::PRECISION));
     let shape = if random.once_in(8) {
         let members = random.one_of(&[1, 2, 4, 5, 8, 9, 60, 1000]);
         choose(&body, level, members).unwrap()
     } else {
-        shape(random, level, width)
+        Shape { bytes: size_of::<T>(), ..shape(random, level, width) }
     };
     let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
     // On other CPUs the assembly is read: see `tests/aarch64`.
@@ -64,7 +77,7 @@ fn one_case(seed: u64, read_code: bool) -> usize {
     let oracle = Interpreter::new(&body, lanes, Level::Baseline);
     let mut scratch = Vec::new();
     for steps in [0, 1, 2, 7] {
-        let inputs = Inputs::new(random, &body, lanes, steps);
+        let inputs = Inputs::<T>::new(random, &body, lanes, steps);
         let (want, got) = (inputs.run(&oracle, &mut Vec::new()), inputs.run(&kernel, &mut scratch));
         for (at, (want, got)) in want.iter().zip(&got).enumerate() {
             let (s, lane) = (at / lanes, at % lanes);
@@ -80,21 +93,42 @@ fn random_bodies_have_the_bits_of_the_interpreter() {
     let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse().ok());
     let (mut seen, mut seed) = (0, 0);
     while seen < wanted.unwrap_or(400_000) {
-        seen += one_case(seed, seed % 4 == 0);
+        seen += one_case::<f64>(seed, seed % 4 == 0);
         seed += 1;
     }
     println!("{seed} bodies, {seen} pairs of a body and an input");
 }
 
+/// The same with numbers of 32 bits; half as many, since twice as many are in a vector.
+#[test]
+fn random_bodies_of_single_precision_have_the_bits_of_the_interpreter() {
+    let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse().ok());
+    let (mut seen, mut seed) = (0, 0);
+    while seen < wanted.unwrap_or(400_000) && !widths_of(Precision::Single).is_empty() {
+        seen += one_case::<f32>(seed, seed % 4 == 0);
+        seed += 1;
+    }
+    println!("{seed} bodies, {seen} pairs of a body and an input");
+}
+
+/// Code for numbers of one size is never called with those of the other.
+#[test]
+#[should_panic(expected = "precision")]
+fn a_tile_of_another_precision_is_refused() {
+    let kernel = written(&oscillator());
+    let body = Body { precision: Precision::Single, ..oscillator() };
+    Inputs::<f32>::new(&mut Random(1), &body, Kernel::<f32>::lanes(&kernel), 1).run(&kernel, &mut Vec::new());
+}
+
 fn oscillator() -> Body {
     // v' = v − φy, y' = y + φv'
     let ops = vec![Op::State(0), Op::State(1), Op::Row(0), Op::Mul(1, 2), Op::Sub(0, 3), Op::Mul(2, 4), Op::Add(1, 5)];
-    Body { ops, next: vec![4, 6], rows: 1, uniforms: 0, per_step: 0 }
+    Body { ops, next: vec![4, 6], rows: 1, ..Body::default() }
 }
 
 fn written(body: &Body) -> Written {
     let (level, width) = *widths().last().expect("machine code");
-    write(body, Shape { level, width, block_vectors: 2, interleaved: 2, blocks: 3, resident: true }).expect("a kernel")
+    write(body, Shape { level, bytes: 8, width, block_vectors: 2, interleaved: 2, blocks: 3, resident: true }).expect("a kernel")
 }
 
 #[test]
@@ -102,8 +136,8 @@ fn states_that_change_places_do() {
     let body = Body { ops: vec![Op::State(0), Op::State(1), Op::Copy(1), Op::Copy(0)], next: vec![2, 3], ..Body::default() };
     for (level, width) in widths() {
         for resident in [false, true] {
-            let shape = Shape { level, width, block_vectors: 2, interleaved: 2, blocks: 2, resident };
-            let inputs = Inputs::new(&mut Random(7), &body, shape.lanes(), 3);
+            let shape = Shape { level, bytes: 8, width, block_vectors: 2, interleaved: 2, blocks: 2, resident };
+            let inputs = Inputs::<f64>::new(&mut Random(7), &body, shape.lanes(), 3);
             let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
             let lanes = shape.lanes();
             assert!(got[..lanes].iter().zip(&inputs.state[lanes..]).all(|(a, b)| same(*a, *b)));
@@ -115,7 +149,7 @@ fn states_that_change_places_do() {
 #[test]
 fn what_is_no_body_is_not_written() {
     let (level, width) = *widths().last().expect("machine code");
-    let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
+    let shape = Shape { level, bytes: 8, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
     let good = oscillator();
     assert!(write(&good, shape).is_some());
     let bad = [
@@ -146,7 +180,7 @@ fn what_is_no_body_is_not_written() {
 #[should_panic(expected = "rows")]
 fn a_tile_that_is_too_small_is_refused() {
     let kernel = written(&oscillator());
-    let mut inputs = Inputs::new(&mut Random(1), &oscillator(), kernel.lanes(), 1);
+    let mut inputs = Inputs::<f64>::new(&mut Random(1), &oscillator(), Kernel::<f64>::lanes(&kernel), 1);
     inputs.rows.pop();
     inputs.run(&kernel, &mut Vec::new());
 }
@@ -154,7 +188,7 @@ fn a_tile_that_is_too_small_is_refused() {
 #[test]
 fn four_threads_run_one_kernel() {
     let kernel = written(&oscillator());
-    let inputs = Inputs::new(&mut Random(3), &oscillator(), kernel.lanes(), 1000);
+    let inputs = Inputs::<f64>::new(&mut Random(3), &oscillator(), Kernel::<f64>::lanes(&kernel), 1000);
     let want = inputs.run(&kernel, &mut Vec::new());
     std::thread::scope(|scope| {
         for _ in 0..4 {
@@ -173,8 +207,8 @@ fn long_rows_are_gone_through_once() {
     // One step over 100 000 numbers, as elementwise functions are.
     let (level, width) = *widths().last().expect("machine code");
     let body = oscillator();
-    let shape = Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 100_000 / width, resident: false };
-    let inputs = Inputs::new(&mut Random(9), &body, shape.lanes(), 2);
+    let shape = Shape { level, bytes: 8, width, block_vectors: 1, interleaved: 1, blocks: 100_000 / width, resident: false };
+    let inputs = Inputs::<f64>::new(&mut Random(9), &body, shape.lanes(), 2);
     let got = inputs.run(&write(&body, shape).expect("a kernel"), &mut Vec::new());
     let want = inputs.run(&Interpreter::new(&body, shape.lanes(), level), &mut Vec::new());
     assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
@@ -190,7 +224,7 @@ const OTHER_ROUNDING: u64 = 1 << 22 | 1 << 24;
 #[test]
 fn rounding_is_to_nearest_whatever_the_caller_does() {
     let kernel = written(&oscillator());
-    let inputs = Inputs::new(&mut Random(5), &oscillator(), kernel.lanes(), 50);
+    let inputs = Inputs::<f64>::new(&mut Random(5), &oscillator(), Kernel::<f64>::lanes(&kernel), 50);
     let want = inputs.run(&kernel, &mut Vec::new());
     let (got, after) = process::with_other_rounding(|| inputs.run(&kernel, &mut Vec::new()));
     assert!(want.iter().zip(&got).all(|(a, b)| same(*a, *b)));
@@ -218,7 +252,7 @@ fn a_trail_has_the_states_of_its_steps() {
         }
         let (lanes, steps) = (random.one_of(&[1, 4, 8]), 1 + random.below(9));
         let trail = body.trail(steps, state, [v, y]);
-        let inputs = Inputs::new(random, &body, lanes, steps);
+        let inputs = Inputs::<f64>::new(random, &body, lanes, steps);
         // One after the other.
         let oracle = Interpreter::new(&body, lanes, Level::Baseline);
         let (mut want_v, mut want_y) = (Vec::new(), Vec::new());
@@ -240,7 +274,7 @@ fn a_trail_has_the_states_of_its_steps() {
         let width = if lanes == 1 { 1 } else { widest };
         let block_vectors = random.one_of(&[1, lanes / width]);
         let blocks = lanes / width / block_vectors;
-        let shape = Shape { level, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
+        let shape = Shape { level, bytes: 8, width, block_vectors, interleaved: block_vectors, blocks, resident: false };
         let written = level.here().then(|| write(&trail, shape).expect("a kernel"));
         let interpreter = Interpreter::new(&trail, lanes, Level::Baseline);
         for kernel in

@@ -12,8 +12,9 @@ use stepwell_core::{
     kernel::{
         interpret::Interpreter,
         pack::{self, Make, Move, Packed, Trial},
-        writer::write_packed,
+        writer::{choose, write_if_it_gains, write_packed},
     },
+    real::Precision,
     tape::{Id, Op, split::Body},
 };
 
@@ -62,7 +63,7 @@ fn one_packed(seed: u64) -> [usize; 2] {
     #[cfg(not(target_arch = "x86_64"))]
     let moves = 0;
     let oracle = Interpreter::new(&body, 1, Level::Baseline);
-    let mut scratch = Vec::new();
+    let mut scratch = Vec::<f64>::new();
     for steps in [0, 1, 2, 7] {
         let inputs = Inputs::new(random, &body, 1, steps);
         let (want, got) = (inputs.run(&oracle, &mut Vec::new()), inputs.run(&kernel, &mut scratch));
@@ -165,6 +166,22 @@ fn a_mistake_in_a_packing_is_noticed() {
         }
     }
     assert!(seen.iter().all(|seen| *seen == 0 || *seen > 100), "{seen:?}");
+}
+
+/// Packed code is for numbers of 64 bits.
+#[test]
+fn a_body_of_single_precision_is_not_packed() {
+    let Some((level, _)) = widths().into_iter().rfind(|(level, _)| *level >= Level::Avx2) else { return };
+    for (n, precision) in [3, 4].into_iter().flat_map(|n| [Precision::Double, Precision::Single].map(|precision| (n, precision)))
+    {
+        let body = Body { precision, ..ring(n) };
+        let is_double = precision == Precision::Double;
+        let shape = choose(&body, level, 1).expect("a shape");
+        assert_eq!(shape.packs(), is_double);
+        let packed = pack::pack(&body, Trial { together: 1, roots: 4, again: true }).expect("a packing");
+        assert_eq!(write_packed(&body, level, &packed).is_some(), is_double);
+        assert!(is_double || write_if_it_gains(&body, shape).is_none());
+    }
 }
 
 #[test]

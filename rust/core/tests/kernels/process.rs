@@ -94,9 +94,12 @@ fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
         return;
     }
     let (level, width) = *crate::widths().last().expect("machine code");
-    assert!(write(&oscillator(), Shape { level, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true }).is_none());
+    assert!(
+        write(&oscillator(), Shape { level, bytes: 8, width, block_vectors: 1, interleaved: 1, blocks: 1, resident: true })
+            .is_none()
+    );
     // What was there before goes on.
-    let inputs = crate::Inputs::new(&mut crate::Random(1), &oscillator(), before.lanes(), 3);
+    let inputs = crate::Inputs::<f64>::new(&mut crate::Random(1), &oscillator(), crate::Kernel::<f64>::lanes(&before), 3);
     inputs.run(&before, &mut Vec::new());
     println!("refused, as it should be");
 }
@@ -106,7 +109,7 @@ fn where_pages_cannot_be_made_executable_there_is_no_kernel() {
 #[test]
 fn a_child_process_runs_the_kernels_of_its_parent() {
     let kernel = written(&oscillator());
-    let inputs = crate::Inputs::new(&mut crate::Random(2), &oscillator(), kernel.lanes(), 100);
+    let inputs = crate::Inputs::<f64>::new(&mut crate::Random(2), &oscillator(), crate::Kernel::<f64>::lanes(&kernel), 100);
     let want = inputs.run(&kernel, &mut Vec::new());
     let (mut scratch, mut state) = (vec![0.0; 1000], inputs.state.clone());
     let pool = kernel.pool(&inputs.uniforms);

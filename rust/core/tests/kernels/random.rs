@@ -1,6 +1,9 @@
 //! Random bodies and inputs, the same from the same seed.
 
-use stepwell_core::tape::{Id, Op, split::Body};
+use stepwell_core::{
+    real::{Precision, Real},
+    tape::{Id, Op, split::Body},
+};
 
 /// SplitMix64.
 pub struct Random(pub u64);
@@ -43,6 +46,30 @@ impl Random {
         };
         f64::from_bits(size.to_bits() ^ sign)
     }
+}
+
+impl Random {
+    /// The same for either size of numbers: of 32 bits often any bits, or a subnormal one.
+    pub fn number_of<T: Real>(&mut self) -> T {
+        match (T::PRECISION, self.below(8)) {
+            (Precision::Single, 0) => T::from_pattern(self.bits()),
+            (Precision::Single, 1) => T::from_pattern(self.bits() & 0x807F_FFFF),
+            _ => T::of(self.number()),
+        }
+    }
+}
+
+/// The same body for numbers of 32 bits.
+#[allow(dead_code, reason = "not all tests have such bodies")]
+pub fn in_single(body: Body) -> Body {
+    let ops = body.ops.iter().map(|op| match *op {
+        Op::Const(u64::MAX) => Op::Const(Precision::Single.all_bits()),
+        Op::Const(bits) => Op::Const(Precision::Single.bits_of(f64::from_bits(bits))),
+        Op::ShiftUp(a, places) => Op::ShiftUp(a, places % 32),
+        Op::ShiftDown(a, places) => Op::ShiftDown(a, places % 32),
+        other => other,
+    });
+    Body { ops: ops.collect(), precision: Precision::Single, ..body }
 }
 
 /// A body in the making.
@@ -185,7 +212,7 @@ pub fn body(random: &mut Random, operations: usize, states: usize) -> Body {
         taken[id as usize] = true;
         next.push(id);
     }
-    let body = Body { ops: maker.ops, next, rows, uniforms, per_step };
+    let body = Body { ops: maker.ops, next, rows, uniforms, per_step, precision: Precision::Double };
     if random.once_in(5) { body } else { needed(body) }
 }
 

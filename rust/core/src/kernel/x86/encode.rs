@@ -4,25 +4,54 @@
 //! operand is a whole vector) or EVEX (AVX-512: 32 registers, a memory operand may be one number for all lanes). Both say the same
 //! things, so that one table of [`Form`]s serves both. Intel's manual, volume 2, sections 2.3 and 2.7.
 
-/// An opcode and what selects it. All are for numbers of 64 bits.
+/// An opcode and what selects it.
 #[derive(Clone, Copy, Debug)]
 pub struct Form {
     /// The opcode map: 1 is 0F, 2 is 0F 38, 3 is 0F 3A.
     pub map: u8,
-    /// Over vectors: the mandatory prefix (0 none, 1 is 66, 2 is F3, 3 is F2) and the opcode.
-    pub vector: (u8, u8),
-    /// The same for the first number of a vector only, if there is such an instruction.
-    pub single: Option<(u8, u8)>,
-    /// Whether VEX has to say that numbers are of 64 bits (W). EVEX always does.
+    /// Of numbers of 64 bits.
+    pub double: Codes,
+    /// Of numbers of 32 bits.
+    pub single: Codes,
+    /// Whether VEX has to say (W) that numbers are of 64 bits. EVEX always does.
     pub wide: bool,
 }
 
-const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
-    Form { map, vector: (prefix, opcode), single: None, wide: false }
+/// The mandatory prefix (0 none, 1 is 66, 2 is F3, 3 is F2) and the opcode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Codes {
+    /// Over vectors.
+    pub vector: (u8, u8),
+    /// For the first number of a vector only, if there is such an instruction.
+    pub first: Option<(u8, u8)>,
 }
 
+const fn codes(prefix: u8, opcode: u8) -> Codes {
+    Codes { vector: (prefix, opcode), first: None }
+}
+
+/// An instruction that is the same for both sizes of numbers, but for what EVEX says.
+const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
+    Form { map, double: codes(prefix, opcode), single: codes(prefix, opcode), wide: false }
+}
+
+/// The same with another opcode for numbers of 32 bits.
+const fn sized(map: u8, prefix: u8, double: u8, single: u8) -> Form {
+    Form { single: codes(prefix, single), ..form(map, prefix, double) }
+}
+
+/// Numbers of 64 bits have the prefix 66, those of 32 bits have none.
+const fn plain(opcode: u8) -> Form {
+    Form { single: codes(0, opcode), ..form(1, P66, opcode) }
+}
+
+/// The same with an instruction for the first number only.
 const fn arithmetic(opcode: u8) -> Form {
-    Form { single: Some((PF2, opcode)), ..form(1, P66, opcode) }
+    Form {
+        double: Codes { first: Some((PF2, opcode)), ..codes(P66, opcode) },
+        single: Codes { first: Some((PF3, opcode)), ..codes(0, opcode) },
+        ..form(1, P66, opcode)
+    }
 }
 
 const P66: u8 = 1;
@@ -36,7 +65,11 @@ pub const DIV: Form = arithmetic(0x5E);
 pub const SQRT: Form = arithmetic(0x51);
 pub const COMPARE: Form = arithmetic(0xC2);
 /// Rounds to a whole number as the byte behind says.
-pub const ROUND: Form = Form { single: Some((P66, 0x0B)), ..form(3, P66, 0x09) };
+pub const ROUND: Form = Form {
+    double: Codes { first: Some((P66, 0x0B)), ..codes(P66, 0x09) },
+    single: Codes { first: Some((P66, 0x0A)), ..codes(P66, 0x08) },
+    ..form(3, P66, 0x09)
+};
 /// A fused multiply-add overwrites one of its operands; which one, the instruction says.
 #[derive(Clone, Copy, Debug)]
 pub struct Fused {
@@ -50,7 +83,8 @@ pub struct Fused {
 
 const fn fused(opcode: u8) -> Fused {
     const fn of(opcode: u8) -> Form {
-        Form { single: Some((P66, opcode + 1)), wide: true, ..form(2, P66, opcode) }
+        let both = Codes { first: Some((P66, opcode + 1)), ..codes(P66, opcode) };
+        Form { map: 2, double: both, single: both, wide: true }
     }
     Fused { over_factor: of(opcode), over_other: of(opcode + 0x10), over_term: of(opcode + 0x20) }
 }
@@ -61,30 +95,30 @@ pub const MUL_ADD: Fused = fused(0x98);
 pub const MUL_SUB: Fused = fused(0x9A);
 /// c − a · b
 pub const SUB_MUL: Fused = fused(0x9C);
-pub const AND: Form = form(1, P66, 0x54);
+pub const AND: Form = plain(0x54);
 /// Not the first, and the second.
-pub const AND_NOT: Form = form(1, P66, 0x55);
-pub const OR: Form = form(1, P66, 0x56);
-pub const XOR: Form = form(1, P66, 0x57);
-pub const ADD_BITS: Form = form(1, P66, 0xD4);
+pub const AND_NOT: Form = plain(0x55);
+pub const OR: Form = plain(0x56);
+pub const XOR: Form = plain(0x57);
+pub const ADD_BITS: Form = sized(1, P66, 0xD4, 0xFE);
 /// Shifts by the byte behind; the place of the result in the operands says which way, [`UP`] or [`DOWN`].
-pub const SHIFT: Form = form(1, P66, 0x73);
+pub const SHIFT: Form = sized(1, P66, 0x73, 0x72);
 pub const UP: u8 = 6;
 pub const DOWN: u8 = 2;
 /// The second where a bit of the mask is set, else the first (EVEX).
 pub const BLEND: Form = form(2, P66, 0x65);
 /// The second where the sign of a third register is set, else the first (VEX).
-pub const BLEND_BY_SIGN: Form = form(3, P66, 0x4B);
+pub const BLEND_BY_SIGN: Form = sized(3, P66, 0x4B, 0x4A);
 /// Any function of three bits (EVEX).
 pub const BITS_OF_THREE: Form = form(3, P66, 0x25);
 /// All ones where a bit of the mask is set (EVEX).
 pub const SPREAD_MASK: Form = form(2, PF3, 0x38);
-pub const LOAD: Form = Form { single: Some((PF2, 0x10)), ..form(1, P66, 0x10) };
-pub const STORE: Form = Form { single: Some((PF2, 0x11)), ..form(1, P66, 0x11) };
+pub const LOAD: Form = arithmetic(0x10);
+pub const STORE: Form = arithmetic(0x11);
 /// From register to register.
-pub const MOVE: Form = form(1, P66, 0x28);
+pub const MOVE: Form = plain(0x28);
 /// One number to all lanes.
-pub const BROADCAST: Form = form(2, P66, 0x19);
+pub const BROADCAST: Form = sized(2, P66, 0x19, 0x18);
 
 /// A vector of two: a number of the first and one of the second, by the byte behind.
 pub const PICK: Form = form(1, P66, 0xC6);
@@ -115,7 +149,7 @@ pub enum General {
 pub struct Memory {
     pub base: General,
     pub at: i32,
-    /// Eight times what is in rax is added.
+    /// What is in rax is added, as so many numbers.
     pub indexed: bool,
     /// One number, for all lanes.
     pub broadcast: bool,
@@ -140,11 +174,18 @@ pub struct Code {
     pub bytes: Vec<u8>,
     /// EVEX and not VEX.
     pub evex: bool,
-    /// How many numbers a vector has: 1, 2, 4 or 8.
+    /// How many numbers a vector has.
     pub width: usize,
+    /// The size of a number in bytes: 8 or 4.
+    pub size: usize,
 }
 
 impl Code {
+    /// What there is of a form for numbers of this size.
+    pub fn codes(&self, form: Form) -> Codes {
+        if self.size == 8 { form.double } else { form.single }
+    }
+
     /// An instruction on vectors: `to` ← `first`, `second`. In a kernel of width one it works on the first number only, where there is
     /// such an instruction, and on 128 bits otherwise. What has no `first` is given 0.
     pub fn vector(&mut self, form: Form, to: u8, first: u8, second: Operand) {
@@ -159,27 +200,34 @@ impl Code {
 
     /// As `vector`, with a mask register.
     pub fn masked(&mut self, form: Form, to: u8, first: u8, second: Operand, mask: u8) {
-        let single = form.single.filter(|_| self.width == 1);
-        let (prefix, opcode) = single.unwrap_or(form.vector);
+        let codes = self.codes(form);
+        let first_only = codes.first.filter(|_| self.width == 1);
+        let (prefix, opcode) = first_only.unwrap_or(codes.vector);
+        let wide = u8::from(self.size == 8);
         let no = |x: u8, bit: u8| (!x >> bit) & 1;
         // The bits of the second operand's number that are in the prefix: of a register, or of base and index.
         let (b, x) = match second {
             Operand::Register(r) => (no(r, 3), no(r, 4)),
             Operand::Memory(m) => (no(m.base as u8, 3), 1),
         };
-        let length = if self.width == 8 { 2 } else { u8::from(self.width == 4) };
+        let length = match self.width * self.size {
+            64 => 2,
+            32 => 1,
+            _ => 0,
+        };
         if self.evex {
             let broadcast = matches!(second, Operand::Memory(Memory { broadcast: true, .. }));
             let high = no(to, 3) << 7 | x << 6 | b << 5 | no(to, 4) << 4 | form.map;
-            let middle = 1 << 7 | (!first & 15) << 3 | 1 << 2 | prefix;
+            let middle = wide << 7 | (!first & 15) << 3 | 1 << 2 | prefix;
             let low = length << 5 | u8::from(broadcast) << 4 | no(first, 4) << 3 | mask;
             self.bytes.extend([0x62, high, middle, low, opcode]);
             // A short displacement counts in units of what is read.
-            let unit = if single.is_some() || broadcast || form.vector == BROADCAST.vector { 8 } else { 8 * self.width as i32 };
-            self.operand(to & 7, second, unit);
+            let one = first_only.is_some() || broadcast || codes == self.codes(BROADCAST);
+            let unit = self.size * if one { 1 } else { self.width };
+            self.operand(to & 7, second, unit as i32);
         } else {
             self.bytes.extend([0xC4, no(to, 3) << 7 | 1 << 6 | b << 5 | form.map]);
-            self.bytes.extend([u8::from(form.wide) << 7 | (!first & 15) << 3 | (length & 1) << 2 | prefix, opcode]);
+            self.bytes.extend([(u8::from(form.wide) & wide) << 7 | (!first & 15) << 3 | (length & 1) << 2 | prefix, opcode]);
             self.operand(to & 7, second, 1);
         }
     }
@@ -197,7 +245,8 @@ impl Code {
         };
         let base = m.base as u8 & 7;
         if m.indexed {
-            self.bytes.extend([mode | register << 3 | 4, 0xC0 | base]);
+            let scale = self.size.trailing_zeros() as u8;
+            self.bytes.extend([mode | register << 3 | 4, scale << 6 | base]);
         } else {
             self.bytes.push(mode | register << 3 | base);
         }

@@ -99,7 +99,12 @@ impl Machine for Code {
     const PACKS: bool = true;
 
     fn new(shape: Shape, instructions: usize) -> Code {
-        Code { bytes: Vec::with_capacity(16 * instructions + 512), evex: shape.level == Level::Avx512, width: shape.width }
+        Code {
+            bytes: Vec::with_capacity(16 * instructions + 512),
+            evex: shape.level == Level::Avx512,
+            width: shape.width,
+            size: shape.bytes,
+        }
     }
 
     fn doing(&self, op: Op) -> Doing {
@@ -128,7 +133,7 @@ impl Machine for Code {
     }
 
     fn negate(&self) -> (Doing, Option<u64>) {
-        (Doing::Two(x::XOR, true), Some(1 << 63))
+        (Doing::Two(x::XOR, true), Some(1 << (8 * self.size - 1)))
     }
 
     fn select(&self, is_mask: bool) -> Doing {
@@ -160,7 +165,7 @@ impl Machine for Code {
             }
             Doing::One(form, byte) => {
                 // Of single numbers such an instruction has two operands: the other lanes are those of the first.
-                let single = writer.code.width == 1 && form.single.is_some();
+                let single = writer.code.width == 1 && form.double.first.is_some();
                 let second = if single { Operand::Register(writer.fetch(of[0])?) } else { writer.operand(of[0], form)? };
                 let first = if let (true, Operand::Register(register)) = (single, second) { register } else { 0 };
                 let to = writer.result(step.id, vector, of)?;
@@ -288,7 +293,7 @@ impl Writer<'_, Code> {
     fn in_place(&self, value: Value, form: Form) -> Option<Memory> {
         let source = self.source(value);
         let single = self.code.width == 1;
-        let is_whole = single && form.single.is_some();
+        let is_whole = single && form.double.first.is_some();
         let has_home = self.plan.packing.is_some() && !matches!(source, Source::PerStep(_));
         let can = match source {
             // Its address must be loaded first.

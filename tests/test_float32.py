@@ -1,0 +1,474 @@
+"""float32: every operation of a step rounded to 24 bits, the same bits by core and reference, and functions of its own."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS, Case, assert_same, cases, thinned
+from hypothesis import given
+from hypothesis import strategies as st
+from stepwell import _core, engine
+from stepwell.errors import ArgumentError, DTypeError, TraceError, UnsupportedError
+from stepwell.reference import functions, trig
+from stepwell.reference.functions import single as own
+from stepwell.reference.fused import odd_sum
+from stepwell.reference.single import evaluated, fma
+from stepwell.reference.traced import Tracer
+from test_graphs import assert_one_graph, methods
+from test_tracing import made
+
+F = np.float32
+SOME = {"direct": 1}
+
+
+def refusal(case: Case) -> str | None:
+    """Why float32 does not go with this case, or None."""
+    try:
+        case.run(1, steps=1, every=None, dtype="float32")
+    except (UnsupportedError, ArgumentError, TraceError) as error:
+        return str(error)
+    return None
+
+
+DIRECT = [case for case in cases() if case.form == "direct"]
+
+
+# ---- the same bits
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
+@pytest.mark.parametrize("case", thinned(DIRECT, SOME, "float32 equals the reference"))
+@pytest.mark.parametrize("fused", [False, True])
+def test_equals_the_reference(case: Case, fused: bool) -> None:
+    if (why := refusal(case)) is not None:
+        assert "dtype: " in why
+        return
+    for b in (33,) if fused else (1, 33):
+        run, again = (case.run(b, dtype="float32", fused=fused, backend=backend) for backend in ("rust", "numpy"))
+        assert run.y.dtype == run.v.dtype == again.y.dtype == again.v.dtype == F
+        assert_same(run, again)
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
+@pytest.mark.parametrize("case", thinned(DIRECT, SOME, "float32 does not depend on the kernels"))
+def test_machine_code_equals_the_interpreter(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By so many steps that machine code is written; saved at every step and at some."""
+    if refusal(case) is not None:
+        return
+    for b, every in ((1, 7), (37, 1), (300, 7)):
+        options = {"steps": 410, "every": every, "dtype": "float32", "dt": 0.02}
+        runs = []
+        for level in sw.isa_levels():
+            monkeypatch.setenv("STEPWELL_ISA", level)
+            runs.append(case.run(b, **options))
+        for run in runs[1:]:
+            assert_same(run, runs[0])
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_step_of_both_is_one_graph(name: str) -> None:
+    system, _, _ = made(name)
+    for method in methods(system):
+        if method.has_series:  # which is refused
+            continue
+        try:
+            model = engine.model(engine.Plan(system, method, system.batch, 0.1, single=True))
+        except TraceError:
+            with pytest.raises(TraceError, match=r"has no version of float32"):
+                Tracer(system, _core.Tape(single=True)).step(method)
+            continue
+        tape = _core.Tape(single=True)
+        assert_one_graph(tape, tape.trace(model, "step"), Tracer(system, tape).step(method))
+
+
+def test_it_does_not_depend_on_threads_company_or_pieces() -> None:
+    case = next(case for case in DIRECT if (case.method, case.system) == ("verlet", "pendulum, sinusoid a"))
+    together = case.run(700, dtype="float32", threads=1, every=1)
+    assert_same(case.run(700, dtype="float32", threads=7, every=1), together)
+    system, arguments = case.make(700)
+    run = sw.integrate(system, **arguments, dtype="float32", steps=9)
+    assert run.resume["dtype"] == "float32"
+    run = sw.integrate(system, case.method, **run.resume, steps=14, every=1)
+    np.testing.assert_array_equal(run.y[-1], together.y[-1])
+    np.testing.assert_array_equal(run.v[-1], together.v[-1])
+
+
+@pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 0}, "float32 diverges alike"))
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
+def test_diverging_members_too(case: Case) -> None:
+    """In the long run only: the next test has a few members that diverge."""
+    if refusal(case) is None:
+        options = {"dt": 60.0, "steps": 60, "every": 20, "dtype": "float32"}
+        assert_same(case.run(40, **options), case.run(40, **options, backend="numpy"))
+
+
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+def test_members_diverge_where_the_range_of_float32_ends(method: str) -> None:
+    system = sw.Oscillator(np.linspace(1.0, 60.0, 40))
+    options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.2, "steps": 400, "dtype": "float32"}
+    run = sw.integrate(system, method, **options)
+    assert_same(run, sw.integrate(system, method, **options, backend="numpy"))
+    wide = sw.integrate(system, method, **(options | {"dtype": "float64"}))
+    bad = run.first_bad_step
+    assert bad[0] == -1
+    assert (bad > 0).any()
+    assert (bad[wide.first_bad_step > 0] > 0).all()
+    assert (bad[bad > 0] != wide.first_bad_step[bad > 0]).any()
+
+
+def test_small_and_large_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    for level in sw.isa_levels():
+        monkeypatch.setenv("STEPWELL_ISA", level)
+        for scale in (1e-45, 1e-38, 1e-30, 1e30, 3e37):
+            arguments = {"v": scale * np.linspace(-1, 1, 50), "y": scale, "dt": 0.1, "steps": 50, "every": 1, "dtype": "float32"}
+            run = sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments)
+            assert_same(run, sw.integrate(sw.Oscillator(1.3, 0.1), "rk4", **arguments, backend="numpy"))
+
+
+@pytest.mark.parametrize("members", [3, 300])
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4"])
+def test_a_world_steps_arrays_of_float32_in_place(method: str, members: int) -> None:
+    """A few numbers are copied, many are stepped where they are; a force changes between steps; another world goes on."""
+    rng = np.random.default_rng(4)
+    system = sw.Pendulum(rng.uniform(0.5, 2.0, members))
+    v, y = (rng.normal(size=members).astype(F) for _ in range(2))
+    options: dict[str, Any] = {"dt": 0.1, "dtype": "float32"}
+    run = sw.integrate(system, method, v=v, y=y, steps=300, every=100, **options)
+    world = sw.World(system, method, v=v, y=y, **options)
+    for i in (1, 2):
+        world.step(100)
+        np.testing.assert_array_equal(y, run.y[i])
+        np.testing.assert_array_equal(v, run.v[i])
+    later = sw.World(system, method, dt=0.1, **world.resume)
+    assert later.y.dtype == F
+    later.step(100)
+    np.testing.assert_array_equal(later.y, run.y[3])
+    on = sw.integrate(system, method, dt=0.1, steps=100, **world.resume)
+    np.testing.assert_array_equal(on.y[-1], run.y[3])
+    # Pushed from outside, by numbers of float32.
+    force = np.zeros(members, dtype=F)
+    v, y = (rng.normal(size=members).astype(F) for _ in range(2))
+    pushed = sw.integrate(system, "rk4", v=v, y=y, steps=50, force=0.1, **options)
+    world = sw.World(system, "rk4", v=v, y=y, force=force, **options)
+    force[:] = 0.1
+    world.step(50)
+    np.testing.assert_array_equal(y, pushed.y[-1])
+
+
+def test_a_world_takes_arrays_of_its_dtype_only() -> None:
+    for dtype, other in (("float32", np.float64), ("float64", np.float32)):
+        with pytest.raises(DTypeError, match=rf"^v: expected dtype {dtype} to step in place, got {np.dtype(other)}"):
+            sw.World(sw.Oscillator(), "rk4", v=np.zeros(3, other), y=np.zeros(3, dtype), dt=0.1, dtype=dtype)
+    with pytest.raises(UnsupportedError, match=r"does not go with taylor"):
+        sw.World(sw.Oscillator(), "taylor", v=np.zeros(1, F), y=np.zeros(1, F), dt=0.1, dtype="float32")
+    with pytest.raises(UnsupportedError, match=r"does not go with samples"):
+        sw.World(sw.Oscillator(x=sw.Sampled([0.0, 1.0], 1.0)), "rk4", v=np.zeros(1, F), y=np.zeros(1, F), dt=0.1, dtype="float32")
+
+
+# ---- what is computed
+
+
+def test_it_is_what_numpy_makes_of_numbers_of_float32() -> None:
+    """Written out, without tapes: v ← v − Φ·y, y ← y + Φ·v with Φ = ω₀·h, and a drive whose time is rounded once."""
+    omega, dt = F(1.7), F(0.1)
+    v, y, phi = F(0.0), F(1.0), omega * dt
+    seen = []
+    for _ in range(200):
+        v = v - phi * y
+        y = y + phi * v
+        seen.append(y)
+    assert isinstance(y, F)
+    run = sw.integrate(sw.Oscillator(1.7), "false_euler", v=0.0, y=1.0, dt=0.1, steps=200, every=1, dtype="float32")
+    np.testing.assert_array_equal(run.y[1:], np.array(seen))
+    assert run.dt == float(dt) != 0.1
+    np.testing.assert_array_equal(run.t, np.arange(201) * float(dt))
+
+
+def test_its_error_is_that_of_24_bits() -> None:
+    """RK4 on an oscillator has 4 stages of 4 operations, each rounding to 2⁻²⁴ of numbers below 1.2: 20·2⁻²⁴ a step at most."""
+    options: dict[str, Any] = {"v": 0.0, "y": np.linspace(0.5, 1.0, 64), "dt": F(0.1), "steps": 500, "every": 1}
+    wide, run = (sw.integrate(sw.Oscillator(), "rk4", **options, dtype=dtype) for dtype in ("float64", "float32"))
+    apart = np.abs(run.y - wide.y).max(axis=1)
+    assert (apart <= 20 * 2.0**-24 * np.maximum(1, np.arange(501))).all()
+    assert apart[-1] > 2.0**-26  # and it is not float64
+
+
+def test_quantities_are_computed_in_float64_from_the_states() -> None:
+    options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 50, "every": 1, "dtype": "float32", "record": "energy"}
+    run = sw.integrate(sw.Oscillator(), "rk4", **options)
+    assert run.energy.dtype == np.float64
+    v, y = run.v.astype(float), run.y.astype(float)
+    np.testing.assert_allclose(run.energy, 0.5 * (v * v + y * y), rtol=1e-15)
+    assert "float32" in repr(run)
+    assert run.dtype == "float32"
+
+
+def test_a_control_keeps_the_energy() -> None:
+    rng = np.random.default_rng(5)
+    v, y = 0.3 * rng.normal(size=(3, 2, 20)), rng.normal(size=(3, 2, 20))
+    options: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 300, "every": 50, "dtype": "float32"}
+    for control in (sw.EnergyControl(1.0), sw.Projection()):
+        run = sw.integrate(sw.NBody(softening=0.3), "rk4", control=control, **options)
+        again = sw.integrate(sw.NBody(softening=0.3), "rk4", control=control, backend="numpy", **options)
+        assert_same(run, again)
+        np.testing.assert_array_equal(run.work, again.work)
+        # Each of some hundred operations of an energy is rounded to 2⁻²⁴ of numbers of its size or some times larger.
+        assert np.abs(run.energy - run.energy[0]).max() < 500 * 2.0**-24 * (1.0 + np.abs(run.energy[0]).max())
+
+
+# ---- fused multiply-adds of float32
+
+SINGLES = st.floats(width=32, allow_nan=True, allow_infinity=True)
+
+
+def rounded_once(a: float, b: float, c: float) -> np.float32:
+    """a·b + c rounded to float32 by rational arithmetic, or as IEEE 754 has it where that has no answer."""
+    if not (math.isfinite(a) and math.isfinite(b)):
+        return F(a * b + c)
+    if not math.isfinite(c):
+        return F(c)
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    if not exact:
+        return F(a * b + c)
+    size = abs(exact)
+    exponent = max(-126, math.floor(math.log2(size.numerator) - math.log2(size.denominator)))
+    exponent += (Fraction(2) ** (exponent + 1) <= size) - (Fraction(2) ** exponent > size and exponent > -126)
+    unit = Fraction(2) ** (exponent - 23)
+    whole = round(size / unit)  # Python rounds halves to even
+    with np.errstate(over="ignore"):
+        return F(math.copysign(float(whole * unit), exact)) if whole * unit < 2**128 else F(math.copysign(np.inf, exact))
+
+
+def same(a: Any, b: Any) -> bool:
+    return bool((np.isnan(a) and np.isnan(b)) or (a == b and np.signbit(a) == np.signbit(b)))
+
+
+@given(SINGLES, SINGLES, SINGLES)
+def test_a_product_and_a_sum_are_rounded_once(a: float, b: float, c: float) -> None:
+    with np.errstate(all="ignore"):
+        assert same(fma(F(a), F(b), F(c)), rounded_once(a, b, c)), (a, b, c)
+
+
+def test_where_two_roundings_would_differ() -> None:
+    """Sums near the middle between two numbers of float32: rounded to float64 first, some would go the wrong way."""
+    rng = np.random.default_rng(2)
+    a = F(1.0) + F(2.0**-23) * rng.integers(0, 2**12, 4000).astype(F)
+    b = F(1.0) + F(2.0**-23) * rng.integers(0, 2**12, 4000).astype(F)
+    c = (F(2.0) ** rng.integers(24, 34, 4000)).astype(F) * rng.integers(1, 4, 4000).astype(F)
+    c[::2] = -np.nextafter((a.astype(float) * b)[::2].astype(F), F(9.0)) * F(2.0**-3)
+    want = np.array([rounded_once(*map(float, each)) for each in zip(a, b, c, strict=True)])
+    np.testing.assert_array_equal(fma(a, b, c), want)
+    tiny = F(2.0**-60) * rng.choice([-1, 1], 4000).astype(F)
+    halves = (F(1.0) + F(2.0**-23) * rng.integers(0, 99, 4000).astype(F)).astype(F)
+    # The product is half a last place of the sum, and the tiny rest decides.
+    small = np.array([rounded_once(float(h), 1.0 + 2.0**-23, float(t)) for h, t in zip(halves, tiny, strict=True)])
+    np.testing.assert_array_equal(fma(halves, F(1.0 + 2.0**-23), tiny), small)
+    twice = (halves.astype(float) * float(F(1.0 + 2.0**-23)) + tiny).astype(F)
+    assert odd_sum(np.array([1.0]), np.array([2.0**-60]))[0] > 1.0
+    assert (twice != small).any() or (np.asarray(a * b + c) != want).any()
+
+
+# ---- functions
+
+
+def function(f: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A function of float32 by its tape."""
+    tape = _core.Tape(single=True)
+    run = evaluated(tape, [f(tape.state(0))], {}, False)
+
+    def of(x: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(run([x], 0.0, 1.0)[0], np.shape(x))
+
+    return of
+
+
+def blocks(long: bool, stride: int = 9973) -> Iterator[Any]:
+    """Numbers of float32: all of them, or one in so many, a prime, with zeros, infinities and the ends of the ranges."""
+    if not long:
+        yield np.arange(0, 2**32, stride, dtype=np.uint64).astype(np.uint32).view(F)
+        ends = np.array([0, 1, 0x7FFFFF, 0x800000, 0x3F800000, 0x7F7FFFFF, 0x7F800000, 0x42B17218, 0x3F3504F3], dtype=np.uint32)
+        yield np.concatenate([ends, ends + np.uint32(1), ends | np.uint32(1 << 31)]).view(F)
+        return
+    for first in range(0, 2**32, 2**22):
+        yield np.arange(first, first + 2**22, dtype=np.uint64).astype(np.uint32).view(F)
+
+
+def worst(f: Callable[[Any], Any], truth: Callable[[Any], Any], within: float = math.inf, long: bool = False) -> float:
+    """The largest error of a function in units in the last place of the result; infinite where it is wrong beside all numbers.
+
+    The truth is NumPy's of float64, within 2⁻⁵² or so of its result: 2⁻²⁸ of a unit here.
+    """
+    most = 0.0
+    for x in blocks(long):
+        x = x[~(np.abs(x) > within)]
+        with np.errstate(all="ignore"):
+            want, got = truth(x.astype(float)), f(x).astype(float)
+            rounded = want.astype(F)
+        ends = ~(np.isfinite(rounded) & np.isfinite(got))
+        if not np.array_equal(got[ends], rounded[ends], equal_nan=True):
+            return math.inf
+        want, got = want[~ends], got[~ends]
+        _, exponent = np.frexp(want)
+        most = max(most, float((np.abs(got - want) / np.ldexp(1.0, np.maximum(exponent - 24, -149))).max(initial=0.0)))
+    return most
+
+
+#: Of each function the truth, up to where it holds, and the largest error of all arguments, found by the long test.
+TRUE: dict[str, tuple[Callable[[Any], Any], float, float]] = {
+    "sin": (np.sin, 12_867.0, 0.80),
+    "cos": (np.cos, 12_867.0, 0.82),
+    "exp": (np.exp, math.inf, 0.78),
+    "log": (np.log, math.inf, 0.84),
+    "sqrt": (np.sqrt, math.inf, 0.501),
+    "round": (np.round, math.inf, 0.0),
+    "floor": (np.floor, math.inf, 0.0),
+    "abs": (np.abs, math.inf, 0.0),
+    "sign": (np.sign, math.inf, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", TRUE)
+def test_no_result_is_further_than_an_ulp_from_the_truth(name: str) -> None:
+    truth, within, most = TRUE[name]
+    assert worst(function(getattr(functions, name)), truth, within) <= most < 1.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["sin", "cos", "exp", "log"])
+def test_none_of_all_results_is_further_than_an_ulp_from_the_truth(name: str) -> None:
+    truth, within, most = TRUE[name]
+    found = worst(function(getattr(functions, name)), truth, within, long=True)
+    assert most - 0.03 < found <= most
+
+
+@pytest.mark.parametrize(
+    ("name", "constant", "value"),
+    [
+        ("sin", "SIN", (-0.1666666, *own.SIN[1:])),
+        ("cos", "COS", (0.0416, *own.COS[1:])),
+        ("sin", "HALF_PI", (*own.HALF_PI[:2], own.HALF_PI[2], 0.0)),
+        ("exp", "EXP", (*own.EXP[:3], 0.0083, own.EXP[4])),
+        ("exp", "OVERFLOW_FROM", 90.0),
+        ("exp", "UNDERFLOW_UNTIL", -87.0),
+        ("log", "LOG", (own.LOG[0], 0.399, *own.LOG[2:])),
+        ("log", "LEAST_NORMAL", 0.0),
+    ],
+)
+def test_a_wrong_constant_is_noticed(name: str, constant: str, value: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own, constant, value)
+    truth, within, most = TRUE[name]
+    assert worst(function(getattr(functions, name)), truth, within) > most
+
+
+def test_the_sine_of_built_in_systems() -> None:
+    """Within an ulp of 1, 2⁻²³, up to 6433 rad; from there on within the effect of rounding the argument and that."""
+    sine = function(lambda x: trig.sin(np.array([x], dtype=object))[0])
+    for x in blocks(False, 1511):
+        x = x[np.abs(x) < 2.0**21].astype(float)
+        error = np.abs(sine(x.astype(F)).astype(float) - np.sin(x))
+        small = np.abs(x) <= 6433.0
+        assert error[small].max(initial=0.0) <= 2.0**-23
+        assert (error <= 2.0**-23 + 2.0**-24 * np.abs(x)).all()
+
+
+def test_the_sine_and_cosine_of_large_angles() -> None:
+    for name, truth in (("sin", np.sin), ("cos", np.cos)):
+        f = function(getattr(functions, name))
+        x = F(10.0) ** np.linspace(4.2, 6.3, 20_000).astype(F)
+        error = np.abs(f(x).astype(float) - truth(x.astype(float)))
+        assert (error <= 2.0**-24 + 2.0**-24 * np.abs(x)).all()
+        assert np.isnan(f(np.array([2.2e6, np.inf, np.nan], dtype=F))).all()
+
+
+@sw.system(order=1)
+def curious(t: Any, y: Any, *, k: Any = 1.0) -> Any:
+    return np.exp(-k * y) * np.cos(y) + np.log(1.0 + y * y) - 0.1 * np.round(3.0 * y) + np.sqrt(np.abs(y)) * np.sin(t) - y**3
+
+
+def test_functions_in_equations_of_ones_own() -> None:
+    options: dict[str, Any] = {"y": np.linspace(-2.0, 2.0, 50), "dt": 0.05, "steps": 300, "every": 50, "dtype": "float32"}
+    system = curious(k=np.linspace(0.5, 1.0, 50))
+    run = sw.integrate(system, "rk4", **options)
+    assert_same(run, sw.integrate(system, "rk4", **options, backend="numpy"))
+    wide = sw.integrate(system, "rk4", **(options | {"dtype": "float64"}))
+    assert 0.0 < np.abs(run.y - wide.y).max() < 1e-2
+    assert np.median(np.abs(run.y[1] - wide.y[1])) < 1e-6
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize("dtype", ["float16", np.int32, "double precision", None, 32, np.complex64, "", object()])
+def test_other_types_are_refused(dtype: Any) -> None:
+    with pytest.raises(DTypeError, match=r"^dtype: expected 'float64' or 'float32', got "):
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, dtype=dtype)
+
+
+@pytest.mark.parametrize("dtype", ["float32", np.float32, np.dtype("float32"), np.zeros(1, np.float32).dtype])
+def test_it_is_asked_for_as_in_numpy(dtype: Any) -> None:
+    assert sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, dtype=dtype).y.dtype == F
+
+
+@sw.system(order=1)
+def bent(t: Any, y: Any) -> Any:
+    return np.tanh(y)
+
+
+REFUSED: list[tuple[Any, dict[str, Any], str]] = [
+    (sw.Oscillator(), {"form": "matrix"}, "form='direct' only"),
+    (sw.Oscillator(), {"dt": None, "steps": None, "method": "merson", "tolerance": 1e-3, "at": [1.0]}, "fixed steps only"),
+    (sw.Oscillator(x=sw.Sampled([0.0, 1.0], 1.0)), {}, "does not go with samples"),
+    (sw.Oscillator(x=sw.Sinusoid(1.0, 1e9)), {}, "a sinusoid's angle may grow to"),
+    (sw.Oscillator(), {"dt": 1e-50}, "dt: expected a number above zero in float32"),
+    (sw.Oscillator(), {"y": 1e39}, "y: expected numbers up to 3.4e38"),
+    (sw.Oscillator(1e39), {"dt": 1e-30}, "omega: expected numbers up to 3.4e38"),
+    (sw.NBody(np.ones(60)), {"v": np.zeros((60, 2)), "y": np.random.default_rng(0).normal(size=(60, 2))}, "is too long"),
+    (sw.Oscillator(), {"method": "taylor"}, "does not go with taylor, whose series"),
+    (sw.Oscillator(), {"events": lambda t, v, y: y}, "does not go with events="),
+    (bent(), {"v": None}, "tanh has no version of float32"),
+]
+
+
+@pytest.mark.parametrize(("system", "options", "told"), REFUSED)
+def test_what_does_not_go_with_float32(system: Any, options: dict[str, Any], told: str) -> None:
+    arguments: dict[str, Any] = {"method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 100, "dtype": "float32"} | options
+    for backend in ("rust", "numpy"):
+        with pytest.raises((UnsupportedError, ArgumentError, TraceError), match=told.replace("(", r"\(")):
+            sw.integrate(system, **arguments, backend=backend)
+
+
+def test_warnings_are_those_of_its_range() -> None:
+    with pytest.warns(sw.AccuracyWarning, match=r"beyond 2\.1e\+06 rad"):
+        sw.integrate(sw.Pendulum(), "rk4", v=1e6, y=0.0, dt=0.1, steps=100, dtype="float32")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sw.integrate(sw.Pendulum(), "rk4", v=1.0, y=0.0, dt=0.1, steps=100, dtype="float32")
+
+
+# ---- what a digit costs
+
+
+def test_a_chart_has_a_curve_of_each() -> None:
+    steps = [200, 400, 800, 12800]
+    chart = sw.charts.work_precision("oscillator", ["rk4"], steps, tolerances=[], fused="both", dtype="both")
+    names = ["rk4", "rk4, fused", "rk4, float32", "rk4, fused, float32"]
+    assert [curve.name for curve in chart.curves] == names
+    assert [curve.dtype for curve in chart.curves] == ["float64", "float64", "float32", "float32"]
+    wide, _, half, _ = ([point.state_error for point in curve.points] for curve in chart.curves)
+    # Where the method errs by more than float32 rounds, both err alike; then float32 stays where it is, or worse.
+    scene = sw.scenes.scene("oscillator")
+    rounded = 20 * 2.0**-24 * np.array(steps)
+    assert (np.abs(np.subtract(wide, half)) <= rounded * np.abs(scene.exact(np.zeros(1))[1]).max()).all()
+    assert half[-1] > 1e3 * wide[-1]
+    chart.plot()
+    with pytest.raises(ArgumentError, match="dtype"):
+        sw.charts.work_precision("oscillator", ["rk4"], steps, dtype="half")
