@@ -9,6 +9,7 @@ use stepwell_core::{
     error::Error,
     isa::Level,
     method::{Needs, Record},
+    real::Precision,
     run::{
         Machine, Model,
         batch::{Arrays, Plan, kept, run, save},
@@ -182,7 +183,13 @@ impl Case {
             ..Given::default()
         };
         let how = How::Method { name: method.to_owned(), choice: 0 };
-        let scene = Scene { given: given.clone(), how, record: vec!["quantity".to_owned()], fused: self.fused };
+        let scene = Scene {
+            given: given.clone(),
+            how,
+            record: vec!["quantity".to_owned()],
+            fused: self.fused,
+            precision: Precision::Double,
+        };
         Model { scene, spec: Spec { given, rows, tables: Vec::new() } }
     }
 
