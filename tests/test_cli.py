@@ -143,6 +143,16 @@ def test_run_takes_fused_multiply_adds(capsys):
     assert fused["last_y"] == run.y[-1].tolist() != plain["last_y"]
 
 
+def test_run_takes_float32(capsys):
+    words = ("run", "kepler", "--method", "rk4", "--dt", "0.02", "--steps", "50", "--json")
+    wide, narrow = (json.loads(told(capsys, *words, *more)[1]) for more in ((), ("--float32",)))
+    run = sw.scenes.kepler().run("rk4", 0.02, steps=50, dtype="float32")
+    assert narrow["last_y"] == run.y[-1].tolist() != wide["last_y"]
+    code, out, err = told(capsys, "run", "kepler", "--method", "dop853", "--tolerance", "1e-6", "--float32")
+    assert (code, out) == (2, "")
+    assert "float32 goes with fixed steps only" in err
+
+
 def test_run_takes_a_control(capsys):
     def last(*words):
         code, out, err = told(capsys, "run", "energy_control", "--method", "standard_euler", "--steps", "300", "--json", *words)

@@ -68,6 +68,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "off for none (default: the scene's)",
     )
     parser.add_argument("--fused", action="store_true", help="compute with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="compute in float32, with half the digits")
     parser.add_argument(
         "-o",
         "--output",
@@ -90,6 +91,8 @@ def command(args: argparse.Namespace) -> None:
     given |= {"record": list(chosen.system.quantities)[:1]}
     if args.fused:
         given["fused"] = True
+    if args.float32:
+        given["dtype"] = "float32"
     if args.start is not None:
         given["start"] = args.start
     if args.form != "direct":
