@@ -124,8 +124,7 @@ def draw() -> None:
     axes.text(1.015, top, "stepwell is faster →", ha="left", color="#555555")
     axes.set_xlabel("times as fast as the peer in brackets, one thread, equal errors")
     ahead = sum(r.exact >= 0.995 for r in found)
-    told = "By the same arithmetic stepwell is level with, or ahead of, the fastest C or numba that we could write\n"
-    told += f"in {ahead} of {len(found)} workloads"
+    told = f"By the same arithmetic stepwell is level with the fastest C or numba\nthat we could write, or ahead, in {ahead} of {len(found)} workloads"
     figure.suptitle(told, x=0.01, ha="left", fontsize=11.5, weight="bold")
     figure.legend(
         handles=[
