@@ -124,7 +124,8 @@ def draw() -> None:
     axes.text(1.015, top, "stepwell is faster →", ha="left", color="#555555")
     axes.set_xlabel("times as fast as the peer in brackets, one thread, equal errors")
     ahead = sum(r.exact >= 0.995 for r in found)
-    told = f"By the same arithmetic stepwell is level with the fastest C or numba\nthat we could write, or ahead, in {ahead} of {len(found)} workloads"
+    told = "By the same arithmetic stepwell is level with the fastest C or numba\n"
+    told += f"that we could write, or ahead, in {ahead} of {len(found)} workloads"
     figure.suptitle(told, x=0.01, ha="left", fontsize=11.5, weight="bold")
     figure.legend(
         handles=[

@@ -280,7 +280,8 @@ def _begins(scene: Scene, run: Run) -> bool:
     """
     pairs = ((run.v[0], scene.v), (run.y[0], scene.y))
     scale = max(float(np.abs(block).max(initial=0.0)) for _, block in pairs)  # a system of first order has no v
-    return all(np.allclose(found, block, rtol=0.0, atol=(2.0**-21 if run.dtype == "float32" else 1e-9) * scale) for found, block in pairs)
+    near = (2.0**-21 if run.dtype == "float32" else 1e-9) * scale
+    return all(np.allclose(found, block, rtol=0.0, atol=near) for found, block in pairs)
 
 
 def keeps_energy(run: Run) -> bool:
