@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FILES = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
 CHANGES = re.compile(r"<!-- change: (\S+) -->\n```diff\n(.*?)```", re.DOTALL)
 LEFT_OUT = shutil.ignore_patterns("target*", ".venv*", ".git", "out", "dist", "*.so", "__pycache__", ".*_cache", ".hypothesis")
+OWN_CRATES = shutil.ignore_patterns("*stepwell*", "lib_core*", "_core-*")
 
 pytestmark = pytest.mark.skipif(shutil.which("cargo") is None, reason="builds the core")
 
@@ -47,7 +48,11 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (tree / name).write_text(changed((tree / name).read_text(encoding="utf-8"), change), encoding="utf-8")
     # In a target folder of its own, which is kept: cargo takes the copy's core for the project's, and the lists of files that
     # build.rs has made for the one would be found by the other.
-    target = str(Path(os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))) / "adding")
+    built = Path(os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target")))
+    target = str(built / "adding")
+    for part in (".fingerprint", "build", "deps"):  # what was built of other crates serves here, too
+        if (built / "release" / part).exists() and not (built / "adding" / "release" / part).exists():
+            shutil.copytree(built / "release" / part, built / "adding" / "release" / part, ignore=OWN_CRATES)
     build = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", "dist"]
     subprocess.run(build, cwd=tree, env=os.environ | {"CARGO_TARGET_DIR": target}, check=True)
     (wheel,) = (tree / "dist").glob("*.whl")
