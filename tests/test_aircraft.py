@@ -198,7 +198,7 @@ def test_huge_angles_do_not_hang() -> None:
     # An angle of 4e8° is known to 2^-25°, and in rad to 2^-31; errors decay, as in the bound above.
     np.testing.assert_allclose(far.y[-1] - [3.6e8, 0.0, 0.0], near.y[-1], rtol=0, atol=100 * 60 * 2.0**-25)
     for angle in (1e17, 1e300, -1.7e308):
-        with pytest.warns(sw.DivergenceWarning, match="1 of 1 member"):
+        with pytest.warns(sw.DivergenceWarning, match="the run diverged at step 1"):
             assert sw.integrate(sw.Aircraft(), "false_euler", v=0.0, y=np.array([angle, 0.0, 0.0]), dt=0.1, steps=100).status
 
 

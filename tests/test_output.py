@@ -109,6 +109,7 @@ def test_what_was_found_is_printed_though_it_cannot_be_written(
     monkeypatch.setattr("numpy.savez", full)
     monkeypatch.setattr("csv.writer", full)
     monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr("os.replace", full)  # by which a text takes its place when it is whole
     code, out, err = told(capsys, *words, *form, "-o", str(tmp_path / file))
     assert code == 2
     assert err.strip() == "stepwell: [Errno 28] No space left on device"  # after the line of a bar

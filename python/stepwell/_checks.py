@@ -6,7 +6,6 @@ import operator
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from errno import EISDIR
 from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -411,6 +410,8 @@ def file(argument: str, path: Any, endings: tuple[str, ...] = ()) -> Path:
         raise ArgumentError(f"{argument}: expected a file ending in {known}, got {short(str(path), PATH)}")
     try:
         if place.is_dir():
+            from errno import EISDIR  # an error alone needs it
+
             raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
         if place.is_file():
             with place.open("ab"):
