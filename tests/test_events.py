@@ -11,8 +11,9 @@ import pytest
 import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
 from stepwell import engine
-from stepwell.events import driver
+from stepwell.events import collected, driver
 from stepwell.events.members import Members
+from stepwell.events.traced import Quantity
 from stepwell.events.trials import Trials, one_step
 
 
@@ -129,7 +130,7 @@ def test_how_many_are_looked_at_together_does_not_matter(method: str, monkeypatc
     for numbers, longest, located in ((1 << 8, 5, 1), (1 << 6, 1, 7), (1 << 20, 100_000, 1 << 20)):
         monkeypatch.setattr(driver, "NUMBERS_AT_ONCE", numbers)
         monkeypatch.setattr(driver, "MOST_STEPS", longest)
-        monkeypatch.setattr(driver, "LOCATED_AT_ONCE", located)
+        monkeypatch.setattr(collected, "LOCATED_AT_ONCE", located)
         other = sweep(method=method)
         assert_same(run, other)
         assert_same_events(run, other)
@@ -155,7 +156,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
     never = sw.Event(lambda t, v, y: y * y + 1.0)
 
     def wrong(quantities: Any, plan: Any) -> Any:
-        return right([driver.Quantity(never, plan.system, {}) for _ in quantities], plan)
+        return right([Quantity(never, plan.system, {}) for _ in quantities], plan)
 
     monkeypatch.setattr(driver, "watched", wrong)
     assert sweep(every=None).events["crossing"].count.sum() < found.events["crossing"].count.sum()

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.events import driver
+from stepwell.events import collected, driver
 from stepwell.events.trials import Trials
 from stepwell.reference import events
 
@@ -213,12 +213,12 @@ def low_end(trial: Any, before: Any, after: Any, v: Any, y: Any, width: Any) -> 
 
 
 def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(driver, "located", straight)
+    monkeypatch.setattr(collected, "located", straight)
     assert order_of(driven, "rk4", STEP[4]) < 3.5
 
 
 def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(driver, "located", low_end)
+    monkeypatch.setattr(collected, "located", low_end)
     with pytest.raises(AssertionError):
         test_bounces()
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses, located, width_at
+from ..reference.events import crosses
 from ..reference.types import Whole
 from ..result import Status
+from .collected import Collected
 from .event import Event
-from .members import Members
-from .parts import At, Changes, Found, nothing, ordinals
-from .result import Occurrences
-from .traced import Quantity, watched
-from .trials import Trials
+from .parts import At, Changes
+from .traced import watched
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
 NUMBERS_AT_ONCE = 1 << 17
@@ -35,8 +33,6 @@ TOO_MANY_NOTICED = 1 / 2
 FEW_MEMBERS = 64
 #: Where states are saved more often than after so many steps, all are looked at instead.
 LEAST_BETWEEN_SAVES = 32
-#: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
-LOCATED_AT_ONCE = 1 << 12
 
 
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
@@ -76,25 +72,19 @@ class Run:
             run.encounter = run.overshoots = None  # these go through all of the steps
 
 
-class _Driver:
+class _Driver(Collected):
     """The run of all members."""
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
-        self.plan, self.events = plan, events
-        self.members = Members(plan)
-        self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
+        super().__init__(plan, events)
         total = plan.members
         self.saves = plan.saves
         blocks = plan.system.v_shape, plan.system.y_shape
         self.kept = tuple(np.empty((len(self.saves), *shape, total)) for shape in blocks)
         self.slot = np.empty((*blocks[0], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
-        self.stopped_at = np.full(total, np.nan)
-        self.count = np.zeros((len(events), total), dtype=np.int64)
-        self.found: list[list[Found]] = [[] for _ in events]
-        self.trials, self.done = Trials(plan, self.members), 0
+        self.done = 0
         self.watched: engine.Watched | None = None
-        self.waiting: list[list[Changes]] = [[] for _ in events]
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
         plan, total = self.plan, self.plan.members
@@ -107,8 +97,6 @@ class _Driver:
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
             self._group(index, At(v[..., index], y[..., index], bad[index], carried), size)
-        for e in range(len(self.events)):
-            self._locate_waiting(e)
         return self._outcome()
 
     def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
@@ -204,83 +192,22 @@ class _Driver:
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
             finite = (out.first_bad < 0) | (ends < out.first_bad)
             changes = [each & finite for each in changes]
-        # The step in which a member stops; later ones do not count.
-        last = np.full(len(index), now.steps)
-        for each, event in zip(changes, self.events, strict=True):
-            if event.terminal:
-                last = np.minimum(last, np.where(each.any(axis=0), each.argmax(axis=0), now.steps))
-        stops = last < now.steps
-        if stops.any():
-            changes = [each & (np.arange(now.steps)[:, np.newaxis] <= last) for each in changes]
-        in_last: list[tuple[Found, Whole]] = []
-        for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
-            step, member = np.nonzero(each)
-            if stops.any():
-                mine = step == last[member]
-                in_last.append(
-                    (self._located(e, self._changes(now, index, g[e], states, step[mine], member[mine])), member[mine])
-                )
-                step, member = step[~mine], member[~mine]
-            if len(step):
-                kept = ordinals(member) + self.count[e, index[member]] <= event.most
-                self.count[e, index] += np.bincount(member, minlength=len(index))
-                self._put_off(e, self._changes(now, index, g[e], states, step[kept], member[kept]))
-        if stops.any():
-            self._stop(index, in_last, last, stops, done)
-        return stops
+        stops = self.take(index, changes, lambda e, step, member: self._changes(now, index, g[e], states, step, member))
+        if stops is None:
+            return np.zeros(len(index), dtype=bool)
+        after = np.searchsorted(self.saves, done + stops.step, "right")
+        for place in np.unique(after[stops.which]):
+            these = stops.which & (after == place)
+            for kept_states, state in zip(self.kept, (stops.v, stops.y), strict=True):
+                kept_states[place:][..., index[these]] = state[..., these]
+        return stops.which
 
     def _changes(self, now: engine.Plan, index: Whole, g: Array, states: Any, step: Whole, member: Whole) -> Changes:
         """What is known of the changes of sign of these members in these steps."""
         begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
-        return Changes(index[member], now.first + step, g[step, member], g[step + 1, member], *begins, *ends)
-
-    def _put_off(self, e: int, changes: Changes) -> None:
-        """Locate these with others, as many at once as are quick together."""
-        self.waiting[e].append(changes)
-        if sum(len(each.member) for each in self.waiting[e]) >= LOCATED_AT_ONCE:
-            self._locate_waiting(e)
-
-    def _locate_waiting(self, e: int) -> None:
-        """Locate what was put off."""
-        waiting, self.waiting[e] = self.waiting[e], []
-        if waiting:
-            together = Changes(*(np.concatenate(each, axis=-1) for each in zip(*waiting, strict=True)))
-            for first in range(0, len(together.member), LOCATED_AT_ONCE):
-                self.found[e].append(self._located(e, together.some(slice(first, first + LOCATED_AT_ONCE))))
-
-    def _located(self, e: int, changes: Changes) -> Found:
-        """The places of these changes of sign."""
-        member, step, dt = changes.member, changes.step, self.plan.dt
-        t: Any = self.plan.t0 + step * dt
-
-        def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
-            index, h = member[which], share * dt
-            v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
-            return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
-
-        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end, width_at(t, dt))
-        return Found(member, step, share, t + share * dt, v, y)
-
-    def _stop(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any, done: int) -> None:
-        """Let members stop at the first terminal event of their last step: their state stays from there on."""
-        end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
-        v, y = (np.empty((*each.shape[1:-1], len(index))) for each in self.kept)
-        for (each, member), event in zip(in_last, self.events, strict=True):
-            if event.terminal:
-                first = each.share < end[member]
-                ends, who = each.some(first), member[first]
-                end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
-        for e, ((each, member), event) in enumerate(zip(in_last, self.events, strict=True)):
-            before_it = each.share <= end[member]  # what comes after the end of a member is not there
-            kept = each.some(before_it)
-            self.count[e, kept.member] += 1
-            self.found[e].append(kept.some(self.count[e, kept.member] <= event.most))
-        self.stopped_at[index[stops]] = times[stops]
-        after = np.searchsorted(self.saves, done + last, "right")
-        for place in np.unique(after[stops]):
-            these = stops & (after == place)
-            for kept_states, state in zip(self.kept, (v, y), strict=True):
-                kept_states[place:][..., index[these]] = state[..., these]
+        numbers = now.first + step
+        t, h = now.t0 + numbers * now.dt, np.full(len(step), now.dt)
+        return Changes(index[member], numbers, t, h, g[step, member], g[step + 1, member], *begins, *ends)
 
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""
@@ -289,18 +216,3 @@ class _Driver:
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
         return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
-
-    def stops(self) -> Array | None:
-        """When a terminal event stopped each member; None without such events."""
-        return self.stopped_at.reshape(self.plan.batch) if any(event.terminal for event in self.events) else None
-
-    def occurrences(self) -> dict[str, Occurrences]:
-        """Those of each event, by name."""
-        blocks, made = (self.plan.system.v_shape, self.plan.system.y_shape), {}
-        for event, found, count in zip(self.events, self.found, self.count, strict=True):
-            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            order = np.lexsort((step, member))
-            v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
-            numbers = count.reshape(self.plan.batch)
-            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
-        return made

@@ -24,10 +24,15 @@ class At(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Changes of sign of one event that are yet to be located: whose, in which step, and what is known at both ends of that."""
+    """Changes of sign of one event that are yet to be located: whose, in which step, and what is known at both ends of that.
+
+    A step begins at ``t`` and is as long as ``h``.
+    """
 
     member: Whole
     step: Whole
+    t: Array
+    h: Array
     g: Array
     g_end: Array
     v: Array
