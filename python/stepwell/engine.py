@@ -603,6 +603,8 @@ class AdaptiveArrays(NamedTuple):
         last_state: the state where members stand at the end, shape (numbers of v and y, members).
         last_paces: where they stand, as ``paces``.
         status: how they ended, shape (members,).
+        trail: None; or times and steps to try next, shape (2, times, members), where attempts are made one by one until the asked
+            time, and what is kept is where members stand before the first and after each.
     """
 
     v: Array
@@ -613,6 +615,7 @@ class AdaptiveArrays(NamedTuple):
     last_state: Array
     last_paces: Array
     status: Whole
+    trail: Array | None = None
 
 
 class Adapted(NamedTuple):
@@ -700,6 +703,16 @@ def _evaluated_attempt(plan: Plan, budget: int) -> Any:
     return attempt
 
 
+def attempt_by_numpy(plan: Plan, budget: int) -> Any:
+    """The same, by the tape if it has to be."""
+    from .reference import adaptive
+
+    if plan.by_tape:
+        return _evaluated_attempt(plan, budget)
+    system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+    return attempts(plan.method, system, plan.block_axes, plan.order)
+
+
 def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
     """Go on from where members stand, of whom ``paces`` has the numbers of each or those of all."""
     if plan.backend == "numpy":
@@ -726,11 +739,7 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     from .reference import adaptive
 
     pace = begun(plan, paces, v, y) if pacing.begins else pace_of(paces, plan.batch)
-    if plan.by_tape:
-        attempt = _evaluated_attempt(plan, pacing.budget)
-    else:
-        system = adaptive.Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
-        attempt = attempts(plan.method, system, plan.block_axes, plan.order)
+    attempt = attempt_by_numpy(plan, pacing.budget)
     out = adaptive.run(attempt, v, y, pace, at=pacing.at.tolist(), budget=pacing.budget)
     each = evaluations(plan.method, plan.system, order=plan.order, paced=True)
     return Adapted(out.v, out.y, out.last_v, out.last_y, np.array(np.broadcast_arrays(*out.pace)), out.status, each)

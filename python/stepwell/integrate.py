@@ -179,7 +179,6 @@ def integrate(
             "first_bad_step": first_bad_step,
             "dt_before": dt_before,
             "force": force,
-            "events": events,
         }
         if not isinstance(form, str) or form != "direct":
             fixed["form"] = form
@@ -187,8 +186,9 @@ def integrate(
             fixed["start_step"] = start_step
         _only_fixed(fixed)
         went = None if carry is None else (carry, carried_by)
+        asked = None if events is None else _asked(events, "direct")
         run, begun = _adapt(
-            system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress
+            system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress, asked
         )
         warn_of_nonsense(run, begun)
         return run
@@ -413,6 +413,7 @@ def _adapt(
     threads: int | None,
     backend: str,
     progress: bool,
+    asked: list[Event] | None,
 ) -> tuple[Run, tuple[Array, Array] | None]:
     """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
     if how.error_order is None:
@@ -476,13 +477,19 @@ def _adapt(
         beside=len(times) * BYTES_PER_TIME,
     )
     v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+    ended, adapt = None, engine.adapt
+    if asked is not None:
+        from .events import adaptive  # only such runs need it
+
+        ended = adaptive.AdaptiveRun(asked)
+        adapt = ended.adapt
     with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
         order = order_of_series(how, relative if carry is None else carry[engine.RELATIVE])
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
         paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
-        out = engine.adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
+        out = adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
     accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
     again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
@@ -513,6 +520,8 @@ def _adapt(
         _warn_of_stops(run)
     if np.count_nonzero(out.paces[engine.ABSOLUTE]):
         _warn_of_lost(engine.pace_of(out.paces, batch))
+    if ended is not None:
+        ended.tell(run)
     return run, None if carry is not None else (v, y)
 
 

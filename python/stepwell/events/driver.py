@@ -206,7 +206,8 @@ class _Driver(Collected):
         """What is known of the changes of sign of these members in these steps."""
         begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
         numbers = now.first + step
-        t, h = now.t0 + numbers * now.dt, np.full(len(step), now.dt)
+        t: Any = now.t0 + numbers * now.dt
+        h = np.full(len(step), now.dt)
         return Changes(index[member], numbers, t, h, g[step, member], g[step + 1, member], *begins, *ends)
 
     def _outcome(self) -> engine.Outcome:

@@ -8,8 +8,10 @@ import numpy as np
 
 from .. import _core, engine
 from .._checks import Array
-from ..reference import contact
+from ..reference import contact, series_pace, tableau
+from ..reference.adaptive import Attempted
 from ..reference.replayed import Operations
+from ..reference.series import coefficients
 from ..reference.traced import Tracer
 from ..systems.own import OwnSystem
 from .members import Members
@@ -32,6 +34,8 @@ class Trials:
         self._plan, self._members = plan, members
         self._operations: Operations | None = None
         self._numbers: list[Array] = []
+        #: Whether there is no other way, however long the step is.
+        self._always_traced = False
         self._is_traced = not isinstance(plan.system, OwnSystem)
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -40,7 +44,7 @@ class Trials:
             self._trace()
             self._is_traced = True
         if self._operations is None:
-            return one_step(self._members.plan(index), t, h, v, y)
+            return self._one(self._members.plan(index), t, h, v, y)
         state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
         numbers = [each if each.shape[-1] == 1 else each[index] for each in self._numbers]
         with np.errstate(all="ignore"):
@@ -56,13 +60,39 @@ class Trials:
         t, h = tape.state(0), tape.state(1)
         shapes, leaves = (plan.system.v_shape, plan.system.y_shape), (tape.state(i) for i in range(2, 1 << 30))
         v, y = (_symbols(shape, leaves) for shape in shapes)
-        s = tracer.scaled(h)
+        made = self._on(tracer, plan, t, h, v, y)
         if tracer.tables:
             return
-        v, y = stepped(plan, s, t, h, v, y)
-        operations = Operations(*tape.operations(tracer.flat(v, y)))
-        if len(operations.lines) <= MOST_OPERATIONS:
+        operations = Operations(*tape.operations(tracer.flat(*made)))
+        if len(operations.lines) <= MOST_OPERATIONS or self._always_traced:
             self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+    def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """A step of all members of a plan, of another time and length for each."""
+        return one_step(plan, t, h, v, y)
+
+    def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+        """The same with symbols."""
+        s = tracer.scaled(h)
+        return (v, y) if tracer.tables else stepped(plan, s, t, h, v, y)
+
+
+class AdaptiveTrials(Trials):
+    """The same of a plan with adaptive steps: as the states within a step are made that are saved."""
+
+    def __init__(self, plan: engine.Plan, members: Members) -> None:
+        super().__init__(plan, members)
+        self._always_traced = plan.method.has_series
+        self._is_traced = self._is_traced and not self._always_traced
+
+    def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        system = Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+        with np.errstate(all="ignore"):
+            v, y = within(plan, system, t, h, v, y)
+        return np.asarray(v), np.asarray(y)
+
+    def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+        return within(plan, tracer.attempted(), t, h, v, y)
 
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -79,6 +109,18 @@ def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[
     slot = steps.start(s, plan.choice, t, v, y) if carries else v
     slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
     return (steps.finish(s, plan.choice, t + h, slot, y) if carries else slot), y
+
+
+def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+    """A step of a method with adaptive steps, of a length that is given."""
+    steps: Any = plan.method.steps
+    if plan.method.has_series:
+        terms = coefficients(system.s, plan.order or steps.ORDER, t, 1.0, v, y)
+        v, y = (series_pace.value(start, [term[i] for term in terms], h) for i, start in enumerate((v, y)))
+    else:
+        v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(system.rates(h), t, h, v, y))
+    v, y, _ = system.project(v, y)
+    return v, y
 
 
 def _symbols(shape: tuple[int, ...], leaves: Any) -> Any:

@@ -67,8 +67,8 @@ def located(trial: Trial, before: Array, after: Array, v: Array, y: Array, width
     return high, v, y
 
 
-def width_at(t: Array, h: float) -> Array:
-    """To which share of the steps from these times, of length h, a change of sign is located."""
+def width_at(t: Array, h: Array) -> Array:
+    """To which share of the steps from these times, of these lengths, a change of sign is located."""
     return np.maximum(SHARE, SPACING * (np.abs(t) / h))
 
 

@@ -113,11 +113,15 @@ class Tracer:
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
 
-    def attempt(self, method: Any, order: int = 0) -> list[Any]:
-        """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
+    def attempted(self) -> adaptive.Attempted:
+        """How an attempt at an adaptive step uses the system."""
         batch = self.system.batch
         given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        system = adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+        return adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+
+    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+        """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
+        system = self.attempted()
         v, y, more = self.state()
         pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
         axes = len(self.system.v_shape), len(self.system.y_shape)

@@ -198,6 +198,7 @@ struct AdaptiveArraysOf<'py> {
     last_state: PyReadwriteArray2<'py, f64>,
     last_paces: PyReadwriteArray2<'py, f64>,
     status: PyReadwriteArray1<'py, i64>,
+    trail: Option<PyReadwriteArrayDyn<'py, f64>>,
 }
 
 /// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether it did:
@@ -223,6 +224,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         state: arrays.last_state.as_slice_mut()?,
         paces: arrays.last_paces.as_slice_mut()?,
         status: arrays.status.as_slice_mut()?,
+        trail: filled(&mut arrays.trail)?,
     };
     interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }

@@ -60,6 +60,10 @@ pub struct Arrays<'a> {
     pub paces: &'a mut [f64],
     /// One row: the status.
     pub status: &'a mut [i64],
+    /// Empty; or for each time of [`Plan::at`], which are then all the same, the times of the members, and behind them the steps to try
+    /// next. Then attempts are made one by one until that time is passed, and what is kept is where members stand before the first and
+    /// after each. No step is held.
+    pub trail: &'a mut [f64],
 }
 
 /// Attempts between two checks of the lanes.
@@ -79,6 +83,7 @@ struct Part<'a> {
     state: Columns<'a, f64>,
     paces: Columns<'a, f64>,
     status: Columns<'a, i64>,
+    trail: Columns<'a, f64>,
 }
 
 /// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one tape.
@@ -95,6 +100,9 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("paces", Pace::<f64>::NUMBERS, plan.paces.len())?;
     expect("paces", Pace::<f64>::NUMBERS * b, arrays.paces.len())?;
     expect("status", b, arrays.status.len())?;
+    if !arrays.trail.is_empty() {
+        expect("trail", 2 * plan.at.len() * b, arrays.trail.len())?;
+    }
     for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces) {
         if row.0.len() != 1 {
             expect("a row", b, row.0.len())?;
@@ -115,14 +123,14 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
     let mut status = cut(arrays.status, b, &shares).into_iter();
-    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces].map(|a| cut(a, b, &shares).into_iter());
+    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.trail].map(|a| cut(a, b, &shares).into_iter());
     let mut parts = Vec::with_capacity(shares.len());
     let mut first = 0;
     for count in shares {
-        if let ([Some(saved_v), Some(saved_y), Some(state), Some(paces)], Some(status)) =
+        if let ([Some(saved_v), Some(saved_y), Some(state), Some(paces), Some(trail)], Some(status)) =
             (rows.each_mut().map(Iterator::next), status.next())
         {
-            parts.push(Part { first, count, saved_v, saved_y, state, paces, status });
+            parts.push(Part { first, count, saved_v, saved_y, state, paces, status, trail });
         }
         first += count;
     }
@@ -156,6 +164,9 @@ impl<'a> Worker<'a> {
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
+        if part.trail.rows() > 0 {
+            return self.trail(part, go_on);
+        }
         let mut waiting = 0..part.count;
         let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
         for (lane, assigned) in assignments.iter_mut().enumerate() {
@@ -201,6 +212,41 @@ impl<'a> Worker<'a> {
             self.group.attempt(attempts);
             if !go_on(0) {
                 return Err(Error::Interrupted);
+            }
+        }
+        Ok(())
+    }
+
+    /// Attempts of all members one by one, keeping where they stand before the first and after each.
+    fn trail(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
+        let (lanes, rows) = (self.group.lanes(), self.plan.at.len());
+        for first in (0..part.count).step_by(lanes) {
+            let last = part.count - 1;
+            for lane in 0..lanes {
+                self.begin_member(&part, lane, (first + lane).min(last)); // lanes without a member repeat the last
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, Pace { target: f64::INFINITY, held: 0.0, ..pace });
+            }
+            for (row, end) in self.plan.at.iter().enumerate() {
+                for (lane, member) in (first..part.count).enumerate().take(lanes) {
+                    let pace = self.group.pace(lane);
+                    if pace.t >= *end && pace.target > pace.t {
+                        self.group.set_pace(lane, pace.idle());
+                    }
+                    part.trail.row(row)[member] = pace.t;
+                    part.trail.row(rows + row)[member] = pace.h;
+                    self.save(&mut part, lane, &Assignment { member, next: row, origin: None, held_before: false });
+                }
+                if row + 1 < rows {
+                    self.group.attempt(1);
+                }
+                if !go_on(0) {
+                    return Err(Error::Interrupted);
+                }
+            }
+            for (lane, member) in (first..part.count).enumerate().take(lanes) {
+                let pace = self.group.pace(lane);
+                self.end(&mut part, lane, &Assignment { member, next: rows, origin: None, held_before: false }, &pace);
             }
         }
         Ok(())

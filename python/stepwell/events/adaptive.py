@@ -1,0 +1,163 @@
+"""A run with events and adaptive steps: attempts are made some at a time, and the states between them are looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from .. import _checks, engine
+from .._checks import Array
+from ..reference.events import crosses
+from ..reference.types import Whole
+from ..result import Status
+from .attempts import Attempts, made
+from .collected import Collected
+from .event import Event
+from .parts import Changes
+from .trials import AdaptiveTrials
+
+#: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
+NUMBERS_AT_ONCE = 1 << 17
+#: The first attempts of members are few, then twice as many are made together each time, up to the most: a member may stop early.
+FIRST_ATTEMPTS, MOST_ATTEMPTS = 16, 1 << 10
+#: Members are cut into groups such that at least so many attempts of each group are looked at together.
+LEAST_ATTEMPTS = 16
+
+
+class AdaptiveRun:
+    """A run with events, in place of ``engine.adapt``: first the events are found, up to where each member stops.
+
+    Then the run is made as without events, to there, so that all that it returns is the same.
+    """
+
+    def __init__(self, events: Sequence[Event]) -> None:
+        self._events = events
+        self._driver: _Driver | None = None
+
+    def adapt(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """Make it."""
+        numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
+        rows = sum(numbers * (1 if event.terminal else min(event.most, pacing.budget)) for event in self._events)
+        _checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
+        self._driver = driver = _Driver(plan, self._events, pacing)
+        driver.run(paces, v, y)
+        out = driver.stepped(paces, v, y)
+        if plan.progress is not None:
+            plan.progress(1.0)
+        return out
+
+    def tell(self, run: Any) -> None:
+        """Give the result what was found."""
+        assert self._driver is not None
+        run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
+        if run.stopped_at is not None:
+            run.status = np.where(np.isnan(run.stopped_at), run.status, Status.EVENT).astype(np.int8)
+
+
+class _Driver(Collected):
+    """The run of all members."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
+        super().__init__(plan, events, AdaptiveTrials)
+        self.pacing, self.end = pacing, float(pacing.at[-1])
+        total, blocks = plan.members, (plan.system.v_shape, plan.system.y_shape)
+        #: Of members that stopped: their states, and how many attempts they had made and steps they had taken by then.
+        self.stop_state = tuple(np.full((*shape, total), np.nan) for shape in blocks)
+        self.attempts, self.steps = np.zeros(total), np.zeros(total)
+        self.begin, self.since = plan.t0, np.full(total, -np.inf)
+        self.reached = np.full(total, plan.t0)
+
+    def run(self, paces: Array, v: Array, y: Array) -> None:
+        """Find all events."""
+        system, total = self.plan.system, self.plan.members
+        paces = np.broadcast_to(paces.reshape(engine.PACE_NUMBERS, -1), (engine.PACE_NUMBERS, total))
+        v, y = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
+        if not self.pacing.begins:
+            self.since, self.begin = paces[engine.TARGET], float(paces[engine.TIME].min(initial=np.inf))
+        numbers = 2 + prod(system.v_shape) + prod(system.y_shape)
+        size = max(1, NUMBERS_AT_ONCE // (numbers * LEAST_ATTEMPTS))
+        for first in range(0, total, size):
+            index = np.arange(first, min(first + size, total))
+            self._group(index, paces[:, index], v[..., index], y[..., index], max(1, NUMBERS_AT_ONCE // numbers))
+
+    def _group(self, index: Whole, paces: Array, v: Array, y: Array, most: int) -> None:
+        """All attempts of some members; those that stop, or are at the end, leave the group."""
+        begins, together = self.pacing.begins, FIRST_ATTEMPTS
+        some = self.members.plan(index)._replace(progress=None)
+        while len(index):
+            attempts = max(1, min(together, most // len(index), MOST_ATTEMPTS))
+            out = made(some, self.end, attempts, self.pacing.budget, begins, np.ascontiguousarray(paces), v, y)
+            before = np.zeros((2, len(index))) if begins else paces[engine.COUNTS][:2]
+            stopped = self._look(some, index, out, before, not begins)
+            after = out.paces[engine.COUNTS][:2].sum(axis=0)
+            # Members that make no attempt cannot, or may not: they are out of attempts, or a step no longer moves the time.
+            on = ~stopped & (out.t[-1] < self.end) & (after - before.sum(axis=0) == attempts) & (after < self.pacing.budget)
+            self.reached[index] = np.where(on, out.t[-1], self.end)
+            index, paces, v, y = index[on], out.paces[:, on], out.v[-1][..., on], out.y[-1][..., on]
+            begins, together = False, 2 * together
+            if not on.all():
+                some = self.members.plan(index)._replace(progress=None)
+            if self.plan.progress is not None:
+                gone = np.mean(self.reached - self.begin) / max(self.end - self.begin, np.finfo(float).tiny)
+                self.plan.progress(min(0.99, max(0.0, float(gone))))
+
+    def _look(self, now: engine.Plan, index: Whole, out: Attempts, before: Array, goes_on: bool) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
+        given, h = self.members.numbers(index), out.lengths(now)
+        g = [quantity(out.t, v, y, given) for quantity in self.quantities]
+        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
+        taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(out.t[1:] > out.t[:-1], axis=0)]) + before[0]
+
+        def known(e: int, row: Whole, member: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, member] for each in states] for later in (0, 1))
+            step, places = taken[row, member].astype(np.int64), (row, member)
+            return Changes(index[member], step, out.t[places], h[places], g[e][places], g[e][row + 1, member], *begins, *ends)
+
+        # Of steps that go beyond the end, or began before this run, only a part is in it.
+        partial = out.t[1:] > self.end
+        if goes_on:
+            partial |= out.t[:-1] < self.since[index]
+        for e, each in enumerate(changes):
+            row, member = np.nonzero(each & partial)
+            if len(row):
+                t = self.located(e, known(e, row, member)).t
+                each[row, member] = (t <= self.end) & (t > self.since[index[member]])
+        stops = self.take(index, changes, known)
+        if stops is None:
+            return np.zeros(len(index), dtype=bool)
+        which, whose = stops.which, index[stops.which]
+        for kept, state in zip(self.stop_state, (stops.v, stops.y), strict=True):
+            kept[..., whose] = state[..., which]
+        self.attempts[whose] = (before.sum(axis=0) + stops.step + 1)[which]
+        self.steps[whose] = taken[(stops.step + 1)[which], np.flatnonzero(which)]
+        return which
+
+    def stepped(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """The run as without events; members that stop make no more attempts than up to there."""
+        stopped = ~np.isnan(self.stopped_at)
+        plan, pacing = self.plan._replace(progress=None), self.pacing
+        if not stopped.any():
+            return engine.adapt(plan, pacing, paces, v, y)
+        batch, rejected = plan.batch, 1 + engine.COUNTS.start
+        # What they may not make any more counts as if it had been rejected before.
+        spare = np.where(stopped, pacing.budget - self.attempts, 0.0).reshape(batch)
+        given = paces.reshape(*paces.shape, *(1,) * len(batch)) if paces.ndim == 1 else paces
+        paces = np.array(np.broadcast_to(given, (engine.PACE_NUMBERS, *batch)))
+        paces[rejected] += spare
+        out = engine.adapt(plan, pacing, paces, v, y)
+        last, who = out.paces, stopped.reshape(batch)
+        last[rejected] -= spare
+        last[engine.TIME][who], last[engine.WORK][who] = self.stopped_at[stopped], np.nan
+        last[engine.COUNTS.start][who] = self.steps[stopped]
+        out.status[who] = 0
+        states = [each.reshape(*each.shape[:-1], *batch) for each in self.stop_state]
+        later = (pacing.at.reshape(-1, *(1,) * len(batch)) >= self.stopped_at.reshape(batch)) & who
+        for saved, at_end, state in zip((out.v, out.y), (out.last_v, out.last_y), states, strict=True):
+            axes = tuple(range(1, state.ndim - len(batch) + 1))
+            np.copyto(saved, state, where=np.expand_dims(later, axes))
+            np.copyto(at_end, state, where=who)
+        return out
