@@ -126,6 +126,8 @@ impl Pace<f64> {
 impl<N: Number> Pace<N> {
     /// How many numbers it has.
     pub const NUMBERS: usize = 20;
+    /// Places of the time and of the step to try next among them.
+    pub const PLACES: [usize; 2] = [0, 1];
 
     /// From its numbers.
     pub fn of(numbers: [N; 20]) -> Self {

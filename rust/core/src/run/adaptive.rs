@@ -32,6 +32,11 @@ pub trait AdaptiveBatch: Send {
     /// The step-size control of a lane.
     fn pace(&self, lane: usize) -> Pace<f64>;
 
+    /// One number of all lanes: of v, of y or, behind these, of the step-size control. None where lanes do not stand side by side.
+    fn row(&self, _number: usize) -> Option<&[f64]> {
+        None
+    }
+
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
@@ -146,6 +151,10 @@ impl AdaptiveBatch for AdaptiveLanes {
     fn pace(&self, lane: usize) -> Pace<f64> {
         let (lanes, before) = (self.step.lanes(), self.numbers);
         Pace::of(std::array::from_fn(|i| self.state[(before + i) * lanes + lane]))
+    }
+
+    fn row(&self, number: usize) -> Option<&[f64]> {
+        self.state.chunks_exact(self.step.lanes()).nth(number)
     }
 
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {

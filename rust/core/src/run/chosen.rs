@@ -123,7 +123,8 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     let shares = if threads == 1 { 1 } else { b.div_ceil(lanes).min(threads * 8) };
     let shares: Vec<usize> = (0..shares).map(|i| b * (i + 1) / shares - b * i / shares).collect();
     let mut status = cut(arrays.status, b, &shares).into_iter();
-    let mut rows = [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.trail].map(|a| cut(a, b, &shares).into_iter());
+    let mut rows =
+        [arrays.saved_v, arrays.saved_y, arrays.state, arrays.paces, arrays.trail].map(|a| cut(a, b, &shares).into_iter());
     let mut parts = Vec::with_capacity(shares.len());
     let mut first = 0;
     for count in shares {
@@ -220,6 +221,7 @@ impl<'a> Worker<'a> {
     /// Attempts of all members one by one, keeping where they stand before the first and after each.
     fn trail(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
         let (lanes, rows) = (self.group.lanes(), self.plan.at.len());
+        let of_time = self.plan.v.len() + self.plan.y.len() + Pace::<f64>::PLACES[0];
         for first in (0..part.count).step_by(lanes) {
             let last = part.count - 1;
             for lane in 0..lanes {
@@ -228,14 +230,15 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, Pace { target: f64::INFINITY, held: 0.0, ..pace });
             }
             for (row, end) in self.plan.at.iter().enumerate() {
-                for (lane, member) in (first..part.count).enumerate().take(lanes) {
+                self.note(&mut part, first, row);
+                for lane in 0..lanes {
+                    if self.group.row(of_time).is_some_and(|times| times[lane] < *end) {
+                        continue;
+                    }
                     let pace = self.group.pace(lane);
                     if pace.t >= *end && pace.target > pace.t {
                         self.group.set_pace(lane, pace.idle());
                     }
-                    part.trail.row(row)[member] = pace.t;
-                    part.trail.row(rows + row)[member] = pace.h;
-                    self.save(&mut part, lane, &Assignment { member, next: row, origin: None, held_before: false });
                 }
                 if row + 1 < rows {
                     self.group.attempt(1);
@@ -250,6 +253,30 @@ impl<'a> Worker<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Keeps where all lanes stand, the first of which has this member.
+    fn note(&self, part: &mut Part, first: usize, row: usize) {
+        let (p, q, rows) = (self.plan.v.len(), self.plan.y.len(), self.plan.at.len());
+        let members = first..part.count.min(first + self.group.lanes());
+        if self.group.row(0).is_none() {
+            for (lane, member) in members.enumerate() {
+                let pace = self.group.pace(lane);
+                part.trail.row(row)[member] = pace.t;
+                part.trail.row(rows + row)[member] = pace.h;
+                self.save(part, lane, &Assignment { member, next: row, origin: None, held_before: false });
+            }
+            return;
+        }
+        let copy = |number: usize, to: &mut [f64]| {
+            let from = self.group.row(number).unwrap_or_default();
+            to[members.clone()].copy_from_slice(&from[..members.len()]);
+        };
+        (0..p).for_each(|i| copy(i, part.saved_v.row(row * p + i)));
+        (0..q).for_each(|i| copy(p + i, part.saved_y.row(row * q + i)));
+        for (i, place) in Pace::<f64>::PLACES.into_iter().enumerate() {
+            copy(p + q + place, part.trail.row(i * rows + row));
+        }
     }
 
     /// How many attempts are made before the next check. A step by a series is long work: none shall be made in vain. Of many lanes
