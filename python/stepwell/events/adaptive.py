@@ -142,22 +142,24 @@ class _Driver(Collected):
         plan, pacing = self.plan._replace(progress=None), self.pacing
         if not stopped.any():
             return engine.adapt(plan, pacing, paces, v, y)
-        batch, rejected = plan.batch, 1 + engine.COUNTS.start
+        batch, total, rejected = plan.batch, plan.members, 1 + engine.COUNTS.start
         # What they may not make any more counts as if it had been rejected before.
-        spare = np.where(stopped, pacing.budget - self.attempts, 0.0).reshape(batch)
-        given = paces.reshape(*paces.shape, *(1,) * len(batch)) if paces.ndim == 1 else paces
-        paces = np.array(np.broadcast_to(given, (engine.PACE_NUMBERS, *batch)))
-        paces[rejected] += spare
-        out = engine.adapt(plan, pacing, paces, v, y)
-        last, who = out.paces, stopped.reshape(batch)
+        spare = np.where(stopped, pacing.budget - self.attempts, 0.0)
+        given = np.broadcast_to(paces.reshape(engine.PACE_NUMBERS, -1), (engine.PACE_NUMBERS, total)).copy()
+        given[rejected] += spare
+        out = engine.adapt(plan, pacing, given.reshape(engine.PACE_NUMBERS, *batch), v, y)
+        last, status = out.paces.reshape(engine.PACE_NUMBERS, total).copy(), out.status.reshape(total).copy()
         last[rejected] -= spare
-        last[engine.TIME][who], last[engine.WORK][who] = self.stopped_at[stopped], np.nan
-        last[engine.COUNTS.start][who] = self.steps[stopped]
-        out.status[who] = 0
-        states = [each.reshape(*each.shape[:-1], *batch) for each in self.stop_state]
-        later = (pacing.at.reshape(-1, *(1,) * len(batch)) >= self.stopped_at.reshape(batch)) & who
-        for saved, at_end, state in zip((out.v, out.y), (out.last_v, out.last_y), states, strict=True):
-            axes = tuple(range(1, state.ndim - len(batch) + 1))
-            np.copyto(saved, state, where=np.expand_dims(later, axes))
-            np.copyto(at_end, state, where=who)
-        return out
+        last[engine.TIME, stopped], last[engine.WORK, stopped] = self.stopped_at[stopped], np.nan
+        last[engine.COUNTS.start, stopped] = self.steps[stopped]
+        status[stopped] = 0
+        later = (pacing.at[:, np.newaxis] >= self.stopped_at) & stopped
+        states = []
+        for saved, at_end, stop in zip((out.v, out.y), (out.last_v, out.last_y), self.stop_state, strict=True):
+            kept = saved.reshape(len(pacing.at), *stop.shape)
+            np.copyto(kept, stop, where=np.expand_dims(later, tuple(range(1, stop.ndim))))
+            ends = np.where(stopped, stop, np.reshape(at_end, stop.shape))
+            states.append((kept.reshape(saved.shape), ends.reshape(saved.shape[1:])))
+        (saved_v, last_v), (saved_y, last_y) = states
+        paces, status = last.reshape(engine.PACE_NUMBERS, *batch), status.reshape(batch)
+        return out._replace(v=saved_v, y=saved_y, last_v=last_v, last_y=last_y, paces=paces, status=status)

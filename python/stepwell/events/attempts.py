@@ -11,6 +11,7 @@ from .. import _core, engine
 from .._checks import Array
 from ..reference import adaptive
 from ..reference.bits import less, where
+from ..systems.base import rows as rows_of
 
 
 class Attempts(NamedTuple):
@@ -57,13 +58,22 @@ def made(plan: engine.Plan, until: float, attempts: int, budget: int, begins: bo
     last = np.empty((prod(plan.system.v_shape) + prod(plan.system.y_shape), members))
     trail, last_paces = np.empty((2, rows, members)), np.empty((engine.PACE_NUMBERS, members))
     before = paces.reshape(engine.PACE_NUMBERS, paces.size // engine.PACE_NUMBERS)
-    blocks = engine.rows(v, plan.batch), engine.rows(y, plan.batch)
-    arrays = engine.AdaptiveArrays(*blocks, before, *states, last, last_paces, np.empty(members, np.int64), trail)
+    arrays = engine.AdaptiveArrays(
+        v=rows_of(v, plan.batch),
+        y=rows_of(y, plan.batch),
+        paces=before,
+        saved_v=states[0],
+        saved_y=states[1],
+        last_state=last,
+        last_paces=last_paces,
+        status=np.empty(members, dtype=np.int64),
+        trail=trail,
+    )
     model, pacing = engine.model(plan), engine.Pacing(np.full(rows, until), budget, begins)
     if not _core.adapt(model, plan, pacing, arrays):  # an attempt is not one tape: the reference finds the start
         begun = np.array(engine.begun(plan, paces, v, y)).reshape(engine.PACE_NUMBERS, members)
         _core.adapt(model, plan, pacing._replace(begins=False), arrays._replace(paces=begun))
-    return Attempts(*trail, *states, last_paces)
+    return Attempts(trail[0], trail[1], states[0], states[1], last_paces)
 
 
 def _by_numpy(
@@ -78,6 +88,7 @@ def _by_numpy(
         for done in range(attempts + 1):
             pace = pace._replace(target=where(less(pace.t, until), np.inf, pace.t))
             rows.append((pace.t, pace.h, v, y))
-            if done < attempts:
+            if done < attempts and pace.outlook(budget).runs.any():
                 pace, v, y = attempt(pace, budget, v, y)
-    return Attempts(*(np.stack(each) for each in zip(*rows, strict=True)), np.array(np.broadcast_arrays(*pace)))
+    t, h, all_v, all_y = (np.stack(each) for each in zip(*rows, strict=True))
+    return Attempts(t, h, all_v, all_y, np.array(np.broadcast_arrays(*pace)))

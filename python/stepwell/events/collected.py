@@ -44,9 +44,13 @@ class Collected:
         self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
         self.trials = trials(plan, self.members)
         self.stopped_at = np.full(plan.members, np.nan)
-        self.count = np.zeros((len(events), plan.members), dtype=np.int64)
-        self.found: list[list[Found]] = [[] for _ in events]
-        self.waiting: list[list[Changes]] = [[] for _ in events]
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what was found."""
+        self.count = np.zeros((len(self.events), self.plan.members), dtype=np.int64)
+        self.found: list[list[Found]] = [[] for _ in self.events]
+        self.waiting: list[list[Changes]] = [[] for _ in self.events]
 
     def take(self, index: Whole, changes: list[Any], known: Known) -> Stops | None:
         """Count and keep changes of sign, up to the first terminal event of each member; None if no member stops.
@@ -99,9 +103,9 @@ class Collected:
         """Locate these with others, as many at once as are quick together."""
         self.waiting[e].append(changes)
         if sum(len(each.member) for each in self.waiting[e]) >= LOCATED_AT_ONCE:
-            self._locate_waiting(e)
+            self.locate_waiting(e)
 
-    def _locate_waiting(self, e: int) -> None:
+    def locate_waiting(self, e: int) -> None:
         """Locate what was put off."""
         waiting, self.waiting[e] = self.waiting[e], []
         if waiting:
@@ -129,7 +133,7 @@ class Collected:
         """Those of each event, by name."""
         blocks, made = (self.plan.system.v_shape, self.plan.system.y_shape), {}
         for e, (event, count) in enumerate(zip(self.events, self.count, strict=True)):
-            self._locate_waiting(e)
+            self.locate_waiting(e)
             found = self.found[e]
             member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
             order = np.lexsort((step, member))

@@ -240,7 +240,8 @@ impl<'a> Worker<'a> {
                         self.group.set_pace(lane, pace.idle());
                     }
                 }
-                if row + 1 < rows {
+                let budget = self.plan.budget as f64;
+                if row + 1 < rows && (0..lanes).any(|lane| self.group.pace(lane).runs(budget)) {
                     self.group.attempt(1);
                 }
                 if !go_on(0) {
