@@ -378,8 +378,6 @@ def test_wrong_events(wrong: tuple[Any, str]) -> None:
 
 def test_what_does_not_go_with_events() -> None:
     start: dict[str, Any] = {"v": 0.0, "y": 1.0, "events": crossing}
-    with pytest.raises(sw.errors.ArgumentError, match="events: goes with fixed steps only"):
-        sw.integrate(sw.Oscillator(), "merson", **start, tolerance=1e-6, at=[1.0])
     with pytest.raises(sw.errors.UnsupportedError, match="events: goes with form='direct' only"):
         sw.integrate(sw.Oscillator(), "rk4", **start, dt=0.1, steps=5, form="power")
     many, system = sw.Event(crossing, most=10**6), sw.Oscillator(np.ones(10**6))

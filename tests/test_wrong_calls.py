@@ -254,6 +254,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         | {"control": None, "tolerance": None, "at": None, "max_steps": None},
     ),
     "integrate events": (sw.integrate, FREE | {"dt": 0.1, "steps": 10, "events": [sw.Event(passage, terminal=True)]}),
+    "integrate events, adaptive": (
+        sw.integrate,
+        FREE | {"method": "merson", "tolerance": 1e-6, "at": [1.0], "events": [passage]},
+    ),
     "integrate bodies": (
         sw.integrate,
         BODIES | {"dt": 0.1, "steps": 10, "record": ["momentum"], "control": sw.EnergyControl(0.1), "first_bad_step": -1},
@@ -288,6 +292,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "scenes.aircraft": (sw.scenes.aircraft, {"form": "euler", "roll": 40.0, "pitch": 0.0}),
     "scenes.gimbal_trap": (sw.scenes.gimbal_trap, {"form": "quaternion", "roll": 2.0, "torque": -1.5}),
     "World": (_world, FREE | {"dt": 0.1, "t0": 0.0, "start_step": 0, "start": None, "control": None, "force": None}),
+    "World events": (_world, FREE | {"dt": 0.1, "events": [sw.Event(passage)]}),
     "scenes.scene": (sw.scenes.scene, {"name": "clover"}),
     "scenes.chain": (sw.scenes.chain, {"n": 4, "modes": {1: 1.0}}),
     "scenes.bouncing_ball": (sw.scenes.bouncing_ball, {"restitution": 0.8, "height": 1.0, "gravity": 9.81}),

@@ -117,8 +117,8 @@ def integrate(
         record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
             ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
         events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
-            g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed steps in the direct form
-            (docs/howto/events.md).
+            g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed and adaptive steps in the
+            direct form (docs/howto/events.md).
         form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
             which make any number of steps at once and need inputs that are constants or sinusoids.
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the

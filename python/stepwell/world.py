@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from .methods import Method
 from .methods import method as find_method
 from .systems import System
 from .systems.base import a_system
+
+if TYPE_CHECKING:
+    from .events import Occurrences
 
 
 class World:
@@ -42,15 +45,18 @@ class World:
         dt_before: the step so far, likewise. Another ``dt`` is then refused.
         fused: compute each step with fused multiply-adds; see ``integrate``.
         dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
+        events: quantities whose changes of sign are located, as of ``integrate``; those of the last call of ``step`` are in
+            ``world.events``. No event stops a member of a world.
 
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
 
     ``step(n)`` makes n steps in place and allocates nothing: it is meant for the few microseconds of a frame, and holds the GIL
-    for them. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between
-    steps, the method starts again from the new values. Ctrl-C leaves the world at the last complete step, or at the
-    one before (leapfrog of many bodies, whose velocity there would take long to compute).
+    for them. With events it looks at the state after each step, which takes some more microseconds. The carry of Verlet and
+    leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts again from the new values. Ctrl-C
+    leaves the world at the last complete step, or at the one before (leapfrog of many bodies, whose velocity there would take
+    long to compute).
     A world does not check for divergence: use ``numpy.isfinite`` on your arrays. Arrays of another library are stepped in place,
     too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
@@ -64,7 +70,22 @@ class World:
         >>> finer = sw.World(world.system, "rk4", dt=0.01, v=v.copy(), y=y.copy(), t0=world.t)
     """
 
-    __slots__ = ("_core", "_dt", "_force", "_fused", "_given", "_method", "_start", "_system", "_t0", "_v", "_y", "step")
+    __slots__ = (
+        "_asked",
+        "_core",
+        "_dt",
+        "_force",
+        "_frames",
+        "_fused",
+        "_given",
+        "_method",
+        "_start",
+        "_system",
+        "_t0",
+        "_v",
+        "_y",
+        "step",
+    )
 
     def __init__(
         self,
@@ -84,6 +105,7 @@ class World:
         dt_before: float | None = None,
         fused: bool = False,
         dtype: Any = "float64",
+        events: Any = None,
     ) -> None:
         how = find_method(method)
         system = copy.deepcopy(a_system(system).sized(v, y))
@@ -94,7 +116,7 @@ class World:
         if single:
             from . import _single  # only such worlds need it
 
-            dt = _single.step(system, how, "direct", dt)
+            dt = _single.step(system, how, "direct", dt, events=events is not None)
         goes_on_alike(how, dt, carried_by, dt_before)
         t0 = _checks.number("t0", t0, unit="units of time")
         batch = _checks.shape_of("y", y)[len(system.y_shape) :]
@@ -138,8 +160,16 @@ class World:
         self._core = loop
         self._given, self._system, self._method, self._dt = system, stepped, how, dt
         self._t0, self._start, self._v, self._y, self._force, self._fused = t0, start, v, y, force, plan.fused
+        self._asked, self._frames = None, None
+        step = loop.step
+        if events is not None:
+            from .events import event, frames  # only such worlds need it
+
+            self._asked = event.several(events)
+            self._frames = frames.Frames(plan, self._asked, v, y, loop.step, lambda: loop.step_number)
+            step = self._frames.step
         #: ``step(n=1)`` makes n steps in place.
-        object.__setattr__(self, "step", loop.step)
+        object.__setattr__(self, "step", step)
 
     step: Any
 
@@ -194,13 +224,13 @@ class World:
         return shortened(f"<world of {self._system!r} by {self._method.name}: {where}>", MAX_LINE)
 
     def __copy__(self) -> World:
-        return World(self._given, self._method, dt=self._dt, **self.resume)
+        return World(self._given, self._method, dt=self._dt, events=self._asked, **self.resume)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> World:
         return self.__copy__()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self._given, self._method.name, self._dt, self.resume)
+        return _restored, (self._given, self._method.name, self._dt, self._asked, self.resume)
 
     @property
     def v(self) -> Array:
@@ -218,6 +248,20 @@ class World:
         return self._force
 
     @property
+    def events(self) -> dict[str, Occurrences]:
+        """Where the quantities given as ``events=`` changed their signs in the last call of ``step``, by the name of the event.
+
+        Example:
+            >>> lowest = sw.Event(lambda t, v, y: y, name="lowest")
+            >>> v, y = np.zeros(3), np.ones(3)
+            >>> world = sw.World(sw.Pendulum([1.0, 2.0, 3.0]), "rk4", v=v, y=y, dt=0.01, events=lowest)
+            >>> world.step(100)
+            >>> world.events["lowest"].member, world.events["lowest"].t.round(6)
+            (array([1, 2]), array([0.837497, 0.558331]))
+        """
+        return {} if self._frames is None else self._frames.told
+
+    @property
     def t(self) -> float:
         """The time at which the world stands: t0 + k·dt."""
         return self._core.t
@@ -228,7 +272,7 @@ class World:
         return self._core.step_number
 
 
-def _restored(system: System, method: str, dt: float, state: dict[str, Any]) -> World:
+def _restored(system: System, method: str, dt: float, events: Any, state: dict[str, Any]) -> World:
     # Arrays of a message from another process may be read-only, and begin at an odd place in memory.
     state = {name: np.array(value) if isinstance(value, np.ndarray) else value for name, value in state.items()}
-    return World(system, method, dt=dt, **state)
+    return World(system, method, dt=dt, events=events, **state)

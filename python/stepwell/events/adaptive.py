@@ -126,7 +126,7 @@ class _Driver(Collected):
             if len(row):
                 t = self.located(e, known(e, row, member)).t
                 each[row, member] = (t <= self.end) & (t > self.since[index[member]])
-        stops = self.take(index, changes, known)
+        stops = self.take(index, len(h), changes, known)
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         which, whose = stops.which, index[stops.which]

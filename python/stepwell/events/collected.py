@@ -52,15 +52,15 @@ class Collected:
         self.found: list[list[Found]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]
 
-    def take(self, index: Whole, changes: list[Any], known: Known) -> Stops | None:
+    def take(self, index: Whole, steps: int, changes: list[Any], known: Known) -> Stops | None:
         """Count and keep changes of sign, up to the first terminal event of each member; None if no member stops.
 
         Args:
             index: the members.
+            steps: how many there are.
             changes: of each event, in which steps it is, shape (steps, members).
             known: what is known of such changes; members are counted among these.
         """
-        steps = len(changes[0])
         # The step in which a member stops; later ones do not count.
         last = np.full(len(index), steps)
         for each, event in zip(changes, self.events, strict=True):

@@ -192,7 +192,9 @@ class _Driver(Collected):
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
             finite = (out.first_bad < 0) | (ends < out.first_bad)
             changes = [each & finite for each in changes]
-        stops = self.take(index, changes, lambda e, step, member: self._changes(now, index, g[e], states, step, member))
+        stops = self.take(
+            index, now.steps, changes, lambda e, step, member: self._changes(now, index, g[e], states, step, member)
+        )
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         after = np.searchsorted(self.saves, done + stops.step, "right")
