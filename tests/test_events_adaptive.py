@@ -179,6 +179,19 @@ def test_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter(method: 
         np.testing.assert_array_equal(sum(piece.events[name].count for piece in pieces), theirs.count)
 
 
+def test_a_run_that_was_out_of_attempts_goes_on() -> None:
+    whole = sweep(slice(0, 5), events=crossing, at=[12.0])
+    assert whole.paces is not None
+    with pytest.warns(sw.ToleranceWarning):
+        head = sweep(slice(0, 5), events=crossing, at=[12.0], max_steps=int(whole.paces.accepted.max()) // 2)
+    tail = sw.integrate(head.system, "merson", **head.resume, at=[12.0], events=crossing)
+    np.testing.assert_array_equal(tail.y[-1], whole.y[-1])
+    counts = [each.events["crossing"].count for each in (head, tail, whole)]
+    assert counts[0].any()
+    assert counts[1].any()
+    np.testing.assert_array_equal(counts[0] + counts[1], counts[2])
+
+
 def test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on() -> None:
     run, free = sweep(), sweep(events=THREE[:2])
     found = run.events["end"]

@@ -76,7 +76,9 @@ class _Driver(Collected):
         paces = np.broadcast_to(paces.reshape(engine.PACE_NUMBERS, -1), (engine.PACE_NUMBERS, total))
         v, y = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
         if not self.pacing.begins:
-            self.since, self.begin = paces[engine.TARGET], float(paces[engine.TIME].min(initial=np.inf))
+            # A step that is held has been looked at before, up to the last time of the run that goes on.
+            self.since = np.where(paces[engine.HELD] > 0.0, paces[engine.TARGET], -np.inf)
+            self.begin = float(paces[engine.TIME].min(initial=np.inf))
         numbers = 2 + prod(system.v_shape) + prod(system.y_shape)
         size = max(1, NUMBERS_AT_ONCE // (numbers * LEAST_ATTEMPTS))
         for first in range(0, total, size):
