@@ -92,7 +92,7 @@ def test_a_trial_is_the_state_that_is_saved_within_a_step(method: str, name: str
     v, y = 0.3 * rng.normal(size=(*system.v_shape, 4)), rng.normal(size=(*system.y_shape, 4))
     plan = engine.Plan(system, how, (4,), 1.0, order=10 if how.has_series else 0)
     paces = engine.paces(plan, None, np.array(1e-6), None)
-    out = attempts.made(plan, np.inf, 12, 1000, True, paces, v, y)
+    out = attempts.attempted(plan, np.inf, 12, 1000, True, paces, v, y)
     trials, who = AdaptiveTrials(plan, Members(plan)), np.arange(4)
     h = out.lengths(plan)[10]
     for block, end in zip(trials.step(who, out.t[10], h, out.v[10], out.y[10]), (out.v[11], out.y[11]), strict=True):

@@ -13,7 +13,7 @@ from .._checks import Array
 from ..reference.events import crosses
 from ..reference.types import Whole
 from ..result import Status
-from .attempts import Attempts, made
+from .attempts import Attempts, attempted
 from .collected import Collected
 from .event import Event
 from .parts import Changes
@@ -91,7 +91,7 @@ class _Driver(Collected):
         some = self.members.plan(index)._replace(progress=None)
         while len(index):
             attempts = max(1, min(together, most // len(index), MOST_ATTEMPTS))
-            out = made(some, self.end, attempts, self.pacing.budget, begins, np.ascontiguousarray(paces), v, y)
+            out = attempted(some, self.end, attempts, self.pacing.budget, begins, np.ascontiguousarray(paces), v, y)
             before = np.zeros((2, len(index))) if begins else paces[engine.COUNTS][:2]
             stopped = self._look(some, index, out, before, not begins)
             after = out.paces[engine.COUNTS][:2].sum(axis=0)

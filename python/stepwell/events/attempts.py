@@ -36,7 +36,9 @@ class Attempts(NamedTuple):
         return self.h[1:] if plan.method.has_series else self.h[:-1]
 
 
-def made(plan: engine.Plan, until: float, attempts: int, budget: int, begins: bool, paces: Array, v: Array, y: Array) -> Attempts:
+def attempted(
+    plan: engine.Plan, until: float, attempts: int, budget: int, begins: bool, paces: Array, v: Array, y: Array
+) -> Attempts:
     """Make attempts one by one, of each member until it is at or past a time.
 
     So the last step of a member is made, where a run would hold it, to save a state within.
