@@ -152,6 +152,18 @@ def test_a_member_alone_is_the_same_as_in_a_batch_and_by_the_reference(method: s
         assert_same_events(run, other)
 
 
+def test_neither_threads_nor_other_members_matter_in_a_large_batch() -> None:
+    omega, given = np.linspace(0.5, 2.0, 600), {"v": 0.1, "y": 1.0, "tolerance": 1e-5, "at": [12.0]}
+    one, two = (sw.integrate(sw.Pendulum(omega), "merson", **given, events=THREE, threads=threads) for threads in (1, 2))
+    same(one, two)
+    assert_same_events(one, two)
+    for i in (0, 63, 299, 300, 599):
+        alone = sw.integrate(sw.Pendulum(omega[i]), "merson", **given, events=THREE)
+        for name, mine in alone.events.items():
+            np.testing.assert_array_equal(mine.t, one.events[name].of(i).t)
+            np.testing.assert_array_equal(mine.y, one.events[name].of(i).y)
+
+
 @pytest.mark.parametrize("fused", [False, True])
 @pytest.mark.parametrize("method", ABLE)
 def test_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter(method: str, fused: bool) -> None:

@@ -112,6 +112,8 @@ class _Driver(Collected):
         given, h = self.members.numbers(index), out.lengths(now)
         g = [quantity(out.t, v, y, given) for quantity in self.quantities]
         changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
+        if not np.any([each.any() for each in changes]):
+            return np.zeros(len(index), dtype=bool)
         taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(out.t[1:] > out.t[:-1], axis=0)]) + before[0]
 
         def known(e: int, row: Whole, member: Whole) -> Changes:
