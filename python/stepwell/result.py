@@ -133,7 +133,7 @@ class Run(Value):
         force: what was added to v̇, or None, shape (*block, *batch).
         work: the energy that a control or a projection added to each member in this run, or None, shape (*batch). For a control
             it is the sum over the steps of ((1 − g)² − 1)·K, the change by its push −g·v alone, averaged over the evaluations.
-            None in a run with events.
+            None in a run of fixed steps with events; with adaptive steps NaN for members that stopped at one.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)

@@ -22,7 +22,8 @@ class Occurrences(Value):
         name: of the event.
         count: how many there were, per member, shape (*batch).
         member: to which member each entry belongs: its index in the flattened batch, shape (kept,).
-        step: the number of the step in which it was, shape (kept,): between t0 + step·dt and one dt later.
+        step: the number of the step in which it was, shape (kept,): between t0 + step·dt and one dt later; with adaptive steps
+            how many the member had taken before.
         t: its time, shape (kept,).
         v: velocities there, shape (kept, *block).
         y: coordinates there, likewise.
