@@ -72,10 +72,11 @@ def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
     The start comes last, so that it is rounded once.
     """
     square = step * step
-    odd, even = (
-        functools.reduce(lambda total, term: term + square * total, reversed(powers)) for powers in (terms[::2], terms[1::2])
-    )
-    return start + step * (odd + step * even)
+
+    def total(powers: Sequence[Array]) -> Array:
+        return functools.reduce(lambda total, term: term + square * total, reversed(powers))
+
+    return start + step * (total(terms[::2]) + step * total(terms[1::2]))
 
 
 def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]) -> Any:

@@ -167,7 +167,7 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, pace.idle());
             }
         }
-        // Of a series: which lanes have a step to try, and how many attempts were made since the last look at the monitor.
+        // Of a series: which lanes have a step to try, and how many attempts were made since the monitor was last asked.
         let (mut runs, mut unseen) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
