@@ -7,7 +7,6 @@ step is the least of these for j = p − 1 and p and both blocks, times exp(−0
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -73,10 +72,15 @@ def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
     """
     square = step * step
 
-    def total(powers: Sequence[Array]) -> Array:
-        return functools.reduce(lambda total, term: term + square * total, reversed(powers))
+    def summed(powers: Sequence[Array]) -> Any:
+        total = powers[-1]
+        for term in reversed(powers[:-1]):
+            total = term + square * total
+        return total
 
-    return start + step * (total(terms[::2]) + step * total(terms[1::2]))
+    odd, even = summed(terms[::2]), summed(terms[1::2])
+    end: Array = start + step * (odd + step * even)
+    return end
 
 
 def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]) -> Any:
