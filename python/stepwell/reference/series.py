@@ -248,17 +248,20 @@ def _product(a: Term, b: Term) -> Term:
 
 
 def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
-    """Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b.
+    """Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for.
 
-    Of a square they are equal.
+    The others are two sums: those with the older of a apart from those with the older of b. Of a square both are equal.
     """
     middle = None if k % 2 else _product(a[k // 2], b[k // 2])
-    older = range((k + 1) // 2 - 1, -1, -1)
+    if k == 0:
+        return middle
+    older = range((k + 1) // 2 - 1, 0, -1)
     if a is b:
-        return functools.reduce(lambda total, j: _sum(total, _product(_sum(a[j], a[j]), a[k - j])), older, middle)
+        return functools.reduce(lambda total, j: _sum(total, _product(_sum(a[j], a[j]), a[k - j])), [*older, 0], middle)
     of_a = functools.reduce(lambda total, j: _sum(total, _product(a[j], b[k - j])), older, None)
     of_b = functools.reduce(lambda total, j: _sum(total, _product(a[k - j], b[j])), older, None)
-    return _sum(_sum(of_a, of_b), middle)
+    newest = _sum(_product(a[0], b[k]), _product(a[k], b[0]))
+    return _sum(_sum(_sum(of_a, of_b), middle), newest)
 
 
 def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign: int = 0) -> Series:

@@ -192,18 +192,22 @@ impl Series {
         }
     }
 
-    /// Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b, so that neither sum waits for the
-    /// other. Of a square they are equal.
+    /// Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for. The others are two sums, those with the
+    /// older of a apart from those with the older of b, so that neither waits for the other; of a square both are equal.
     fn product(&self, a: Id, b: Id, k: usize) -> Term {
         let middle = if k.is_multiple_of(2) { product(self.term(a, k / 2), self.term(b, k / 2)) } else { None };
-        let older = (0..k.div_ceil(2)).rev();
         if a == b {
             let twice = |j: usize| sum(self.term(a, j), self.term(a, j));
-            return older.fold(middle, |total, j| sum(total, product(twice(j), self.term(a, k - j))));
+            return (0..k.div_ceil(2)).rev().fold(middle, |total, j| sum(total, product(twice(j), self.term(a, k - j))));
         }
-        let of_a = older.clone().fold(None, |total, j| sum(total, product(self.term(a, j), self.term(b, k - j))));
-        let of_b = older.fold(None, |total, j| sum(total, product(self.term(a, k - j), self.term(b, j))));
-        sum(sum(of_a, of_b), middle) // which does not depend on which of both is a
+        let of_a = |j: usize| product(self.term(a, j), self.term(b, k - j));
+        let of_b = |j: usize| product(self.term(a, k - j), self.term(b, j));
+        if k == 0 {
+            return middle;
+        }
+        let older = (1..k.div_ceil(2)).rev();
+        let totals = older.fold((None, None), |(by_a, by_b), j| (sum(by_a, of_a(j)), sum(by_b, of_b(j))));
+        sum(sum(sum(totals.0, totals.1), middle), sum(of_a(0), of_b(0))) // which does not depend on which of both is a
     }
 
     /// Of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
