@@ -23,6 +23,8 @@ RUNS = {
     "with a bar": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**11, progress=True)",
     "a limit of many states": "sw.stability_limit(sw.LinearSystem(np.random.rand(90, 90) - 60 * np.eye(90)), 'false_euler')",
     "limits of many members": "sw.stability_limit(sw.Oscillator(np.ones(10**6), 0.1), 'rk4')",
+    "events with a tolerance": "sw.integrate(sw.Pendulum(np.ones(10**4)), 'merson', v=0.0, y=1.0, tolerance=1e-11, at=[10.0**4], "
+    "events=sw.Event(lambda t, v, y: y, most=9))",
     "many digits": "sw.stability_limit(sw.LinearSystem(np.eye(30, k=1) - np.eye(30) + np.diag([1e-9], -29)), 'false_heun')",
     "the reference": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, backend='numpy')",
 }
