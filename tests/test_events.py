@@ -11,7 +11,7 @@ import pytest
 import stepwell as sw
 from cases import SYSTEMS, Case, assert_same, cases, thinned
 from stepwell import engine
-from stepwell.events import collected, driver
+from stepwell.events import collected, driver, trials
 from stepwell.events.members import Members
 from stepwell.events.traced import Quantity
 from stepwell.events.trials import Trials, one_step
@@ -69,7 +69,7 @@ def test_steps_are_those_of_a_run_without_and_both_backends_agree(case: Case, mo
 
 @pytest.mark.parametrize("case", thinned(DIRECT, {"direct": 1}, "events"))
 @pytest.mark.filterwarnings("ignore")
-def test_a_trial_of_the_whole_length_is_the_step_whatever_members_are_taken(case: Case) -> None:
+def test_a_trial_of_the_whole_length_is_the_step_whatever_members_are_taken(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     system, arguments = case.make(5)
     method = sw.method(case.method)
     plan = engine.Plan(system.stepped_by(method), method, (5,), 0.1, choice=method.start_choice(case.start))
@@ -78,11 +78,20 @@ def test_a_trial_of_the_whole_length_is_the_step_whatever_members_are_taken(case
     t, h = np.zeros(4), np.full(4, 0.1)
     v, y = (arguments[name][..., index] for name in ("v", "y"))
     by_reference = one_step(members.plan(index), t, h, v, y)
+    by_core = Trials(plan, members).step(index, t, h, v, y)
+    monkeypatch.setattr(trials, "MEMBERS_BY_CORE", 0)
     by_trial = Trials(plan, members).step(index, t, h, v, y)
     out = engine.advance(plan, arguments["v"], arguments["y"])
-    for a, b, step in zip(by_reference, by_trial, (out.v[-1], out.y[-1]), strict=True):
+    for a, b, c, step in zip(by_reference, by_trial, by_core, (out.v[-1], out.y[-1]), strict=True):
         np.testing.assert_array_equal(a, step[..., index])
         np.testing.assert_array_equal(b, step[..., index])
+        np.testing.assert_array_equal(c, step[..., index])
+    # Of other lengths, by the core and by the reference.
+    h = 0.1 * np.array([0.3, 0.01, 0.9, 0.5])
+    by_trial = Trials(plan, members).step(index, t, h, v, y)
+    monkeypatch.setattr(trials, "MEMBERS_BY_CORE", 4)
+    for a, b in zip(Trials(plan, members).step(index, t, h, v, y), by_trial, strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 SWEEP: dict[str, Any] = {"v": np.linspace(-0.5, 0.5, 40), "y": 1.0, "dt": 0.1, "steps": 300}

@@ -240,6 +240,7 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
         return plan.method.steps.finish(s, plan.choice, t + h, slot, y), y
 
     monkeypatch.setattr(trials, "stepped", wrong)
+    monkeypatch.setattr(trials, "MEMBERS_BY_CORE", 0)
     assert order_of(pendulum, "verlet", STEP[2]) < 1.7
 
 

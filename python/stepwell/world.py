@@ -53,10 +53,10 @@ class World:
         UnsupportedError: if the method cannot step the system.
 
     ``step(n)`` makes n steps in place and allocates nothing: it is meant for the few microseconds of a frame, and holds the GIL
-    for them. Events are evaluated after each step, which takes a tenth of a millisecond more, and some milliseconds where one
-    happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts again
-    from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies, whose
-    velocity there would take long to compute).
+    for them. Events are evaluated after each step, which takes a tenth of a millisecond more, and one to three milliseconds where
+    one happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts
+    again from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies,
+    whose velocity there would take long to compute).
     A world does not check for divergence: use ``numpy.isfinite`` on your arrays. Arrays of another library are stepped in place,
     too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 

@@ -18,12 +18,18 @@ from .members import Members
 
 #: A step of an own system of more operations is computed by calling its function.
 MOST_OPERATIONS = 4000
+#: Steps of up to so many members are made by the core, one after the other: NumPy's calls take as long for one member as for some
+#: hundred.
+MEMBERS_BY_CORE = 6
+#: So many members of a plan are kept, each as a plan of its own.
+KEPT_PLANS = 256
 
 
 class Trials:
     """Steps of any members of a plan, from any of their states.
 
-    The function of an own system takes long to call, so that its step is traced once for all members; the bits are the same.
+    The function of an own system takes long to call, so that its step is traced once for all members; of a few members the core
+    makes them, of steps of one length for all. The bits are the same.
 
     Args:
         plan: of the run.
@@ -37,9 +43,13 @@ class Trials:
         #: Whether there is no other way, however long the step is.
         self._always_traced = False
         self._is_traced = not isinstance(plan.system, OwnSystem)
+        self._by_core = plan.backend == "rust"
+        self._plans: dict[int, engine.Plan] = {}
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, of another time and length for each."""
+        if self._by_core and len(index) <= MEMBERS_BY_CORE:
+            return self._one_by_one(index, t, h, v, y)
         if not self._is_traced:
             self._trace()
             self._is_traced = True
@@ -51,6 +61,21 @@ class Trials:
             made = self._operations(state, numbers)
         n = len(made) - y[..., 0].size
         return _block(made[:n], v), _block(made[n:], y)
+
+    def _one_by_one(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """The same by the core."""
+        made_v, made_y = np.empty(v.shape), np.empty(y.shape)
+        for i, (member, begin, length) in enumerate(zip(index.tolist(), t.tolist(), h.tolist(), strict=True)):
+            if member not in self._plans:
+                if len(self._plans) >= KEPT_PLANS:
+                    self._plans.clear()
+                self._plans[member] = self._members.plan(np.array([member]))._replace(
+                    first=0, steps=1, every=None, threads=1, progress=None, record=(), fused=False
+                )
+            plan, one = self._plans[member]._replace(t0=begin, dt=length), slice(i, i + 1)
+            out = engine.advance(plan, np.ascontiguousarray(v[..., one]), np.ascontiguousarray(y[..., one]))
+            made_v[..., one], made_y[..., one] = out.v[-1], out.y[-1]
+        return made_v, made_y
 
     def _trace(self) -> None:
         """Trace a step of an own system, if it is short and has no samples."""
@@ -82,6 +107,7 @@ class AdaptiveTrials(Trials):
 
     def __init__(self, plan: engine.Plan, members: Members) -> None:
         super().__init__(plan, members)
+        self._by_core = False  # which makes no steps of a given length of these
         self._always_traced = plan.method.has_series
         self._is_traced = self._is_traced and not self._always_traced
 
