@@ -432,6 +432,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "methods": ["rk4"],
             "cost": "evaluations",
             "fixed": True,
+            "dtype": "both",
         },
     ),
     "charts.figures": (charts.figures, OF_METHODS | {"phi": 0.5, "periods": 2.0}),
