@@ -371,6 +371,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "control": None,
             "force": None,
             "fused": False,
+            "dtype": "float32",
             "t0": 0.0,
             "start": None,
         }

@@ -36,6 +36,11 @@ def step(system: System, how: Method, form: str, dt: float, *, events: bool = Fa
             f"dtype: float32 does not go with rods that meet surfaces, whose joints are decided by more digits than it has, got "
             f"{system!r}; use float64"
         )
+    return rounded_step(dt)
+
+
+def rounded_step(dt: float) -> float:
+    """A step, rounded to float32; raise if nothing is left of it."""
     with np.errstate(over="ignore"):
         rounded = float(np.float32(dt))
     if not 0.0 < rounded < np.inf:
