@@ -407,7 +407,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,
-        {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False},
+        {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False, "dtype": "float64"},
     ),
     "explain bodies": (sw.explain, {"system": sw.NBody(), "method": "rk4", "members": 2, "control": sw.EnergyControl(0.1)}),
     "explore": (sw.explore, {"scenes": "oscillator", "methods": ["rk4"]}),

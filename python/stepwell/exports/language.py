@@ -117,6 +117,7 @@ class Language(Notation, ABC):
     called = FUNCTIONS
 
     def __init__(self, prefix: str, fields: Names) -> None:
+        super().__init__()
         self.prefix, self.fields = prefix, fields
         self.names = Names()
         self.kinds: dict[str, str] = {}
