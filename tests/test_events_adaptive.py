@@ -1,5 +1,7 @@
-"""Events with adaptive steps: steps are those of runs without; what is found depends neither on backend, batch, pieces nor saves;
-where it is, against closed forms; and mistakes that these tests must notice."""
+"""Events with adaptive steps: steps are those of runs without; what is found depends neither on backend, batch, pieces nor saves.
+
+Where it is, and mistakes that these tests must notice, are in test_events_adaptive_located.py.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +11,15 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, assert_same, fits
 from stepwell import engine
-from stepwell.events import adaptive, attempts, collected
+from stepwell.events import adaptive, attempts
 from stepwell.events.members import Members
 from stepwell.events.trials import AdaptiveTrials
 from test_events import assert_same_events, crossing, first
-from test_events_located import low_end, straight
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]
 U = 2.0**-53
@@ -344,174 +344,6 @@ def test_what_does_not_go() -> None:
         sw.integrate(sw.Pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[1.0], events=lambda t, y: y)
     with pytest.raises(sw.errors.ArgumentError, match="events: expected a list of events"):
         sw.integrate(sw.Pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[1.0], events=3.0)
-
-
-# ---- where they are
-
-#: A quarter of the period of a pendulum that begins at 1 rad, at rest: π/2/agm(1, cos ½) (Gauss).
-QUARTER = float(mpmath.pi / 2 / mpmath.agm(1, mpmath.cos(0.5)))
-zero = sw.Event(lambda t, v, y: y, name="zero")
-
-
-def passage(method: str, tolerance: float, number: int = 3) -> tuple[float, float]:
-    """By how much a pendulum's fourth passage through its lowest point is late, and by how much it is so by the state then."""
-    run = sw.integrate(sw.Pendulum(), method, v=0.0, y=1.0, tolerance=tolerance, at=[7.0 * QUARTER, 13.0], events=zero)
-    return float(run.events["zero"].t[number]) - 7.0 * QUARTER, float(-run.y[0] / run.v[0])
-
-
-#: From the coarsest tolerance at which the error is nearly a power of it to where roundings show.
-TOLERANCES = 10.0 ** -np.arange(5.0, 10.0)
-
-
-def slope(method: str) -> float:
-    """By what power of the tolerance the error of the time falls."""
-    errors = [abs(passage(method, tolerance)[0]) for tolerance in TOLERANCES]
-    return float(np.polyfit(np.log10(TOLERANCES), np.log10(errors), 1)[0])
-
-
-@pytest.mark.parametrize("method", ABLE)
-def test_the_error_of_the_time_follows_the_tolerance_and_is_that_of_the_motion(method: str) -> None:
-    """As that of states does (test_adaptive). And a motion that is off by δ at the time of the passage passes later by −δ/v, to
-    first order: the second is δ²·|v̇|/(2v³), with v near 1 and v̇ near 0 there, less than δ². Both lie in one step, or in two
-    whose errors differ: of each step's error a share at most, which the tolerance bounds, counted twice with the roundings.
-    """
-    assert 0.7 < slope(method) < 1.3
-    for tolerance in TOLERANCES:
-        late, by_state = passage(method, tolerance)
-        assert abs(late - by_state) < by_state**2 + 1e-3 * abs(by_state) + 100 * U
-
-
-def pericentre(method: str, tolerance: float) -> float:
-    """By how much a planet of eccentricity 1/2 that begins at its apocentre is early or late at its pericentre, π later."""
-    event = sw.Event(lambda t, v, y: y[1, 0] * v[1, 0] + y[1, 1] * v[1, 1], direction=1, name="pericentre")
-    v, y = (np.array([[0.0, 0.0], each]) for each in ([0.0, (1 / 3) ** 0.5], [1.5, 0.0]))
-    run = sw.integrate(sw.NBody([1.0, 0.0], force="newton"), method, v=v, y=y, tolerance=tolerance, at=[4.0], events=event)
-    return abs(float(run.events["pericentre"].t[0]) - np.pi)
-
-
-@pytest.mark.parametrize("method", ABLE)
-def test_a_planet_is_at_its_pericentre_in_time(method: str) -> None:
-    """The error falls by four decades or more over six of the tolerance, and ends within a thousand tolerances."""
-    coarse, fine = pericentre(method, 1e-4), pericentre(method, 1e-10)
-    assert fine < 1e-4 * coarse
-    assert fine < 1e-7
-
-
-@sw.system
-def by_time(t: Any, v: Any, y: Any, *, amplitude: float = 1.0) -> Any:
-    return -amplitude * np.cos(t)
-
-
-@pytest.mark.parametrize("method", ABLE)
-def test_a_driven_motion_passes_in_time(method: str) -> None:
-    """y = cos t, driven by v̇ = −cos t alone, is ½ at π/3: so trials are made at their own times."""
-    half = sw.Event(lambda t, v, y: y - 0.5, name="half")
-    run = sw.integrate(by_time(), method, v=0.0, y=1.0, tolerance=1e-10, at=[2.0], events=half)
-    # Some 100 steps at most, each off by 10⁻¹⁰ of numbers up to 1, and y passes at a speed of 0.87.
-    assert abs(float(run.events["half"].t[0]) - np.pi / 3) < 100 * 1e-10
-
-
-@pytest.mark.parametrize("method", ABLE)
-def test_bounces(method: str) -> None:
-    """Falling from 1 under gravity 1, bouncing with half of the speed: at √2·(1, 1 + 1, 1 + 1 + 1/2, …).
-
-    All methods here are exact for a parabola; each flight adds some roundings of numbers up to 4 in each of some 30 steps.
-    """
-
-    @sw.system
-    def ball(t: Any, v: Any, y: Any, *, gravity: float = 1.0) -> Any:
-        return -gravity
-
-    ground = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
-    v, y, t, times = 0.0, 1.0, 0.0, []
-    for _ in range(6):
-        run = sw.integrate(ball(), method, v=v, y=y, tolerance=1e-9, at=[t + 10.0], t0=t, events=ground)
-        assert run.stopped_at is not None
-        v, y, t = -0.5 * float(run.v[-1]), float(run.y[-1]), float(run.stopped_at)
-        assert -1e-13 < y <= 0.0  # at or past the ground
-        times.append(t)
-    expected = 2**0.5 * (1.0 + 2.0 * np.concatenate([[0.0], np.cumsum(0.5 ** np.arange(1, 6))]))
-    assert np.abs(np.array(times) - expected).max() < 6 * 30 * 4 * 4 * U
-
-
-# ---- mistakes
-
-
-def test_mistake_a_straight_line_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collected, "located", straight)
-    with pytest.raises(AssertionError):
-        test_the_error_of_the_time_follows_the_tolerance_and_is_that_of_the_motion("dop853")
-
-
-def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collected, "located", low_end)
-    with pytest.raises(AssertionError):
-        test_bounces("merson")
-
-
-def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    step = AdaptiveTrials.step
-    monkeypatch.setattr(AdaptiveTrials, "step", lambda self, index, t, h, v, y: step(self, index, 0.0 * t, h, v, y))
-    with pytest.raises(AssertionError):
-        test_a_driven_motion_passes_in_time("merson")
-
-
-@pytest.mark.parametrize("method", ["merson", "taylor"])
-def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The step to try next is not the one that was made; of a series the one before is not."""
-    series = sw.method(method).has_series
-    monkeypatch.setattr(attempts.Attempts, "lengths", lambda self, plan: self.h[:-1] if series else self.h[1:])
-    with pytest.raises(AssertionError):
-        test_a_trial_is_the_state_that_is_saved_within_a_step(method, "pendulum")
-
-
-def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Wrong(adaptive._Driver):
-        def __init__(self, *given: Any) -> None:
-            super().__init__(*given)
-            self.far = self.end
-
-        def _look(self, *given: Any) -> Any:
-            self.end = np.inf
-            try:
-                return super()._look(*given)
-            finally:
-                self.end = self.far
-
-    monkeypatch.setattr(adaptive, "_Driver", Wrong)
-    with pytest.raises(AssertionError):
-        test_the_ends_of_a_run()
-
-
-def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    look = adaptive._Driver._look
-    monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *given: look(self, *given[:-1], False))
-    with pytest.raises(AssertionError):
-        test_pieces_find_what_the_whole_finds_and_saved_times_do_not_matter("merson", False)
-
-
-def test_mistake_attempts_after_the_end_of_a_member_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = adaptive._Driver.stepped
-
-    def wrong(self: Any, *given: Any) -> Any:
-        self.attempts += 1e6
-        return right(self, *given)
-
-    monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
-    with pytest.raises(AssertionError):
-        test_what_comes_after_a_terminal_event_is_not_computed("merson", monkeypatch)
-
-
-def test_mistake_one_attempt_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = adaptive._Driver.stepped
-
-    def wrong(self: Any, *given: Any) -> Any:
-        self.attempts -= 1.0
-        return right(self, *given)
-
-    monkeypatch.setattr(adaptive._Driver, "stepped", wrong)
-    with pytest.raises(AssertionError):
-        test_a_member_that_stopped_stays_where_it_was_and_cannot_go_on()
 
 
 def test_no_warning_is_hidden_by_these_tests() -> None:

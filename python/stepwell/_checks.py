@@ -276,7 +276,7 @@ def is_single(dtype: Any) -> bool:
         return True
     try:
         name = np.dtype(dtype).name if dtype is not None else ""
-    except TypeError:
+    except (TypeError, ValueError):  # the latter of whole numbers that are too long to print
         name = ""
     if name not in ("float64", "float32"):
         raise DTypeError(f"dtype: expected 'float64' or 'float32', got {short(dtype)}")
