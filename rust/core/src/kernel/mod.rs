@@ -14,6 +14,7 @@ mod pages;
 mod plan;
 mod registers;
 pub mod runner;
+mod schedule;
 mod shape;
 mod write;
 mod written;
