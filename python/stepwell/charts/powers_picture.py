@@ -61,5 +61,10 @@ def finding(chart: Powers) -> str:
     first = int(slow[-1]) + 1 if slow.size else 0
     what = f"{chart.method.title}: Pⁿ is computed at once"
     if first >= len(chart.steps):
-        return f"{what}, and is never faster than {int(chart.steps[-1]):,} steps".replace(",", " ").replace("once ", "once, ", 1)
-    return f"{what}, faster than n steps from n = {int(chart.steps[first]):,} on".replace(",", " ").replace("once ", "once, ", 1)
+        return f"{what}, and is never faster than {_spaced(chart.steps[-1])} steps"
+    return f"{what}, faster than n steps from n = {_spaced(chart.steps[first])} on"
+
+
+def _spaced(number: int) -> str:
+    """A whole number, its thousands apart."""
+    return f"{int(number):,}".replace(",", " ")
