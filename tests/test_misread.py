@@ -37,6 +37,8 @@ def test_masks_are_not_lost() -> None:
     ):
         with pytest.raises(ArgumentError, match="got a masked array in which 1 are masked"):
             call()
+    with pytest.raises(ArgumentError, match="steps: expected a whole number, got a masked one"):
+        sw.integrate(sw.Oscillator(), "rk4", **FIXED | {"steps": np.ma.masked_array(3, True)})
     whole = np.ma.masked_array([1.0, 2.0, 3.0], False)
     assert sw.integrate(sw.Oscillator(), "rk4", **FIXED | {"y": whole}).y.shape == (1, 3)
 

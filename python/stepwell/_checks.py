@@ -143,6 +143,8 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
         raise DTypeError(f"{argument}: expected a whole number, got {short(value)} ({type(value).__name__})") from None
     if isinstance(value, (bool, np.bool_)):
         raise DTypeError(f"{argument}: expected a whole number, got {value!r} (bool)")
+    if _masked(value):
+        raise ArgumentError(f"{argument}: expected a whole number, got a masked one")
     if not least <= n <= most:
         raise ArgumentError(f"{argument}: expected {least} or more{'' if n < least else f', up to {most}'}, got {short(n)}")
     return n

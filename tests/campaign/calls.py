@@ -40,7 +40,7 @@ def whole(value: Any) -> int:
     """A whole number of anything, for what is no argument of the package."""
     try:
         return int(value)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, np.ma.MaskError):
         return len(str(type(value)))
 
 

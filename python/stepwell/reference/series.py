@@ -244,11 +244,14 @@ def _product(a: Term, b: Term) -> Term:
 
 
 def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
-    """Σ aⱼ·bₖ₋ⱼ: pairs of terms, the newest last."""
-    total = None if k % 2 else _product(a[k // 2], b[k // 2])
+    """Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b. Of a square they are equal."""
+    of_a, of_b = None if k % 2 else _product(a[k // 2], b[k // 2]), None
     for j in range((k + 1) // 2 - 1, -1, -1):
-        total = _sum(total, _sum(_product(a[j], b[k - j]), _product(a[k - j], b[j])))
-    return total
+        if a is b:
+            of_a = _sum(of_a, _product(_sum(a[j], a[j]), a[k - j]))
+        else:
+            of_a, of_b = _sum(of_a, _product(a[j], b[k - j])), _sum(of_b, _product(a[k - j], b[j]))
+    return _sum(of_a, of_b)
 
 
 def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series) -> Series:

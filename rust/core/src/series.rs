@@ -184,11 +184,18 @@ impl Series {
         }
     }
 
-    /// Σ aⱼ·bₖ₋ⱼ: pairs of terms, the newest last.
+    /// Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b, so that neither sum waits for the
+    /// other. Of a square they are equal.
     fn product(&self, a: Id, b: Id, k: usize) -> Term {
-        let term = |j: usize| product(self.term(a, j), self.term(b, k - j));
-        let middle = if k.is_multiple_of(2) { term(k / 2) } else { None };
-        (0..k.div_ceil(2)).rev().fold(middle, |total, j| sum(total, sum(term(j), term(k - j))))
+        let middle = if k.is_multiple_of(2) { product(self.term(a, k / 2), self.term(b, k / 2)) } else { None };
+        let older = (0..k.div_ceil(2)).rev();
+        if a == b {
+            let twice = |j: usize| sum(self.term(a, j), self.term(a, j));
+            return older.fold(middle, |total, j| sum(total, product(twice(j), self.term(a, k - j))));
+        }
+        let of_a = older.clone().fold(middle, |total, j| sum(total, product(self.term(a, j), self.term(b, k - j))));
+        let of_b = older.fold(None, |total, j| sum(total, product(self.term(a, k - j), self.term(b, j))));
+        sum(of_a, of_b)
     }
 
     /// Of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
