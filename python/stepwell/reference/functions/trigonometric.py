@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from .operations import add_bits, and_bits, elementary, equal, magnitude, shift_up, sign_of, turn_bits, where
-from .pieces import MAGIC, by_parity, fast_sum, halves, quotient
+from .pieces import MAGIC, fast_sum, halves, polynomial, quotient
 
 #: π/2: three parts of 29 bits, and what then remains to 53.
 HALF_PI = (1.570796325802803, 9.920935808982456e-10, -1.2177051780877821e-18, 2.9038559739793605e-28)
@@ -75,10 +75,10 @@ def reduced(x: Any) -> Reduced:
     r = c - d
     tail = ((c - r) - d) - n * HALF_PI[3]
     z = r * r
-    half, square = 0.5 * z, z * z
+    half = 0.5 * z
     cosine = 1.0 - half
-    sine_rest = (z * r) * by_parity(z, square, SIN) + tail * cosine
-    cosine_rest = ((1.0 - cosine) - half) + (square * by_parity(z, square, COS) - r * tail)
+    sine_rest = (z * r) * polynomial(z, SIN) + tail * cosine
+    cosine_rest = ((1.0 - cosine) - half) + ((z * z) * polynomial(z, COS) - r * tail)
     return Reduced(turn, equal(and_bits(turn, 1), ODD), z, r, sine_rest, cosine, cosine_rest)
 
 

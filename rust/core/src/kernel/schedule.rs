@@ -39,7 +39,8 @@ pub fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order {
     let registers = shape.registers();
     let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
     // How many results may wait to be used. More than there are registers: it costs less to spill some than to wait.
-    let most_waiting = if shape.interleaved.min(shape.block_vectors) == 1 { 2 * registers } else { 3 * registers / 4 };
+    let e = |n: &str, d: usize| std::env::var(n).map_or(d, |x| x.parse().unwrap());
+    let most_waiting = if shape.interleaved.min(shape.block_vectors) == 1 { e("X_MW1", 8) * registers / 4 } else { e("X_MW2", 3) * registers / 4 };
     match shape.interleaved.min(shape.block_vectors) {
         1 if !alone && plan.steps.len() < SHORT_STEP_OPERATIONS => order,
         1 => Waits::new(plan, ops).shortened(order, most_waiting, alone),
