@@ -11,6 +11,7 @@ import stepwell as sw
 from cases import ADAPTIVE, SYSTEMS, fits
 from stepwell import engine
 from stepwell.errors import ArgumentError, StepwellError, UnsupportedError
+from stepwell.reference import series_pace
 from stepwell.result import Status
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None]
@@ -89,10 +90,10 @@ def test_a_hard_member_changes_nobody(method: str) -> None:
         assert alone.paces.h == whole.paces.h[member]
     assert whole.paces.evaluations[3] > 1.5 * whole.paces.evaluations[0]
     # For each of the two asked times the step that passes it is made twice, and an extra one. A series has the coefficients
-    # already, so it adds the last step alone, which is not taken. How many evaluations an order of 10 is, see test_taylor.py.
+    # already, so it adds the last step alone, which is not taken. How many evaluations an order is, see test_taylor.py.
     again = 1 if sw.method(method).has_series else 2 * 2
     tried = whole.paces.accepted + whole.paces.rejected + again
-    evaluations = engine.evaluations(sw.method(method), whole.system, order=10, paced=True)
+    evaluations = engine.evaluations(sw.method(method), whole.system, order=series_pace.order_of(1e-7), paced=True)
     assert np.array_equal(whole.paces.evaluations, evaluations * tried)
 
 

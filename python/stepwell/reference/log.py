@@ -32,15 +32,20 @@ def log(x: Array) -> Array:
         return log(x.real) + 1j * (x.imag / x.real)
     if bits.is_single(x):
         return _single(x)
-    u = bits.add_bits(x, TO_ONE)
-    k = bits.or_bits(bits.shift_down(u, 52), TWO_52) - (4503599627370496.0 + 1023.0)
-    f = bits.add_bits(bits.and_bits(u, MANTISSA), HALF_ROOT) - 1.0
+    k, f = split(x)
     s = f / (2.0 + f)
     z = s * s
     r = z * (L[0] + z * (L[1] + z * (L[2] + z * (L[3] + z * (L[4] + z * (L[5] + z * L[6]))))))
     half = 0.5 * f * f
     value: Array = k * LN2[0] - ((half - (s * (half + r) + k * LN2[1])) - f)
     return value
+
+
+def split(x: Array) -> tuple[Array, Array]:
+    """The whole exponent k and the fraction f of x = 2ᵏ·(1 + f)."""
+    u = bits.add_bits(x, TO_ONE)
+    exponent = bits.or_bits(bits.shift_down(u, 52), TWO_52) - (4503599627370496.0 + 1023.0)
+    return exponent, bits.add_bits(bits.and_bits(u, MANTISSA), HALF_ROOT) - 1.0
 
 
 SINGLE_LN2 = (0.693145751953125, 1.428606765330187e-06)

@@ -7,6 +7,7 @@ to order k follow those of the rates, and from these the coefficients k + 1 of t
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -107,7 +108,10 @@ class Series:
         return Series(self.book, self.terms[0] / other, lambda k: None if self.terms[k] is None else self.terms[k] / other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return NotImplemented if isinstance(other, np.ndarray) else _quotient(other / self.terms[0], lambda k: None, self)
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        sign = 1 if _is(other, 1.0) else -1 if _is(other, -1.0) else 0
+        return _quotient(other / self.terms[0], lambda k: None, self, sign)
 
     def __neg__(self) -> Series:
         if self.opposite is not None:
@@ -244,26 +248,34 @@ def _product(a: Term, b: Term) -> Term:
 
 
 def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
-    """Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b. Of a square they are equal."""
-    of_a, of_b = None if k % 2 else _product(a[k // 2], b[k // 2]), None
-    for j in range((k + 1) // 2 - 1, -1, -1):
-        if a is b:
-            of_a = _sum(of_a, _product(_sum(a[j], a[j]), a[k - j]))
-        else:
-            of_a, of_b = _sum(of_a, _product(a[j], b[k - j])), _sum(of_b, _product(a[k - j], b[j]))
-    return _sum(of_a, of_b)
+    """Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for.
+
+    The others are two sums: those with the older of a apart from those with the older of b. Of a square both are equal.
+    """
+    middle = None if k % 2 else _product(a[k // 2], b[k // 2])
+    if k == 0:
+        return middle
+    older = range((k + 1) // 2 - 1, 0, -1)
+    if a is b:
+        return functools.reduce(lambda total, j: _sum(total, _product(_sum(a[j], a[j]), a[k - j])), [*older, 0], middle)
+    of_a = functools.reduce(lambda total, j: _sum(total, _product(a[j], b[k - j])), older, None)
+    of_b = functools.reduce(lambda total, j: _sum(total, _product(a[k - j], b[j])), older, None)
+    newest = _sum(_product(a[0], b[k]), _product(a[k], b[0]))
+    return _sum(_sum(_sum(of_a, of_b), middle), newest)
 
 
-def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series) -> Series:
-    """C = a/b: from c·b = a."""
+def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign: int = 0) -> Series:
+    """C = a/b: from c·b = a. ``sign`` is that of a reciprocal ±1/b, which is its own factor, and else 0."""
     over: list[Any] = []
 
     def rule(k: int) -> Term:
-        if not over:
-            over.append(1.0 / divisor.terms[0])
         known = None
         for j in range(1, k + 1):
             known = _sum(known, _product(divisor.terms[j], made.terms[k - j]))
+        if sign:
+            return None if known is None else -(known * start) if sign > 0 else known * start
+        if not over:
+            over.append(1.0 / divisor.terms[0])
         rest = _difference(dividend(k), known)
         return None if rest is None else rest * over[0]
 

@@ -67,14 +67,38 @@ fn half_turn<N: Number>(r: N, y: N) -> N {
     sine.xor_bits(y.shift_up(63))
 }
 
-/// exp x to eight digits, which is enough for the length of a step: 2ᵏ·exp(r), |r| ≤ ½·ln 2.
+/// 2^r on [−½, ½], and log₂(1 + f)/f for 1 + f between √½ and √2: fitted at Chebyshev's nodes, wrong by 3.5e-6 and, times f, by 2.9e-5.
+const ROUGH_EXP2: [f64; 5] = [1.0, 0.693121045203, 0.24022349038, 0.0559219758423, 0.00966636851538];
+const ROUGH_LOG2: [f64; 5] = [1.44264046428, -0.72062921586, 0.485737842443, -0.389675223792, 0.250287846961];
+
+/// 2ˣ to five digits, which is enough for the length of a step.
 #[inline(always)]
-pub fn rough_exp<N: Number>(x: N) -> N {
-    let magic = x * N::of(std::f64::consts::LOG2_E) + N::of(MAGIC);
-    let r = x - (magic - N::of(MAGIC)) * N::of(std::f64::consts::LN_2);
-    let one = N::of(1.0);
-    let value = (1..=7).rev().fold(one, |value, k| one + (r * N::of(1.0 / f64::from(k))) * value);
-    value * magic.shift_up(52).add_bits(1023 << 52)
+pub fn rough_exp2<N: Number>(x: N) -> N {
+    let magic = x + N::of(MAGIC);
+    rough(x - (magic - N::of(MAGIC)), ROUGH_EXP2) * magic.shift_up(52).add_bits(1023 << 52)
+}
+
+/// log₂ x of a normal number above zero to four digits behind the point, which is enough for the length of a step.
+#[inline(always)]
+pub fn rough_log2<N: Number>(x: N) -> N {
+    let (exponent, f) = split(x);
+    exponent + f * rough(f, ROUGH_LOG2)
+}
+
+/// A polynomial of degree four, in few operations one after the other.
+#[inline(always)]
+fn rough<N: Number>(x: N, coefficients: [f64; 5]) -> N {
+    let [c0, c1, c2, c3, c4] = coefficients.map(N::of);
+    let x2 = x * x;
+    (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
+}
+
+/// The whole exponent k and the fraction f of x = 2ᵏ·(1 + f).
+#[inline(always)]
+fn split<N: Number>(x: N) -> (N, N) {
+    let u = x.add_bits(TO_ONE);
+    let exponent = u.shift_down(52).or_bits(TWO_52) - N::of(4_503_599_627_370_496.0 + 1023.0);
+    (exponent, u.and_bits(MANTISSA).add_bits(HALF_ROOT) - N::of(1.0))
 }
 
 /// ln 2 in two parts; the first has 33 bits, so that its product with k is exact.
@@ -103,9 +127,7 @@ pub fn log<N: Number>(x: N) -> N {
         return single_log(x);
     }
     let l = |i: usize| N::of(L[i]);
-    let u = x.add_bits(TO_ONE);
-    let k = u.shift_down(52).or_bits(TWO_52) - N::of(4_503_599_627_370_496.0 + 1023.0);
-    let f = u.and_bits(MANTISSA).add_bits(HALF_ROOT) - N::of(1.0);
+    let (k, f) = split(x);
     let s = f / (N::of(2.0) + f);
     let z = s * s;
     let r = z * (l(0) + z * (l(1) + z * (l(2) + z * (l(3) + z * (l(4) + z * (l(5) + z * l(6)))))));

@@ -111,6 +111,15 @@ impl Pace<f64> {
         }
     }
 
+    /// How many steps of the present length are left to the next output times, in the mean of those members that are not there.
+    pub fn steps_left<'a>(row: impl Fn(usize) -> &'a [f64]) -> f64 {
+        let places = Pace::of(std::array::from_fn(|i| i as f64));
+        let [t, h, target] = [places.t, places.h, places.target].map(|place| row(place as usize));
+        let left = t.iter().zip(h).zip(target).filter(|((t, _), target)| t < target).map(|((t, h), target)| (target - t) / h);
+        let (count, sum) = left.fold((0.0, 0.0), |(n, sum), left| (n + 1.0, sum + left));
+        if count > 0.0 { sum / count } else { 0.0 }
+    }
+
     /// Whether the next output time is within the held step.
     pub fn holds(&self) -> bool {
         self.held > 0.0 && self.target < self.t + self.h
@@ -285,7 +294,7 @@ pub fn judge<N: Number>(pace: &Pace<N>, order: u32, old: [N; 2], made: &[N], out
 }
 
 /// An error over what is tolerated. A block that is zero, as it has always been, tolerates no error and has none.
-pub(crate) fn share<N: Number>(error: N, tolerated: N) -> N {
+fn share<N: Number>(error: N, tolerated: N) -> N {
     let zero = N::of(0.0);
     N::choose(error.at_most(zero), zero, error / tolerated)
 }

@@ -162,8 +162,16 @@ impl Series {
                 if !self.terms.contains_key(&b) {
                     return self.term(a, k).map(|a| a / Symbol(b));
                 }
-                let over = *self.reciprocals.entry(id).or_insert_with(|| Symbol::of(1.0) / Symbol(b));
                 let known = (1..=k).fold(None, |total, j| sum(total, product(self.term(b, j), self.term(id, k - j))));
+                // A reciprocal and its negative are their own factors.
+                if let Op::Const(bits) = operation(a) {
+                    match f64::from_bits(bits) {
+                        1.0 => return known.map(|known| -(known * Symbol(id))),
+                        -1.0 => return known.map(|known| known * Symbol(id)),
+                        _ => (),
+                    }
+                }
+                let over = *self.reciprocals.entry(id).or_insert_with(|| Symbol::of(1.0) / Symbol(b));
                 difference(self.term(a, k), known).map(|rest| rest * over)
             }
             Op::Sqrt(a) => {
@@ -184,18 +192,22 @@ impl Series {
         }
     }
 
-    /// Σ aⱼ·bₖ₋ⱼ, the newest terms last: those with the older of a apart from those with the older of b, so that neither sum waits for the
-    /// other. Of a square they are equal.
+    /// Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for. The others are two sums, those with the
+    /// older of a apart from those with the older of b, so that neither waits for the other; of a square both are equal.
     fn product(&self, a: Id, b: Id, k: usize) -> Term {
         let middle = if k.is_multiple_of(2) { product(self.term(a, k / 2), self.term(b, k / 2)) } else { None };
-        let older = (0..k.div_ceil(2)).rev();
         if a == b {
             let twice = |j: usize| sum(self.term(a, j), self.term(a, j));
-            return older.fold(middle, |total, j| sum(total, product(twice(j), self.term(a, k - j))));
+            return (0..k.div_ceil(2)).rev().fold(middle, |total, j| sum(total, product(twice(j), self.term(a, k - j))));
         }
-        let of_a = older.clone().fold(middle, |total, j| sum(total, product(self.term(a, j), self.term(b, k - j))));
-        let of_b = older.fold(None, |total, j| sum(total, product(self.term(a, k - j), self.term(b, j))));
-        sum(of_a, of_b)
+        let of_a = |j: usize| product(self.term(a, j), self.term(b, k - j));
+        let of_b = |j: usize| product(self.term(a, k - j), self.term(b, j));
+        if k == 0 {
+            return middle;
+        }
+        let older = (1..k.div_ceil(2)).rev();
+        let totals = older.fold((None, None), |(by_a, by_b), j| (sum(by_a, of_a(j)), sum(by_b, of_b(j))));
+        sum(sum(sum(totals.0, totals.1), middle), sum(of_a(0), of_b(0))) // which does not depend on which of both is a
     }
 
     /// Of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….

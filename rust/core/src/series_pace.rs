@@ -5,9 +5,9 @@
 //! the least of these for j = p − 1 and p and both blocks, times exp(−0.7/(p − 1)). `reference/series_pace.py` is the specification.
 
 use crate::{
-    functions::{log, rough_exp},
+    functions::{rough_exp2, rough_log2},
     number::Number,
-    pace::{Pace, length2, longer, share},
+    pace::{Pace, length2, longer},
     program::coefficients,
     system::{Block, System},
 };
@@ -16,8 +16,8 @@ use crate::{
 const MAX_GROWTH: f64 = 1024.0;
 /// The squared length of the last terms over the tolerated one, between bounds whose logarithms exist.
 const BOUNDS: [f64; 2] = [1e-280, 1e280];
-/// The margin of a step of order p is exp(−MARGIN/(p − 1)).
-const MARGIN: f64 = 0.7;
+/// The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
+const MARGIN: f64 = 0.7 * std::f64::consts::LOG2_E;
 
 /// Coefficients of v and y, from the first on.
 pub type Terms<N> = Vec<(Block<N>, Block<N>)>;
@@ -51,10 +51,18 @@ pub fn attempt<N: Number>(
     (next, goes_on(&new_v, v), goes_on(&new_y, y))
 }
 
-/// The sum of a series at a distance, by Horner's rule.
-fn value<'a, N: Number>(start: &'a Block<N>, terms: impl DoubleEndedIterator<Item = &'a Block<N>>, step: N) -> Block<N> {
-    let rest = terms.rev().cloned().reduce(|sum, term| term.zip_map(&sum, |term, sum| term + step * sum));
-    rest.map_or_else(|| start.clone(), |rest| start.zip_map(&rest, |start, rest| start + step * rest))
+/// The sum of a series at a distance. Odd and even powers are summed apart by Horner's rule, which takes half the time of one sum; the start
+/// comes last, so that it is rounded once.
+fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a Block<N>>, step: N) -> Block<N> {
+    let square = step * step;
+    let terms: Vec<&Block<N>> = terms.collect();
+    let sum = |first: usize| {
+        let powers = terms.iter().skip(first).step_by(2).rev().map(|term| (*term).clone());
+        powers.reduce(|sum, term| term.zip_map(&sum, |term, sum| term + square * sum))
+    };
+    let (Some(odd), Some(even)) = (sum(0), sum(1)) else { return start.clone() };
+    let rest = odd.zip_map(&even, |odd, even| odd + step * even);
+    start.zip_map(&rest, |start, rest| start + step * rest)
 }
 
 /// How far the series is as good as is tolerated. In `before` the pace has the length of the last step that was taken; a held one does not
@@ -66,18 +74,22 @@ fn reach<N: Number>(order: u32, pace: &Pace<N>, start: [&Block<N>; 2], terms: &[
     };
     let (present, first) = (start.map(length2), of(1));
     // A block at zero counts as long as its rate would have made it in the last step.
+    // Squares of what is tolerated: of the absolute part and of the relative one, added.
     let tolerated = [0, 1].map(|i| {
         let counts = N::choose(N::of(0.0).below(pace.lasts), pace.longest[i], present[i]);
-        let length = pace.absolute + pace.relative * longer(counts, first[i] * (pace.before * pace.before)).sqrt();
-        length * length
+        let square = longer(counts, first[i] * (pace.before * pace.before));
+        pace.absolute * pace.absolute + (pace.relative * pace.relative) * square
     });
+    let per = tolerated.map(|square| N::of(1.0) / square);
+    let zero = N::of(0.0);
+    let share = |square: N, per: N| N::choose(square.at_most(zero), zero, square * per);
     let logarithm = |k: u32| {
         let last = of(k);
-        let over = longer(share(last[0], tolerated[0]), share(last[1], tolerated[1])).clamped(BOUNDS[0], BOUNDS[1]);
-        log(over) * N::of(-0.5 / f64::from(k))
+        let over = longer(share(last[0], per[0]), share(last[1], per[1])).clamped(BOUNDS[0], BOUNDS[1]);
+        rough_log2(over) * N::of(-0.5 / f64::from(k))
     };
     let (one, other) = (logarithm(order - 1), logarithm(order));
-    let reach = rough_exp(N::choose(one.below(other), one, other) - N::of(MARGIN / f64::from(order - 1)));
+    let reach = rough_exp2(N::choose(one.below(other), one, other) - N::of(MARGIN / f64::from(order - 1)));
     let most = N::of(MAX_GROWTH) * pace.before;
     N::choose(most.below(reach), most, reach)
 }

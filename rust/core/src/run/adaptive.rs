@@ -56,6 +56,11 @@ pub trait AdaptiveBatch: Send {
         runs.iter_mut().enumerate().for_each(|(lane, runs)| *runs = self.pace(lane).runs(budget));
     }
 
+    /// How many steps of the present length lanes have left to their next saved times, in the mean of those that are not there.
+    fn steps_left(&self) -> f64 {
+        1.0
+    }
+
     /// One attempt of one lane, at the start of a step whose coefficients are known.
     fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
@@ -180,6 +185,11 @@ impl AdaptiveBatch for AdaptiveLanes {
     fn find_running(&self, budget: f64, runs: &mut [bool]) {
         let lanes = self.step.lanes();
         Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
+    }
+
+    fn steps_left(&self) -> f64 {
+        let lanes = self.step.lanes();
+        Pace::steps_left(|i| &self.state[(self.numbers + i) * lanes..][..lanes])
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {

@@ -167,8 +167,8 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, pace.idle());
             }
         }
-        // Of a series: which lanes have a step to try, and how many calls were made.
-        let (mut runs, mut calls) = (vec![false; assignments.len()], 0);
+        // Of a series: which lanes have a step to try, and how many attempts were made since the monitor was last asked.
+        let (mut runs, mut unseen) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
                 if runs[lane] {
@@ -180,11 +180,15 @@ impl<'a> Worker<'a> {
             }
             let numbers = self.plan.v.len() + self.plan.y.len();
             if self.group.has_terms() {
-                self.group.attempt(self.attempts_by_series(&assignments));
+                let attempts = self.attempts_by_series();
+                self.group.attempt(attempts);
                 self.group.find_running(self.plan.budget as f64, &mut runs);
-                calls += 1;
-                if calls % ATTEMPTS_BETWEEN_CHECKS == 0 && !go_on(0) {
-                    return Err(Error::Interrupted);
+                unseen += attempts;
+                if unseen >= ATTEMPTS_BETWEEN_CHECKS {
+                    unseen = 0;
+                    if !go_on(0) {
+                        return Err(Error::Interrupted);
+                    }
                 }
                 continue;
             }
@@ -206,15 +210,13 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// How many attempts are made before the next check. A step by a series is long work: none shall be made in vain. Of many lanes
-    /// one comes to its end at nearly any time; a single one may make half as many as are left by the present step.
-    fn attempts_by_series(&self, assignments: &[Option<Assignment>]) -> usize {
-        if assignments.len() > 1 {
-            return 1;
-        }
-        let Pace { t, h, target, held, .. } = self.group.pace(0);
-        let left = if held > 0.0 { 0.0 } else { (target - t) / (2.0 * h) };
-        (left as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
+    /// How many attempts are made before the next check, by the number of steps that are left to the next saved times. A single lane
+    /// makes half of them. Of many lanes, each waits for half of the attempts when it is there, and a check costs about a fourth of an
+    /// attempt: the sum is least for the root of half of the steps that a lane has left in the mean.
+    fn attempts_by_series(&self) -> usize {
+        let left = self.group.steps_left() / 2.0;
+        let attempts = if self.group.lanes() > 1 { left.sqrt() } else { left };
+        (attempts as usize).clamp(1, ATTEMPTS_BETWEEN_CHECKS)
     }
 
     /// Puts a member into a lane, which steps it from now on.
