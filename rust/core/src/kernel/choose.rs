@@ -73,7 +73,7 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
         return Shape { level, bytes, width, block_vectors, interleaved, blocks, resident: true };
     }
     let most = (MAX_CODE_OPERATIONS / body.work()).max(1);
-    let interleaving = std::env::var("X_IL").map_or(interleaving(body, level), |n| n.parse().unwrap()).min(most);
+    let interleaving = interleaving(body, level).min(most);
     if interleaving == 1 {
         // Two vectors in a turn, one after the other: the second begins while the first ends. State that has a register stays there.
         let block_vectors = evenly(vectors, most.min(2));

@@ -9,7 +9,8 @@ use super::{
     write::{Value, Where, Writer},
 };
 
-/// The code of a plan in a shape, its operations in this order, and how many vectors of scratch it needs. None if it cannot be done with the registers there are.
+/// The code of a plan in a shape, its operations in this order, and how many vectors of scratch it needs. None if it cannot be done with
+/// the registers there are.
 pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape, order: &Order) -> Option<(Vec<u8>, usize)> {
     let mut writer = Writer::new(plan, code, shape, order);
     let pinned = writer.share_out();

@@ -252,7 +252,6 @@ fn joined<M: Machine>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Doing>>>
         let of = chosen[id].filter(|_| uses[id] == 1)?;
         // Where p < q is false, of a NaN for example, the second is chosen. p <= q would choose the first of two zeros.
         let extreme = match body.ops[id] {
-            _ if std::env::var("X_NOEXT").is_ok() && matches!(body.ops[id], Op::Less(..) | Op::LessEqual(..) | Op::Equal(..)) => None,
             Op::Less(p, q) if of == [p, q] => machine.extreme(false),
             Op::Less(p, q) if of == [q, p] => machine.extreme(true),
             Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => None,

@@ -63,8 +63,9 @@ fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape)
         Some(packed) => Plan::packed(body, packed, &machine)?,
     };
     let order = match packed {
-        None if std::env::var("X_OLD").is_err() => schedule::order(&plan, &body.ops, shape),
-        _ => schedule::in_turn(plan.steps.len(), shape),
+        None => schedule::order(&plan, &body.ops, shape),
+        // Its order is that of the model by which the packing was chosen.
+        Some(_) => schedule::in_turn(plan.steps.len(), shape),
     };
     let (code, spills) = loops::function(&plan, machine, shape, &order)?;
     let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));
