@@ -91,7 +91,8 @@ def exp(x: Any) -> Any:
     low = x < 0.0
     p = reduced(x, magic(low))
     rest = p.z * by_parity(p.r, p.z, (0.5, *EXP)) - p.lower
-    return scaled(1.0 + (p.upper + rest), p.turn, low)
+    s, lost = fast_sum(1.0, p.upper)
+    return scaled(s + (lost + rest), p.turn, low)
 
 
 @elementary

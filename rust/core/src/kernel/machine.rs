@@ -81,7 +81,7 @@ pub trait Machine: Sized {
 
     /// The lesser of two numbers, or the greater: `a` if a < b, or if a > b, and else `b`, as where one is a NaN. None where that takes more
     /// than one instruction.
-    fn extreme(&self, _is_greater: bool) -> Option<Self::Doing> {
+    fn min_or_max(&self, _is_greater: bool) -> Option<Self::Doing> {
         None
     }
 

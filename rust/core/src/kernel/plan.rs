@@ -252,8 +252,8 @@ fn joined<M: Machine>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Doing>>>
         let of = chosen[id].filter(|_| uses[id] == 1)?;
         // Where p < q is false, of a NaN for example, the second is chosen. p <= q would choose the first of two zeros.
         let extreme = match body.ops[id] {
-            Op::Less(p, q) if of == [p, q] => machine.extreme(false),
-            Op::Less(p, q) if of == [q, p] => machine.extreme(true),
+            Op::Less(p, q) if of == [p, q] => machine.min_or_max(false),
+            Op::Less(p, q) if of == [q, p] => machine.min_or_max(true),
             Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => None,
             _ => return None,
         };

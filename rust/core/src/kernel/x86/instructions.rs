@@ -145,8 +145,8 @@ impl Machine for Code {
         self.evex.then(|| Doing::Pick(predicate(comparison)))
     }
 
-    fn extreme(&self, is_greater: bool) -> Option<Doing> {
-        Some(Doing::Two(if is_greater { x::MOST } else { x::LEAST }, false))
+    fn min_or_max(&self, is_greater: bool) -> Option<Doing> {
+        Some(Doing::Two(if is_greater { x::MAXIMUM } else { x::MINIMUM }, false))
     }
 
     fn moving(&self, to: Move) -> Doing {
