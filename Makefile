@@ -4,8 +4,8 @@
 PYTHON ?= python3
 OUT    ?= out
 BIN    := .venv/bin
-# On every core; a file stays on one, for its tests share what takes time to make.
-PYTEST := $(BIN)/python -m pytest -q -n auto --dist loadfile
+# On every core; a file stays on one, for its tests share what takes time to make. The order of files is that of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
 
@@ -16,7 +16,8 @@ LISTED := $(shell find rust/core/src/steppers rust/core/src/systems -name "*.rs"
 WHEELS := x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 
 .DEFAULT_GOAL := help
-.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench lint rust-test python-test format clean
+.PHONY: help demo docs test test-long test-wheels campaign wheel wheels release dev bench format clean
+.PHONY: lint lint-rust lint-python rust-build rust-test python-test python-beside
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -28,7 +29,9 @@ docs: .venv/docs ## build the site into out/docs, without a network; a warning i
 	$(BIN)/sphinx-build -n -W --keep-going -q docs $(OUT)/docs
 	@echo "open $(OUT)/docs/index.html"
 
-test: lint rust-test python-test ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
+test: ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
+	$(MAKE) --no-print-directory -j2 lint rust-test python-beside
+	$(BIN)/python -m pytest -q tests/test_interrupt.py
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
@@ -53,25 +56,38 @@ dev: .venv/test ## install in place, for work on the code; run again after a cha
 bench: .venv/bench ## time every language on the same work, in one run, into benches/RESULTS.md
 	$(BIN)/python -m benches.compare
 
-lint: .venv/test
+# In `make test` two of these run at a time, so that neither core waits for a download or a program that uses only one.
+lint: lint-rust lint-python
+
+# After the build, which has both cores already.
+lint-rust: rust-build
 	cargo fmt --all --check
 	rustfmt --edition 2024 --check $(LISTED)
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
+
+lint-python: .venv/test
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy --no-error-summary
 	$(BIN)/python -m mypy.stubtest stepwell._core --concise
 
-rust-test:
+# The wheel comes first: both are built in one folder, and have the core in common.
+rust-build: .venv/wheel
+	cargo test --release --workspace --quiet --no-run
+
+rust-test: rust-build
 	cargo test --release --workspace --quiet
 
-# One of the tests builds a core with one more method, which takes minutes: beside the others. How soon Ctrl-C ends a run is timed
-# when all others are done, and not from a shell's background, where Ctrl-C is ignored.
-python-test: .venv/test
+# How soon Ctrl-C ends a run is timed when all others are done, and not from a shell's background, where Ctrl-C is ignored.
+python-test: python-beside
+	$(BIN)/python -m pytest -q tests/test_interrupt.py
+
+# One of the tests builds a core with one more method, which takes a minute: beside the others. It copies what was built of other
+# crates, and the checks of types leave what they know: both must be done.
+python-beside: .venv/test rust-build lint-python
 	$(BIN)/python -m pytest -q tests/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
 	$(PYTEST) --ignore=tests/test_adding.py --ignore=tests/test_interrupt.py; others=$$?; \
 	wait $$adding; added=$$?; cat .venv/adding.log; test $$others -eq 0 -a $$added -eq 0
-	$(BIN)/python -m pytest -q tests/test_interrupt.py
 
 test-long: .venv/test ## run what `test` leaves out for its time: every family of tests in full
 	$(PYTEST) -m long --durations=20
@@ -128,12 +144,20 @@ clean: ## remove everything that was built
 	for target in $(WHEELS); do PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --zig --target $$target --out dist/wheels || exit 1; done
 	@touch $@
 
-# The wheel with the extras that a target asks for.
-.venv/demo: EXTRA = chart
-.venv/docs: EXTRA = docs
-.venv/test: EXTRA = test,docs
-.venv/bench: EXTRA = bench
-.venv/demo .venv/docs .venv/test .venv/bench: .venv/wheel
+# The wheel with the extras that a target asks for. What these need is installed while the wheel is built, if make may do two things.
+.venv/demo .venv/demo.needs: EXTRA = chart
+.venv/docs .venv/docs.needs: EXTRA = docs
+.venv/test .venv/test.needs: EXTRA = test,docs
+.venv/bench .venv/bench.needs: EXTRA = bench
+NEEDS = import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
+        print(*(need for extra in "$(EXTRA)".split(",") for need in extras[extra]), sep="\n")
+
+.venv/demo.needs .venv/docs.needs .venv/test.needs .venv/bench.needs: .venv/maturin pyproject.toml
+	$(BIN)/python -c '$(NEEDS)' > $@.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check -r $@.txt
+	@touch $@
+
+.venv/demo .venv/docs .venv/test .venv/bench: .venv/%: .venv/%.needs .venv/wheel
 	$(BIN)/pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[$(EXTRA)]"
 	$(BIN)/pip install --quiet --disable-pip-version-check --force-reinstall --no-deps dist/*.whl
 	@touch $@

@@ -82,6 +82,10 @@ class Journey:
     def works(self) -> bool:
         return "control" in self.options
 
+    @property
+    def single(self) -> bool:
+        return self.options.get("dtype") == "float32"
+
 
 def bits(x: float) -> int:
     (whole,) = struct.unpack("<Q", struct.pack("<d", x))
@@ -114,19 +118,21 @@ def _hex(values: Iterable[float]) -> str:
 
 def _c(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
     text = "".join(sources) + "\n#include <stdio.h>\n"
-    text += "static void tell(const double *x, int n) { for (int i = 0; i < n; i++) { uint64_t b; memcpy(&b, x + i, 8); "
-    text += 'printf("%llx ", (unsigned long long)b); } }\n'
+    text += "static void tell_one(double x) { uint64_t b; memcpy(&b, &x, 8); "
+    text += 'printf("%llx ", (unsigned long long)b); }\n'
+    text += "#define tell(x, n) for (int i = 0; i < n; i++) tell_one((x)[i]);\n"
     for i, each in enumerate(journeys):
         p, (v, y) = f"step_{i}", each.blocks
+        number = "float" if each.single else "double"
         slot = sw.method(each.method).carry or "v"
         arrays = [(name, a) for name, a in (("v", v), ("y", y)) if a]
         text += f"static void run_{i}(void) {{\n    {p} m;\n    {p}_state s;\n"
-        text += "".join(f"    const double {n}[] = {{{_hex(a)}}};\n" for n, a in arrays)
+        text += "".join(f"    const {number} {n}[] = {{{_hex(a)}}};\n" for n, a in arrays)
         text += f"    {p}_defaults(&m);\n" + "".join(f"    m.{n} = {x.hex()};\n" for n, x in each.changed.items())
         text += f"    {p}_prepare(&m);\n    {p}_start(&m, &s{''.join(f', {n}' for n, _ in arrays)});\n"
         text += f"    for (int k = 0; k < {each.steps}; k++) {p}_step(&m, &s);\n"
         if each.carries:
-            text += f"    double out[{len(v)}];\n    {p}_finish(&m, &s, out);\n    tell(out, {len(v)});\n"
+            text += f"    {number} out[{len(v)}];\n    {p}_finish(&m, &s, out);\n    tell(out, {len(v)});\n"
         elif v:
             text += f"    tell(s.{slot}, {len(v)});\n"
         text += f"    tell(s.y, {len(y)});\n" if y else ""
@@ -157,11 +163,13 @@ def _javascript(journeys: Sequence[Journey], sources: Sequence[str], folder: Pat
 
 
 def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:
-    text = 'fn tell(x: &[f64]) { for each in x { print!("{:x} ", each.to_bits()); } }\n'
+    text = (
+        'fn tell<T: Copy + Into<f64>>(x: &[T]) { for each in x { let x: f64 = (*each).into(); print!("{:x} ", x.to_bits()); } }\n'
+    )
     for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
         text += f"pub mod step_{i} {{\n{source}\n}}\n"
         arrays = [block for block in each.blocks if block]
-        given = ", ".join(f"[{', '.join(f'f64::from_bits({bits(x)})' for x in block)}]" for block in arrays)
+        given = ", ".join(f"[{', '.join(_rust_number(x, each.single) for x in block)}]" for block in arrays)
         text += f"fn run_{i}() {{\n    let mut m = step_{i}::Step{i}::new();\n"
         text += "".join(f"    m.{name} = {value!r};\n" for name, value in each.changed.items())
         text += f"    m.prepare();\n    let mut s = m.start({given});\n    for _ in 0..{each.steps} {{ m.step(&mut s); }}\n"
@@ -176,6 +184,10 @@ def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> 
     (folder / "all.rs").write_text(text, encoding="utf-8")
     executed(["rustc", *RUST_FLAGS, "all.rs", "-o", "all_rust"], folder)
     return executed([folder / "all_rust"], folder).splitlines()
+
+
+def _rust_number(x: float, single: bool) -> str:
+    return f"f32::from_bits({np.float32(x).view(np.uint32)})" if single else f"f64::from_bits({bits(x)})"
 
 
 def _python(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> list[str]:

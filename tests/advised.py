@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell.advice.trials import single_name
 from stepwell.scenes import Scene
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -47,10 +48,10 @@ def _times_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def once(name: str) -> Any:
         measure = getattr(sw.advice, name)
 
-        def times(scene: Scene, methods: Any) -> dict[str, float]:
-            key = (name, repr(scene.system), repr(scene.control), *(m.name for m in methods))
+        def times(scene: Scene, methods: Any, singles: Any = ()) -> dict[str, float]:
+            key = (name, repr(scene.system), repr(scene.control), *(m.name for m in methods), "", *(m.name for m in singles))
             if key not in MEASURED:
-                MEASURED[key] = measure(scene, methods)
+                MEASURED[key] = measure(scene, methods, singles) if singles else measure(scene, methods)
             return MEASURED[key]
 
         return times
@@ -59,11 +60,16 @@ def _times_are_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"stepwell.advice.{name}", once(name))
 
 
+def equal_times(scene: Scene, methods: Any, singles: Any = ()) -> dict[str, float]:
+    """A nanosecond each, in float32 as well."""
+    return {m.name: 1.0 for m in methods} | {single_name(m): 1.0 for m in singles}
+
+
 @pytest.fixture
 def unmeasured(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every step takes a nanosecond: for tests that rank by evaluations and look at no time."""
     for name in ("step_times", "tried_times"):
-        monkeypatch.setattr(f"stepwell.advice.{name}", lambda scene, methods: {m.name: 1.0 for m in methods})
+        monkeypatch.setattr(f"stepwell.advice.{name}", equal_times)
 
 
 def evaluations_of(row: Any, system: sw.System) -> int:

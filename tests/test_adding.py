@@ -15,7 +15,16 @@ ROOT = Path(__file__).resolve().parents[1]
 FILES = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
 CHANGES = re.compile(r"<!-- change: (\S+) -->\n```diff\n(.*?)```", re.DOTALL)
 LEFT_OUT = shutil.ignore_patterns("target*", ".venv*", ".git", "out", "dist", "*.so", "__pycache__", ".*_cache", ".hypothesis")
-OWN_CRATES = shutil.ignore_patterns("*stepwell*", "lib_core*", "_core-*")
+#: What is compiled anew; stepwell-base, which the page does not change, is not.
+ADDED_TO = shutil.ignore_patterns("*stepwell[-_]core*", "*stepwell[-_]py*", "lib_core*", "_core-*")
+#: A core that is compiled sooner than it is quick: bits do not depend on it, nor do kernels, which are written at run time.
+LITTLE_OPTIMISED = """
+[profile.release.package.stepwell-core]
+opt-level = 1
+
+[profile.release.package.stepwell-py]
+opt-level = 1
+"""
 
 pytestmark = pytest.mark.skipif(shutil.which("cargo") is None, reason="builds the core")
 
@@ -52,7 +61,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = str(built / "adding")
     for part in (".fingerprint", "build", "deps"):  # what was built of other crates serves here, too
         if (built / "release" / part).exists() and not (built / "adding" / "release" / part).exists():
-            shutil.copytree(built / "release" / part, built / "adding" / "release" / part, ignore=OWN_CRATES)
+            shutil.copytree(built / "release" / part, built / "adding" / "release" / part, ignore=ADDED_TO)
+    with (tree / "Cargo.toml").open("a", encoding="utf-8") as manifest:
+        manifest.write(LITTLE_OPTIMISED)
     build = [sys.executable, "-m", "maturin", "build", "--release", "--quiet", "--out", "dist"]
     subprocess.run(build, cwd=tree, env=os.environ | {"CARGO_TARGET_DIR": target}, check=True)
     (wheel,) = (tree / "dist").glob("*.whl")

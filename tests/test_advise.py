@@ -201,7 +201,7 @@ def test_ranking_by_time_is_by_measured_time() -> None:
 
 def with_prices(monkeypatch: pytest.MonkeyPatch, prices: dict[str, float], chosen: float = 3.0) -> dict[str, float]:
     """Let a step cost what is given, and that many times as much with a tolerance; returns what rows cost by their name."""
-    monkeypatch.setattr("stepwell.advice.step_times", lambda scene, methods: {m.name: prices[m.name] for m in methods})
+    monkeypatch.setattr("stepwell.advice.step_times", lambda scene, methods, singles: {m.name: prices[m.name] for m in methods})
     monkeypatch.setattr("stepwell.advice.tried_times", lambda scene, methods: {m.name: chosen * prices[m.name] for m in methods})
     return prices | {f"{name}, tolerance": chosen * price for name, price in prices.items()}
 
@@ -288,7 +288,7 @@ def test_advise_takes_the_better_of_equal_costs(noise: float, best: str, monkeyp
     """As measured once: costs of 3 % between them, errors of a factor of 12; the worse was named for the noise of a day."""
     prices = {"damped_euler": 7.70, "leapfrog": 7.74, "false_euler": 7.91}
 
-    def times(scene: sw.Scene, methods: Sequence[sw.Method]) -> Times:
+    def times(scene: sw.Scene, methods: Sequence[sw.Method], singles: Sequence[sw.Method]) -> Times:
         found = Times({m.name: prices[m.name] for m in methods})
         found.noise = noise
         return found
@@ -299,7 +299,7 @@ def test_advise_takes_the_better_of_equal_costs(noise: float, best: str, monkeyp
     assert advice.best.method.name == best
     assert advice.cost_noise == noise
     if noise:
-        assert "damped_euler, false_euler cost the same, and the error is larger" in str(advice)
+        assert "damped_euler; false_euler cost the same, and the error is larger" in str(advice)
         assert "about 2·10⁶ such objects" in str(advice)
     else:
         assert "cost the same" not in str(advice)

@@ -85,7 +85,8 @@ def changed(old: str, new: str) -> ModuleType:
 
 
 def is_noticed() -> bool:
-    for check, method in itertools.product(contacts.ALL.values(), METHODS):
+    """Whether a check notices, all of them by one method and then by the next: most mistakes are noticed by any method."""
+    for method, check in itertools.product(METHODS, contacts.ALL.values()):
         if check is contacts.squares and method in contacts.LAG:
             continue
         try:

@@ -230,6 +230,8 @@ FUNCTIONS = {
     "shift_up": _on_bits(np.left_shift),
     "shift_down": _on_bits(np.right_shift),
 }
+#: The type of constants; the tests of float32 take another, and other functions.
+NUMBER: Any = np.float64
 COMPARED = {ast.Lt: np.less, ast.LtE: np.less_equal, ast.Eq: np.equal}
 DONE = {ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide}
 
@@ -239,7 +241,7 @@ def _value(node: Any, known: dict[str, Any]) -> Any:
     of = lambda each: _value(each, known)  # noqa: E731
     match node:
         case ast.Constant():
-            return np.float64(node.value)
+            return NUMBER(node.value)
         case ast.Name():
             return known[node.id]
         case ast.UnaryOp(op=ast.USub()):

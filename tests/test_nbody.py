@@ -45,6 +45,8 @@ RANDOM = {
 @given(**RANDOM, method=st.sampled_from(METHODS))
 def test_momentum_is_kept_by_every_method(seed: int, n: int, dim: int, force: str, method: str) -> None:
     """The two pushes of a pair are G·m·m times the same numbers, so they cancel but for rounding."""
+    if sw.method(method).has_series:
+        n = min(n, 8)  # of more bodies a series is refused, see test_taylor.py
     system, v, y = bodies(seed, n, dim, force)
     run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=200)
     m = system.masses[:, np.newaxis]

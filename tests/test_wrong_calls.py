@@ -371,6 +371,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "control": None,
             "force": None,
             "fused": False,
+            "dtype": "float32",
             "t0": 0.0,
             "start": None,
         }
@@ -406,14 +407,15 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "criteria": (sw.criteria, OF_METHODS | {"phi": (0.1, 0.5)}),
     "explain": (
         sw.explain,
-        {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False},
+        {"system": sw.Oscillator(), "method": "merson", "members": 2, "control": None, "fused": False, "attempt": False}
+        | {"dtype": "float64"},
     ),
     "explain bodies": (sw.explain, {"system": sw.NBody(), "method": "rk4", "members": 2, "control": sw.EnergyControl(0.1)}),
     "explore": (sw.explore, {"scenes": "oscillator", "methods": ["rk4"]}),
     "export": (
         sw.export,
         {"system": sw.Oscillator([1.0, 2.0]), "method": "rk4", "language": "c", "dt": 0.1, "t0": 0.0, "v": 0.0, "y": 1.0}
-        | {"member": 1, "start": None, "control": None, "fused": False, "name": "step"},
+        | {"member": 1, "start": None, "control": None, "fused": False, "name": "step", "dtype": "float32"},
     ),
     "export Verlet": (sw.export, {"system": sw.Oscillator(), "method": "verlet", "language": "rust", "start": "first_order"}),
     "export bodies": (
@@ -432,6 +434,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "methods": ["rk4"],
             "cost": "evaluations",
             "fixed": True,
+            "dtype": "both",
         },
     ),
     "charts.figures": (charts.figures, OF_METHODS | {"phi": 0.5, "periods": 2.0}),

@@ -56,6 +56,8 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         return np.array(value)  # the most frequent case: nothing more to check
     if type(value) is np.ndarray and _core.sound(value, finite, positive):
         return value  # likewise; the checks below say what is wrong with any other
+    if type(value) is np.ndarray and value.dtype == np.float32 and _core.sound(wide := _widened(value), finite, positive):
+        return wide
     if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
         value = shared(argument, value)
     try:
@@ -82,6 +84,15 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
+
+
+def _widened(value: Any) -> Array:
+    """An array of float32 as one of float64; in memory that was in use, since new pages take longer than filling them."""
+    from . import _memory  # which needs this module
+
+    wide = _memory.empty(value.shape)
+    wide[...] = value
+    return wide
 
 
 def shared(argument: str, value: Any) -> Any:
@@ -261,6 +272,8 @@ def is_single(dtype: Any) -> bool:
     """Whether float32 is asked for; raise if it is neither that nor float64."""
     if dtype is np.float64 or (type(dtype) is str and dtype == "float64"):
         return False  # the usual case: NumPy takes 3 µs to name a type
+    if dtype is np.float32 or (type(dtype) is str and dtype == "float32"):
+        return True
     try:
         name = np.dtype(dtype).name if dtype is not None else ""
     except TypeError:

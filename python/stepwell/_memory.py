@@ -66,6 +66,8 @@ def _memory(numbers: int) -> Array:
 def empty(shape: Shape, dtype: Any = np.float64) -> Array:
     """As ``np.empty``, of float64 or float32."""
     numbers = prod(shape)
+    if dtype != np.float64 and 4 * numbers < LEAST_LENT:
+        return np.empty(shape, dtype)
     if dtype != np.float64:
         whole: Array = empty((-(-numbers // 2),)).view(dtype)
         return whole[:numbers].reshape(shape)

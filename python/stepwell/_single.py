@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ._checks import LARGEST_SINGLE
 from .errors import ArgumentError, UnsupportedError
 from .systems import Sampled, Sinusoid
 from .systems.inputs import LAST_SINGLE_ANGLE
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 def step(system: System, how: Method, form: str, dt: float, *, events: bool = False) -> float:
     """The step in float32; raise if there is none, or nothing of float32 goes with what is asked for."""
-    from .systems import Pendulum3D, Rods  # only such runs need them
-
     if form != "direct":
         raise UnsupportedError(f"dtype: float32 goes with form='direct' only, got form={form!r}")
     if how.has_series:
@@ -31,13 +30,23 @@ def step(system: System, how: Method, form: str, dt: float, *, events: bool = Fa
             "dtype: float32 does not go with events=, which are located in float64 only; use float64, or look for them in the "
             "saved states"
         )
-    if isinstance(system, (Pendulum3D, Rods)) and system.contacts:
+    if system.contacts and _is_of_rods(system):
         raise UnsupportedError(
             f"dtype: float32 does not go with rods that meet surfaces, whose joints are decided by more digits than it has, got "
             f"{system!r}; use float64"
         )
-    with np.errstate(over="ignore"):
-        rounded = float(np.float32(dt))
+    return rounded_step(dt)
+
+
+def _is_of_rods(system: System) -> bool:
+    from .systems import Pendulum3D, Rods  # only systems with surfaces need them
+
+    return isinstance(system, (Pendulum3D, Rods))
+
+
+def rounded_step(dt: float) -> float:
+    """A step, rounded to float32; raise if nothing is left of it."""
+    rounded = float(np.float32(dt)) if dt <= LARGEST_SINGLE else np.inf
     if not 0.0 < rounded < np.inf:
         raise ArgumentError(f"dt: expected a number above zero in float32, from 1.4e-45 to 3.4e38 units of time, got {dt!r}")
     return rounded

@@ -31,5 +31,8 @@ ControlForm = Literal["limited", "printed"]
 #: What advice ranks by.
 Cost = Literal["time", "evaluations"]
 
+#: In which numbers methods are compared.
+Dtypes = Literal["float64", "float32", "both"]
+
 #: Languages of exported steps.
 LanguageName = Literal["c", "javascript", "python", "rust"]

@@ -10,11 +10,12 @@ import platform
 import shutil
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from ..workloads import SINGLE_KIND
 from . import Contestant, MissingPeerError, Ready, Workload, fastest, threads
 
 OSCILLATORS, BODIES, SPRINGS = (Path(__file__).with_name(name) for name in ("kernels.c", "bodies.c", "springs.c"))
@@ -25,7 +26,8 @@ BODY_BLOCKS = (8, 16, 32)
 EXACT = ("-ffp-contract=off",)
 FAST = ("-ffast-math",)  # for bodies, where it is faster; it may also reorder
 
-numbers = ctypes.POINTER(ctypes.c_double)
+#: Kernels of float32.
+SINGLE = "-DSINGLE"
 
 
 def flags() -> list[str]:
@@ -86,9 +88,11 @@ class Form:
     def made(self, work: Workload) -> Ready:
         """The workload by the function of that name."""
         defines = [f"-D{each.upper().replace(' ', '=')}" for each in self.told]
-        function = getattr(library(self.source, *defines, *self.options), work.kind)
+        function = getattr(library(self.source, *defines, *self.options), work.kind.removeprefix(SINGLE_KIND))
         function.restype = None
-        rows = [np.ascontiguousarray(row) for row in work.data.values()]
+        dtype, number = (np.float32, ctypes.c_float) if SINGLE in self.options else (np.float64, ctypes.c_double)
+        numbers = ctypes.POINTER(number)
+        rows = [np.ascontiguousarray(row, dtype) for row in work.data.values()]
         pointers = (numbers * len(rows))(*(row.ctypes.data_as(numbers) for row in rows))
 
         def call():
@@ -147,6 +151,21 @@ def cloth(work: Workload, quick: bool, exact: bool) -> list[Form]:
     return [Form(SPRINGS, (form,), (*sizes, *how)) for form in ("scatter", "kept") for how in hows]
 
 
+def single(forms):
+    """The same in float32."""
+
+    def of_float32(work: Workload, quick: bool, exact: bool) -> list[Form]:
+        found = [replace(form, options=(*form.options, SINGLE)) for form in forms(work, quick, exact)]
+        # Blocks of as many numbers, and of as many vectors, which hold twice as many.
+        longer = [replace(form, told=(twice(form.told[0]), *form.told[1:])) for form in found]
+        return list(dict.fromkeys([*found, *longer]))
+
+    def twice(block: str) -> str:
+        return f"block {2 * int(block.removeprefix('block '))}"
+
+    return of_float32
+
+
 FORMS = {
     "free_false_euler": oscillators,
     "forced_standard_heun": oscillators,
@@ -158,6 +177,7 @@ FORMS = {
     "shared_cluster_leapfrog": cluster,
     "cloth_leapfrog": cloth,
 }
+FORMS |= {SINGLE_KIND + kind: single(FORMS[kind]) for kind in ("free_false_euler", "pendulums_standard_heun", "pendulums_rk4")}
 
 
 def contestant(name: str, exact: bool) -> Contestant:

@@ -8,7 +8,7 @@ import numpy as np
 import stepwell as sw
 
 from ..own.equations import EQUATIONS, Equation
-from ..workloads import w2_pendulums
+from ..workloads import SINGLE_KIND, w2_pendulums
 from . import Contestant, Ready, Workload, threads
 
 
@@ -64,6 +64,7 @@ SYSTEMS = {
     "cloth_leapfrog": (cloth, "leapfrog"),
     **{f"own_{each.name}": (functools.partial(own, each), "rk4") for each in EQUATIONS},
 }
+SYSTEMS |= {SINGLE_KIND + kind: SYSTEMS[kind] for kind in ("free_false_euler", "pendulums_standard_heun", "pendulums_rk4")}
 OWN = tuple(kind for kind in SYSTEMS if kind.startswith("own_"))
 
 
@@ -72,6 +73,10 @@ def made(system, method: str, how, work: Workload, quick: bool) -> Ready:
     data = work.data
     if work.members == 1 and data["v"].ndim > 1:  # one system has no axis of members
         data = {name: row[..., 0] for name, row in data.items()}
+
+    if work.kind.startswith(SINGLE_KIND):
+        how = how | {"dtype": "float32"}
+        data = {name: row.astype(np.float32) for name, row in data.items()}
 
     start = {name: data[name] for name in ("v", "y") if data[name].size}  # a system of the first order has no v
 

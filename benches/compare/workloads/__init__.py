@@ -41,6 +41,8 @@ class Workload(ABC):
     unit: ClassVar[Unit] = Unit("G steps/s", 1e9)
     #: The contestants that all others are compared with, where they take part.
     beside: ClassVar[tuple[str, ...]] = ("numba", "C", "C, exact")
+    #: How far contestants with the same method may be apart: a few thousand operations of 1e-16 each, and another sine.
+    rounding: ClassVar[float] = 1e-11
     name: str
     data: Mapping[str, Array]
     dt: float
@@ -88,6 +90,10 @@ class Workload(ABC):
         """The largest distance of a member from its exact state. Amplitudes are about 1."""
         exact_v, exact_y = self.exact()
         return float(np.hypot(v - exact_v, y - exact_y).max())
+
+
+#: The kinds of work in float32 begin so.
+SINGLE_KIND = "single_"
 
 
 def catalogue() -> list[Workload]:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, TypeVar
 
-from .. import _checks
+from .. import _checks, _single
 from ..charts.measure import TIMED_STEP
 from ..errors import ArgumentError, TooLargeError, UnsupportedError
 from ..integrate import integrate
@@ -22,23 +22,27 @@ from ..scenes import Scene
 from ..scenes import scene as find_scene
 from . import predict
 from .adaptive import AdaptiveTrials
-from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed
-from .motion import Grid, motion_of
+from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
+from .motion import SINGLE_STEP_ROUNDING, Grid, motion_of
 from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
 from .trials import Times, Trial, Trials, step_times, tried_times
 
 if TYPE_CHECKING:
-    from .._words import Cost
+    from .._words import Cost, Dtypes
 
 Kind = TypeVar("Kind")
 
 __all__ = ["Advice", "Rejected", "Row", "Shortfall", "advise"]
 
 COSTS: tuple[Cost, ...] = ("time", "evaluations")
+DTYPES: tuple[Dtypes, ...] = ("float64", "float32", "both")
 
 #: A larger budget in seconds is refused: the age of the universe is half of it.
 MOST_SECONDS = 1e18
+
+#: A step in float32 takes about this share of the time of one in float64, so its runs count so much in the work of a search.
+SINGLE_WORK = 0.5
 
 #: The longest frame, in horizons: a run must reach its end.
 LONGEST_FRAME = 100.0
@@ -59,6 +63,7 @@ def advise(
     *,
     cost: Cost = "time",
     fixed: bool = False,
+    dtype: Dtypes = "float64",
 ) -> Advice:
     """Find the cheapest method and step that are accurate enough for a scene.
 
@@ -78,6 +83,9 @@ def advise(
             cost of frames differs, their mean counts. Of methods whose costs differ by less than the noise of the measurement the
             one with the smallest error comes first.
         fixed: leave out adaptive steps, which a ``World`` cannot take.
+        dtype: ``"float64"``, ``"float32"``, or ``"both"``, which also tries each method with fixed steps in float32. There a
+            step takes about half the time, and rounding bounds what is accurate enough. Of equal costs, as evaluations are,
+            float64 comes first. With ``"float32"`` there are no adaptive steps, which it does not go with.
 
     Returns:
         An ``Advice``; print it.
@@ -94,6 +102,7 @@ def advise(
     tolerance = _checks.number("tolerance", tolerance, positive=True)
     cost = _checks.known("cost", cost, COSTS)
     fixed = _checks.flag("fixed", fixed)
+    dtype = _checks.known("dtype", dtype, DTYPES)
     frame = None if frame is None else _checks.number("frame", frame, positive=True, unit="units of time")
     budget = frame if budget is None else _checks.number("budget", budget, positive=True, unit="seconds")
     if budget is not None and budget > MOST_SECONDS:
@@ -112,26 +121,31 @@ def advise(
         frames = f"{_checks.LAST_STEP:.0e} frames or fewer in the horizon of {scene.horizon:g} units of time"
         raise ArgumentError(f"frame: expected {frames}, got a frame of {frame:g}")
 
-    known = motion_of(scene, frame, tolerance)
+    known = motion_of(scene, frame, tolerance, single=dtype != "float64")
     most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
     trials = Trials(known, tolerance, LONG_RUN_SHARE * most)
+    narrow = Trials(known, tolerance, LONG_RUN_SHARE * most, "float32")
     adaptive = AdaptiveTrials(known, ERROR_SHARE * tolerance, most)
     candidates: list[Candidate] = []
     rejected = []
     for method in chosen:
-        ways: list[Candidate] = [Fixed(method, trials, known.grid, known.share)]
-        ways += [Adaptive(method, adaptive)] if method.error_order is not None and not (fixed or method.has_series) else []
+        ways: list[Candidate] = []
+        if dtype != "float32":
+            ways += [Fixed(method, trials, known.grid, known.share)]
+            ways += [Adaptive(method, adaptive)] if method.error_order is not None and not (fixed or method.has_series) else []
+        if dtype != "float64":
+            ways += [Single(method, narrow, known.grid, known.share, trials, known.share * tolerance)]
         for candidate in ways:
-            why = _refusal(scene, candidate)
+            why = _refusal(scene, candidate, known.grid)
             if why is None:
                 candidates.append(candidate)
             else:
-                rejected.append(Rejected(method.name, "refused", why, candidate.by))
+                rejected.append(Rejected(method.name, "refused", why, candidate.by, candidate.dtype))
 
     times, noise = _times(scene, candidates)
     noise = noise if cost == "time" else 0.0
     prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
-    search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + adaptive.work)
+    search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
     found, missed = search.run(candidates)
 
     spent = _Spending(known.grid, adaptive, times)
@@ -145,9 +159,8 @@ def advise(
         missed = {name: why for name, why in missed.items() if name not in again}
     enough = [each for each in candidates if each.name in found]
     fits = [each for each in enough if spent.fits(each, found[each.name].k, budget)]
-    fits = by_cost_and_error(
-        fits, [search.cost(each, found[each.name].k) for each in fits], [found[each.name].trial.error for each in fits], noise
-    )
+    costs = [search.cost(each, found[each.name].k) for each in fits]
+    fits = by_cost_and_error(fits, costs, [_judged(each, found[each.name].trial) for each in fits], noise)
     for each in candidates:
         if each.name in missed:
             rejected.append(_missed(each, missed[each.name], search))
@@ -155,15 +168,16 @@ def advise(
             worst = " in its worst frame" if each.by == "tolerance" and frame is not None else ""
             need = spent.longest(each, found[each.name].k)
             reason = f"good enough, but takes {need:.3g} s{worst} of the {budget:.3g} s"
-            rejected.append(Rejected(each.method.name, "budget", reason, each.by))
+            rejected.append(Rejected(each.method.name, "budget", reason, each.by, each.dtype))
     fastest = predict.fastest_oscillation(trials) if fits else None
     ranked = tuple(_row(trials, each, found[each.name], spent, budget, fastest) for each in fits)
     shortfall = None if ranked else _shortfall(candidates, found, spent, budget)
-    made = trials.made + adaptive.made
-    return Advice(trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut, noise)
+    made = trials.made + narrow.made + adaptive.made
+    found_of = (trials.scene, frame, tolerance, budget, cost, ranked, tuple(rejected), shortfall, made, known.cut, noise)
+    return Advice(*found_of, dtype=dtype)
 
 
-def _refusal(scene: Scene, candidate: Candidate) -> str | None:
+def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     """Why the method cannot step the scene with its control, or None; found by trying a step."""
     if candidate.by == "tolerance" and scene.control is not None:
         return "adaptive steps are tried for scenes without a control only"
@@ -173,21 +187,33 @@ def _refusal(scene: Scene, candidate: Candidate) -> str | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            if candidate.by == "step":
+            if candidate.dtype == "float32":
+                _single.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
+                _single.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)
+                scene.run(candidate.method, dt, steps=1, dtype="float32")
+            elif candidate.by == "step":
                 scene.run(candidate.method, dt, steps=1)
             else:
                 integrate(scene.system, candidate.method, v=scene.v, y=scene.y, tolerance=1.0, at=[dt], max_steps=1)
         except UnsupportedError as error:
-            return str(error).removeprefix(f"{candidate.method.name} ")
+            return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
+        except ArgumentError as error:
+            # Such a scene was made, so nothing is wrong with it but numbers that float32 does not have.
+            if candidate.dtype == "float64":
+                raise
+            return str(error)
     return None
 
 
 def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, float], float]:
     """Nanoseconds per step, by the candidate's name, and by which share they may differ without a meaning."""
-    steps = step_times(scene, [each.method for each in candidates if each.by == "step"])
+    # What is advised in float32 is shown beside float64, so all are measured in that, too.
+    both = list({each.method.name: each.method for each in candidates if each.by == "step"}.values())
+    steps = step_times(scene, both, [each.method for each in candidates if each.dtype == "float32"])
     tried = tried_times(scene, [each.method for each in candidates if each.by == "tolerance"])
     noise = max((each.noise for each in (steps, tried) if isinstance(each, Times)), default=0.0)
-    return {each.name: (steps if each.by == "step" else tried)[each.method.name] for each in candidates}, noise
+    adaptive = {each.name: tried[each.method.name] for each in candidates if each.by == "tolerance"}
+    return {**steps, **adaptive}, noise
 
 
 def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors: Sequence[float], noise: float) -> list[Kind]:
@@ -205,6 +231,11 @@ def by_cost_and_error(candidates: Sequence[Kind], costs: Sequence[float], errors
         ranked += sorted(group, key=lambda i: (errors[i], costs[i]))
         order = order[len(group) :]
     return [candidates[i] for i in ranked]
+
+
+def _judged(candidate: Candidate, trial: Trial) -> float:
+    """The error by which what costs the same is ordered; that rounding made an error smaller is luck, and counts for nothing."""
+    return max(trial.error, candidate.in_float64(trial)) if isinstance(candidate, Single) else trial.error
 
 
 class _Spending:
@@ -247,6 +278,10 @@ def _row(
     ns, mean, longest = spent.times[candidate.name], spent.mean(candidate, trial), spent.longest(candidate, found.k)
     per_frame = candidate.evaluations * trial.steps / grid.spans
     by_modes, limit = None, predict.Limit(None, "none", None, None)
+    wide_error = wide_ns = None
+    if isinstance(candidate, Single):
+        wide_error, wide_ns = candidate.in_float64(trial), spent.times[method.name]
+        trials = candidate.trials
     observed = math.inf
     if candidate.by == "step":
         by_modes = predict.predicted(trials.scene, method, trial.dt, trial.steps)
@@ -280,6 +315,9 @@ def _row(
         tolerance=candidate.tolerance(found.k) if isinstance(candidate, Adaptive) else None,
         rejected_steps=trial.rejected,
         worst_evaluations=candidate.evaluations * spent.most(candidate, found.k) if grid.framed else None,
+        dtype=candidate.dtype,
+        float64_error=wide_error,
+        float64_ns_per_step=wide_ns,
     )
 
 
@@ -302,7 +340,9 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
         reason = f"error {trial.error:.2g} {tried}, and what is enough {too_expensive}{needs}"
     else:
         reason = f"error {trial.error:.2g} {tried}, the most tried{needs}"
-    return Rejected(candidate.method.name, missed.kind, reason, candidate.by)
+    if isinstance(candidate, Single) and candidate.is_rounding(missed.k):
+        reason = f"error {trial.error:.2g} {tried}, most of it rounding: in float64 it is {candidate.in_float64(trial):.2g}"
+    return Rejected(candidate.method.name, missed.kind, reason, candidate.by, candidate.dtype)
 
 
 def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None) -> Shortfall:
@@ -318,4 +358,4 @@ def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spen
         return Shortfall(least, None, None, needed, by)
     chosen, k = best
     tolerance = chosen.tolerance(k) if isinstance(chosen, Adaptive) else None
-    return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance)
+    return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance, chosen.dtype)

@@ -13,7 +13,7 @@ from typing import Protocol
 from ..methods import Method
 from .adaptive import AdaptiveTrials
 from .motion import Grid
-from .trials import Trial, Trials
+from .trials import ASYMPTOTIC_ERROR, Trial, Trials, single_name
 
 #: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
 UNIT_TOLERANCE_K = 64
@@ -21,6 +21,8 @@ UNIT_TOLERANCE_K = 64
 #: No tolerance is smaller than this: below it rounding is all.
 LEAST_TOLERANCE = 1e-16
 
+#: Steps below the normal numbers of float32 have fewer digits.
+LEAST_SINGLE_STEP = 2.0**-126
 
 #: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this share of
 #: what is allowed.
@@ -33,7 +35,8 @@ class Candidate(Protocol):
     Attributes:
         method: the method.
         by: ``"step"`` or ``"tolerance"``.
-        name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``.
+        name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``; or by "float32".
+        dtype: in which its steps are computed.
         first: the least k.
         share: of the error that is allowed, what the run may have.
         seen: the runs that were made, by k.
@@ -42,6 +45,7 @@ class Candidate(Protocol):
     method: Method
     by: str
     name: str
+    dtype: str
     first: int
     share: float
     seen: dict[int, Trial]
@@ -67,6 +71,7 @@ class Fixed:
     """Steps of one length: k of them in a span of the grid."""
 
     by = "step"
+    dtype = "float64"
 
     def __init__(self, method: Method, trials: Trials, grid: Grid, share: float) -> None:
         self.method, self.name, self.share = method, method.name, share
@@ -96,10 +101,51 @@ class Fixed:
         return f"{k} step{'s' * (k != 1)}{' a frame' * self.grid.framed}"
 
 
+class Single(Fixed):
+    """Steps of one length in float32.
+
+    Shorter steps do not help where rounding alone is more than what is allowed, so the search ends there.
+
+    Args:
+        method: the method.
+        trials: runs in float32.
+        grid: the steps that can be chosen.
+        share: of the error that is allowed, what the run may have.
+        wide: the same runs in float64.
+        allowed: the state error that its runs may have.
+    """
+
+    dtype = "float32"
+
+    def __init__(self, method: Method, trials: Trials, grid: Grid, share: float, wide: Trials, allowed: float) -> None:
+        super().__init__(method, trials, grid, share)
+        self.name, self.wide, self.allowed = single_name(method), wide, allowed
+
+    def possible(self, k: int) -> bool:
+        """Whether the step is a normal number of float32, and fewer steps leave hope for so many."""
+        before = max((n for n in self.seen if n < k), default=None)
+        return super().possible(k) and self.grid.dt(k) >= LEAST_SINGLE_STEP and (before is None or not self.is_rounding(before))
+
+    def is_rounding(self, k: int) -> bool:
+        """Whether rounding alone makes the error of a run that was made too large.
+
+        The states of the two precisions differ by at least as much as their errors do, and rounding is all that they differ by.
+        """
+        error = self.seen[k].error
+        if not self.allowed < error < ASYMPTOTIC_ERROR:
+            return False
+        return error - self.in_float64(self.seen[k]) > self.allowed
+
+    def in_float64(self, trial: Trial) -> float:
+        """The error of the same steps in float64."""
+        return self.wide.confirm(self.method, trial.dt, trial.steps).error
+
+
 class Adaptive:
     """Steps chosen to a tolerance: it is the power of 1/k with which the method estimates its error."""
 
     by = "tolerance"
+    dtype = "float64"
     share = ERROR_SHARE
 
     def __init__(self, method: Method, trials: AdaptiveTrials) -> None:

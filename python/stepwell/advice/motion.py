@@ -38,6 +38,9 @@ SAMPLES_PER_LENGTH, MAX_SAMPLES = 4.0, 20_000
 #: The length of the path is found by so many refinements, each of which adds times where the path is long.
 PATH_ITERATIONS = 4
 
+#: A step that is rounded to float32 is longer by at most this share, twice the half of a unit in the last place.
+SINGLE_STEP_ROUNDING = 2.0**-23
+
 #: How many results of ``exact`` are cached: all methods are tried with the same numbers of steps, hence at the same times.
 CACHED_ANSWERS = 96
 
@@ -97,6 +100,7 @@ class Motion(NamedTuple):
         marks: times within the horizon at which errors are looked for, ascending from 0.
         cut: whether the scene's horizon is longer, and its true motion not known so far.
         share: of the error that is allowed, what a run may have that is compared with it.
+        until: the last time for which the motion is known.
     """
 
     scene: Scene
@@ -104,10 +108,13 @@ class Motion(NamedTuple):
     marks: Array
     cut: bool
     share: float
+    until: float
 
 
-def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
-    """The true motion of a scene, over whole frames.
+def motion_of(scene: Scene, frame: float | None, tolerance: float, single: bool = False) -> Motion:
+    """The true motion of a scene, over whole frames; with ``single`` a little further, where it is known.
+
+    Runs of float32 make steps that are rounded to it, so they end a little later or earlier than others.
 
     Raises:
         ArgumentError: if it is not known to the end of the first frame.
@@ -115,11 +122,12 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
     horizon = scene.horizon
     grid = grid_of(horizon, frame)
     last = max(horizon, grid.end)
-    until = min(scene.until, last)
+    reach = last * (1.0 + SINGLE_STEP_ROUNDING) if single else last
+    until = min(scene.until, reach)
     exact = scene.exact
     if exact is None:
-        known = with_truth(replace(scene, horizon=last), tolerance / TRUTH_FACTOR)
-        exact, until = known.exact, min(known.until, last)
+        known = with_truth(replace(scene, horizon=reach), tolerance / TRUTH_FACTOR)
+        exact, until = known.exact, min(known.until, reach)
         assert exact is not None
     cut = until < horizon
     if frame is not None and until < last:
@@ -135,7 +143,7 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float) -> Motion:
         exact = tabled(exact, until, judged.scales, min(MAX_TABLE_ERROR, tolerance / TABLE_FACTOR))
 
     judged = replace(judged, exact=Within(exact, until))
-    return Motion(judged, grid, _marks(judged), cut, ERROR_SHARE if scene.exact is None else 1.0)
+    return Motion(judged, grid, _marks(judged), cut, ERROR_SHARE if scene.exact is None else 1.0, until)
 
 
 def _marks(scene: Scene) -> Array:

@@ -64,6 +64,9 @@ class Row:
         tolerance: the tolerance of adaptive steps, as ``integrate`` takes it; None for fixed steps.
         rejected_steps: the number of rejected steps among the steps.
         worst_evaluations: function (rate) evaluations in the most expensive frame; None without a frame.
+        dtype: in which its steps are computed, ``"float64"`` or ``"float32"``. A step of float32 is ``dt`` rounded to it.
+        float64_error: of a row in float32, the largest state error of the same steps in float64; else None.
+        float64_ns_per_step: of a row in float32, what a step of the same method takes in float64; else None.
     """
 
     method: Method
@@ -90,6 +93,9 @@ class Row:
     tolerance: float | None = None
     rejected_steps: int = 0
     worst_evaluations: int | None = None
+    dtype: str = "float64"
+    float64_error: float | None = None
+    float64_ns_per_step: float | None = None
 
     __repr__ = one_line
 
@@ -100,8 +106,8 @@ class Row:
 
     @property
     def name(self) -> str:
-        """The method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``."""
-        return named(self.method.name, self.by)
+        """The method's name, followed by "tolerance" for adaptive steps or by "float32": ``"merson, tolerance"``."""
+        return named(self.method.name, self.by, self.dtype)
 
     @property
     def margin(self) -> float:
@@ -136,6 +142,7 @@ class Rejected:
             more than ten times as expensive as the best; ``"budget"``, good enough but too expensive.
         reason: the same in words and numbers.
         by: ``"step"`` or ``"tolerance"``, what its steps were chosen by.
+        dtype: ``"float64"`` or ``"float32"``, in which they were computed.
     """
 
     __repr__ = one_line
@@ -144,11 +151,12 @@ class Rejected:
     kind: str
     reason: str
     by: str = "step"
+    dtype: str = "float64"
 
     @property
     def name(self) -> str:
-        """The method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``."""
-        return named(self.method, self.by)
+        """The method's name, followed by "tolerance" for adaptive steps or by "float32": ``"merson, tolerance"``."""
+        return named(self.method, self.by, self.dtype)
 
 
 @dataclass(frozen=True)
@@ -162,6 +170,7 @@ class Shortfall:
         needed_budget: seconds in a frame (in a unit of time without one) that the tolerance needs, or None if nothing meets it.
         needed_method: by which, ``"merson, tolerance"`` if it chooses its steps, or None.
         tolerance: to which the steps of the least error are chosen, or None.
+        dtype: in which they are computed.
     """
 
     __repr__ = one_line
@@ -172,6 +181,7 @@ class Shortfall:
     needed_budget: float | None
     needed_method: str | None
     tolerance: float | None = None
+    dtype: str = "float64"
 
 
 @dataclass(frozen=True)
@@ -191,6 +201,7 @@ class Advice:
         runs: how many runs were made to find it.
         cut: whether the scene's horizon is longer, and its true motion not known so far.
         cost_noise: the share by which measured times may differ without a meaning; 0 for evaluations.
+        dtype: ``"float64"``, ``"float32"`` or ``"both"``: in which numbers steps were tried.
     """
 
     scene: Scene
@@ -204,6 +215,7 @@ class Advice:
     runs: int
     cut: bool = False
     cost_noise: float = 0.0
+    dtype: str = "float64"
 
     @property
     def best(self) -> Row | None:
@@ -226,6 +238,7 @@ class Advice:
             "runs": self.runs,
             "cut": self.cut,
             "cost_noise": self.cost_noise,
+            "dtype": self.dtype,
         }
         found: dict[str, Any] = finite(whole)
         return found
@@ -259,7 +272,7 @@ class Advice:
         if row is None:
             raise ArgumentError("row: nothing fits, so there is nothing to run")
         if row.tolerance is None:
-            return self.scene.run(row.method, row.dt, steps=row.steps, every=1)
+            return self.scene.run(row.method, row.dt, steps=row.steps, every=1, dtype=row.dtype)
         most = row.steps + 1
         scene = self.scene
         return integrate(scene.system, row.method, v=scene.v, y=scene.y, tolerance=row.tolerance, at=self.asked, max_steps=most)
@@ -276,14 +289,15 @@ class Advice:
         else:
             count = f"{best.substeps} step{'s' * (best.substeps != 1)} a frame" if best.substeps else f"{best.steps} steps"
             run = f"error {best.error:.2g} in the run of {best.steps} steps"
-            lines = [f"Use {best.method.name} with {count}, dt = {best.dt:.4g}: {run}."]
+            single = " in float32" if best.dtype == "float32" else ""
+            lines = [f"Use {best.method.name}{single} with {count}, dt = {best.dt:.4g}: {run}."]
         lines += self._cut()
         ns = 1e9 * (best.seconds_per_frame if best.seconds_per_frame is not None else best.seconds_per_time)
         evaluations = best.evaluations_per_frame if best.evaluations_per_frame is not None else best.evaluations_per_time
         worst = f", {best.worst_evaluations} in the worst frame" if best.tolerance is not None and best.worst_evaluations else ""
         counted = f"{evaluations:.4g} function evaluation{'s' * (evaluations != 1)}{worst}"
         lines.append(f"Cost {per}: {counted}; {ns:.2g} ns measured in a batch on one thread.")
-        lines += self._as_cheap(best)
+        lines += self._as_cheap(best) + self._beside(best)
         if best.objects is not None:
             objects = f"{about(best.objects)} such object{'s' * (best.objects != 1)}{', also then' * bool(worst)}"
             lines.append(f"The budget of {self.budget:.3g} s {per} suffices for {objects}.")
@@ -300,8 +314,19 @@ class Advice:
         same = [row.name for row in self.ranked[1:] if row.seconds_per_time <= alike and row.error >= best.error]
         if not same:
             return []
-        said = f"{', '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
+        said = f"{'; '.join(same)} cost{'s' * (len(same) == 1)} the same, and the error is larger"
         return [f"As far as can be measured (±{100 * self.cost_noise:.0f} %), {said}."]
+
+    def _beside(self, best: Row) -> list[str]:
+        """What float32 gains and costs, where it was asked for."""
+        row = next((row for row in self.ranked if row.dtype == "float32"), None)
+        if row is None or row.float64_error is None or row.float64_ns_per_step is None:
+            return []
+        ratio = f"a step takes {row.float64_ns_per_step / row.ns_per_step:.2g} times as long"
+        if row is best:
+            return [f"In float64 these steps have an error of {row.float64_error:.2g}, and {ratio}."]
+        error = f"error {row.error:.2g}, {row.float64_error:.2g} in float64, where {ratio}"
+        return [f"Of float32 the best is {row.method.name}, dt = {row.dt:.4g}: {error}."]
 
     def _cut(self) -> list[str]:
         if not self.cut:
@@ -324,7 +349,8 @@ class Advice:
         if gap.method is not None:
             within = "within the budget" if self.budget is not None else "found"
             how = f"{gap.substeps} {unit}" if gap.tolerance is None else f"a tolerance of {gap.tolerance:g}"
-            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method} with {how}.")
+            single = " in float32" if gap.dtype == "float32" else ""
+            lines.append(f"The least error {within} is {gap.least_error:.2g}, by {gap.method}{single} with {how}.")
         elif self.budget is not None:
             lines.append(f"The budget of {self.budget:.3g} s {per} does not suffice for one step of any method.")
         if gap.needed_budget is not None:
@@ -341,7 +367,7 @@ class Advice:
             steps = f"{row.steps / self._frames:.3g}" if framed and row.substeps is None else str(row.substeps or row.steps)
             rows.append(
                 (
-                    row.method.name if row.tolerance is None else f"{row.method.name} to {row.tolerance:g}",
+                    row.name if row.tolerance is None else f"{row.method.name} to {row.tolerance:g}",
                     steps + ("" if row.is_robust else "*"),
                     ("" if row.tolerance is None else "~") + f"{row.dt:.4g}",
                     f"{row.error:.2g}",
@@ -425,7 +451,8 @@ class Advice:
         if best is None:
             return f"<advice for {self.scene.name}: nothing fits>"
         how = f"dt = {best.dt:g}" if best.tolerance is None else f"tolerance {best.tolerance:g}"
-        return f"<advice for {self.scene.name}: {best.method.name}, {how}, error {best.error:.2g}>"
+        single = ", float32" if best.dtype == "float32" else ""
+        return f"<advice for {self.scene.name}: {best.method.name}{single}, {how}, error {best.error:.2g}>"
 
 
 def about(number: int) -> str:
@@ -440,9 +467,9 @@ def about(number: int) -> str:
     return f"about {mantissa}·10{power}"
 
 
-def named(method: str, by: str) -> str:
-    """The method's name, followed by "tolerance" for adaptive steps."""
-    return method if by == "step" else f"{method}, tolerance"
+def named(method: str, by: str, dtype: str) -> str:
+    """The method's name, followed by "tolerance" for adaptive steps, or by "float32"."""
+    return f"{method}{'' if by == 'step' else ', tolerance'}{'' if dtype == 'float64' else ', float32'}"
 
 
 def _aligned(cell: str, i: int, widths: list[int]) -> str:

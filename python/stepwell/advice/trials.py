@@ -6,7 +6,8 @@ import copy
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,9 +98,11 @@ class Trials:
         motion: what runs are compared with.
         tolerance: the state error that is allowed.
         long: a run of more rate evaluations than this is stopped where it is wrong altogether.
+        dtype: in which they are computed.
     """
 
-    def __init__(self, motion: Motion, tolerance: float, long: float) -> None:
+    def __init__(self, motion: Motion, tolerance: float, long: float, dtype: str = "float64") -> None:
+        self.dtype, self.until = dtype, motion.until
         self.long, self.lost = long, max(ASYMPTOTIC_ERROR, min(LOST, LOST_RATIO * tolerance), 2.0 * tolerance)
         self.scene, self.grid, self.marks = motion.scene, motion.grid, motion.marks
         self.numbers = self.scene.v.size + self.scene.y.size
@@ -170,6 +173,7 @@ class Trials:
         self.made += 1
         worst, done, pieces = 0.0, 0, []
         state: dict[str, Any] = {"v": self.scene.v, "y": self.scene.y, "dt": dt, "control": self.scene.control}
+        state["dtype"] = self.dtype
         with warnings.catch_warnings():
             for kind in (DivergenceWarning, ControlWarning, AccuracyWarning):
                 warnings.simplefilter("ignore", kind)
@@ -184,6 +188,7 @@ class Trials:
             blocks = [getattr(each, name) for each in pieces]
             setattr(whole, name, np.concatenate([blocks[0], *(block[1:] for block in blocks[1:])]))
         whole.steps = done
+        whole = self._known(whole)
         if done == steps:
             self._last = (method.name, steps, dt), whole
         return whole, worst
@@ -195,7 +200,13 @@ class Trials:
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", ControlWarning)
             warnings.simplefilter("ignore", AccuracyWarning)
-            return self.scene.run(method, dt, steps=steps, every=self._every(steps))
+            return self._known(self.scene.run(method, dt, steps=steps, every=self._every(steps), dtype=self.dtype))
+
+    def _known(self, run: Run) -> Run:
+        """The run as far as the true motion is known: steps that were rounded to float32 may end after it."""
+        if self.dtype == "float64" or run.t[-1] <= self.until:
+            return run
+        return _part(run, np.flatnonzero(run.t <= self.until))
 
     def _marked(self, run: Run) -> Run:
         """The states at the marks; the last is one of them."""
@@ -215,17 +226,33 @@ def _part(run: Run, places: np.ndarray[Any, np.dtype[np.int64]]) -> Run:
     return part
 
 
-def step_times(scene: Scene, methods: Sequence[Method]) -> Times:
-    """Nanoseconds per step of one member of a batch, on one thread, by method; the methods take turns."""
+def step_times(scene: Scene, methods: Sequence[Method], singles: Sequence[Method] = ()) -> Times:
+    """Nanoseconds per step of one member of a batch, on one thread; all take turns.
+
+    Args:
+        scene: what is stepped.
+        methods: by which, in float64.
+        singles: by which, in float32.
+
+    Returns:
+        Times by the method's name, those in float32 by ``single_name``.
+    """
     v, y, members = _batch(scene)
 
-    def timed(method: Method, steps: int) -> tuple[float, int]:
+    def timed(method: Method, steps: int, dtype: str) -> tuple[float, int]:
         dt = TIMED_STEP * scene.dt  # so small that nothing leaves the finite numbers
         begin = time.perf_counter()
-        integrate(scene.system, method, v=v, y=y, dt=dt, steps=steps, threads=1, control=scene.control)
+        integrate(scene.system, method, v=v, y=y, dt=dt, steps=steps, threads=1, control=scene.control, dtype=dtype)
         return time.perf_counter() - begin, steps
 
-    return _in_turns(methods, timed, members)
+    ways = {method.name: partial(timed, method, dtype="float64") for method in methods}
+    ways |= {single_name(method): partial(timed, method, dtype="float32") for method in singles}
+    return _in_turns(ways, members)
+
+
+def single_name(method: Method) -> str:
+    """The name of a method in float32: ``"rk4, float32"``."""
+    return f"{method.name}, float32"
 
 
 def tried_times(scene: Scene, methods: Sequence[Method]) -> Times:
@@ -263,7 +290,7 @@ def tried_times(scene: Scene, methods: Sequence[Method]) -> Times:
             while tried(method, scene.v, scene.y, end) < fewest and end < 1000 * scene.horizon:
                 end *= 2.0
             ends[method.name] = end
-    return _in_turns(methods, timed, members)
+    return _in_turns({method.name: partial(timed, method) for method in methods}, members)
 
 
 def _batch(scene: Scene) -> tuple[Array, Array, int]:
@@ -273,26 +300,27 @@ def _batch(scene: Scene) -> tuple[Array, Array, int]:
     return v, y, members
 
 
-def _in_turns(methods: Sequence[Method], timed: Callable[[Method, int], tuple[float, int]], members: int) -> Times:
+def _in_turns(ways: Mapping[str, Callable[[int], tuple[float, int]]], members: int) -> Times:
+    """Each function takes a number of runs or steps, and returns seconds and how many steps were made."""
     sizes, repeats = {}, {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         warnings.simplefilter("ignore", ToleranceWarning)
         warnings.simplefilter("ignore", AccuracyWarning)
         begun = time.perf_counter()
-        for method in methods:
-            n, (seconds, steps) = 1, timed(method, 1)
+        for name, timed in ways.items():
+            n, (seconds, steps) = 1, timed(1)
             # The quicker of two, for a call that something else held up would look long enough; one that is far too long is not.
-            while seconds < MUCH * TIMED_SECONDS and min(seconds, timed(method, n)[0]) < TIMED_SECONDS:
+            while seconds < MUCH * TIMED_SECONDS and min(seconds, timed(n)[0]) < TIMED_SECONDS:
                 n *= 2
-                seconds, steps = timed(method, n)
-            sizes[method.name], repeats[method.name] = n, [1e9 * seconds / (steps * members)]
+                seconds, steps = timed(n)
+            sizes[name], repeats[name] = n, [1e9 * seconds / (steps * members)]
         for _ in range(REPEATS):
             if time.perf_counter() - begun > SLOW_SECONDS:
                 break
-            for method in methods:
-                seconds, steps = timed(method, sizes[method.name])
-                repeats[method.name].append(1e9 * seconds / (steps * members))
+            for name, timed in ways.items():
+                seconds, steps = timed(sizes[name])
+                repeats[name].append(1e9 * seconds / (steps * members))
     found = Times({name: min(each) for name, each in repeats.items()})
     found.noise = cost_noise(repeats.values())
     return found

@@ -91,7 +91,8 @@ def unit(advice: Advice) -> str:
 
 def name(row: Row) -> str:
     """A method and its step."""
-    return f"{row.method.title}, " + (f"dt = {row.dt:.3g}" if row.tolerance is None else f"tolerance {row.tolerance:g}")
+    single = "float32, " if row.dtype == "float32" else ""
+    return f"{row.method.title}, {single}" + (f"dt = {row.dt:.3g}" if row.tolerance is None else f"tolerance {row.tolerance:g}")
 
 
 def on_front(costs: np.ndarray[Any, Any], errors: np.ndarray[Any, Any]) -> set[int]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .. import _checks
 from ..advice import COSTS, advise
@@ -15,6 +16,9 @@ from ..errors import ArgumentError
 from ..methods import method
 from ..scenes import scene
 from . import show
+
+if TYPE_CHECKING:
+    from .._words import Dtypes
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +39,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--methods", metavar="A,B,…", help="which methods (default: all)")
     parser.add_argument("--cost", default="time", metavar="COST", help=f"what to rank by: {' or '.join(COSTS)} (default: time)")
     parser.add_argument("--fixed", action="store_true", help="fixed steps only, none adaptive")
+    parser.add_argument("--float32", action="store_true", help="also fixed steps in float32, beside float64")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write all of it: .json")
     show.json_option(parser)
 
@@ -46,7 +51,8 @@ def command(args: argparse.Namespace) -> None:
     if args.output is not None:
         _checks.file("-o", args.output, (".json",))
 
-    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed)
+    dtype: Dtypes = "both" if args.float32 else "float64"
+    found = advise(chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype)
     written = show.Written()
     if args.output is not None:
         written.write(args.output, found.to_json)

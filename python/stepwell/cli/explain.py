@@ -27,6 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("method", metavar="METHOD", help="a method; see stepwell methods")
     parser.add_argument("--members", type=int, metavar="N", help="how many trajectories go together (default: 1)")
     parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
     parser.add_argument("--attempt", action="store_true", help="an attempt at an adaptive step")
     parser.add_argument("--form", default="direct", choices=("direct", "matrix"), help="a step by the transition matrix, or not")
     parser.add_argument("--start", metavar="HOW", help="how a method with a choice starts; see stepwell methods")
@@ -50,6 +51,7 @@ def command(args: argparse.Namespace) -> None:
         form=args.form,
         start=args.start,
         record=args.record,
+        dtype="float32" if args.float32 else "float64",
     )
     written = show.Written()
     if args.output is not None:

@@ -30,6 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--start", metavar="START", help="how a method with a choice starts")
     parser.add_argument("--fused", action="store_true", help="with fused multiply-adds")
+    parser.add_argument("--float32", action="store_true", help="in float32, with half the digits")
     parser.add_argument("--name", metavar="NAME", help="what functions and types are called, or begin with")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write it there instead of printing it")
     show.json_option(parser)
@@ -55,6 +56,7 @@ def command(args: argparse.Namespace) -> None:
         control=control,
         fused=args.fused,
         name=args.name,
+        dtype="float32" if args.float32 else "float64",
         **state,
     )
     written = show.Written()

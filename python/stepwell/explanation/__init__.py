@@ -11,7 +11,7 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from .. import _checks, _core, engine
+from .. import _checks, _core, _single, engine
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, UnsupportedError
 from ..integrate import fits_together, not_of_a_step
@@ -41,6 +41,7 @@ def explain(
     form: StepForm = "direct",
     start: str | None = None,
     record: str | Sequence[str] | None = (),
+    dtype: Any = "float64",
 ) -> Explanation:
     """Explain what a step of a system by a method computes, and its machine code on this machine.
 
@@ -62,6 +63,7 @@ def explain(
         start: how a method with a choice starts, as ``integrate`` takes it.
         record: quantities that the core can record, whose computation is listed, too: "energy", and what else the system names
             in its ``quantities``.
+        dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it.
 
     Returns:
         An ``Explanation``.
@@ -81,7 +83,10 @@ def explain(
     how, system = find_method(method), a_system(system).sized()
     fits_together(system, how)
     fused, attempt = _checks.flag("fused", fused), _checks.flag("attempt", attempt)
+    single = _checks.is_single(dtype)
     control = a_control(control)
+    if single and attempt:
+        raise UnsupportedError("attempt: float32 goes with fixed steps only; explain the attempt in float64")
     if attempt and how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"attempt: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
@@ -95,10 +100,15 @@ def explain(
         raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
     if form != "direct" and not system.linear:
         raise UnsupportedError(f"form: only linear systems have a transition matrix, and {system!r} is not linear")
+    if single:
+        _single.step(system, how, form, 1.0)
+        _single.check_inputs(system, 0.0)
     choice = how.start_choice(start)
     given = [record] if isinstance(record, str) else [] if record is None else _checks.several("record", record, "quantities")
     if given and not system.quantities:
         raise UnsupportedError(f"record: the core records nothing of {system!r}; its energy is NumPy's, from the saved states")
+    if given and single:
+        raise UnsupportedError("record: float32 runs compute it of the saved states, in float64; explain it without dtype=")
     quantities = list(dict.fromkeys(_checks.known("record", name, list(system.quantities)) for name in given))
     count = own if members is None else _checks.count("members", members, 1)
     if count % own:
@@ -110,7 +120,9 @@ def explain(
         system = system.under(control, batch)
         fits_together(system, how)
         system = system.stepped_by(how)
-    plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice)
+        if single:
+            _single.check_control(system)
+    plan = engine.Plan(system, how, batch, 1.0, fused=fused, form=form, choice=choice, single=single)
     explained = _explained(plan, attempt)
     if explained.parts is not None or attempt:
         return explained
@@ -120,7 +132,7 @@ def explain(
 def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
     model = engine.matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
     what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
-    what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form}
+    what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form, "dtype": "float32" if plan.single else "float64"}
     parts = _core.in_parts(model, plan.members, attempts=attempt)
     told = None if parts else _core.compiled(model, plan.members, attempts=attempt)
     if told is None:

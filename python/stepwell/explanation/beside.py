@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..engine import Plan
 from ..reference.traced import Tracer
-from .formula import Formula
+from .formula import Formula, Notation
 from .listing import Leaf, Section, Writer, indexed, parameters
 
 
@@ -28,7 +28,7 @@ def lines_beside(plan: Plan, choice: int, record: Sequence[str]) -> tuple[Sectio
 
 def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Section:
     """A part that is made now and then, as a section that is not cut."""
-    tape = _core.Tape()
+    tape = _core.Tape(single=plan.single)
     tracer = Tracer(plan.system, tape)
     symbols = traced(tracer)
     numbers, tables = parameters(plan._replace(form="direct"))
@@ -56,4 +56,6 @@ def _lines(plan: Plan, when: str, traced: Callable[[Tracer], list[Any]]) -> Sect
                 return Leaf(Formula("t"), tape.time(), 3)
 
     omegas = {(tape.step() * symbol).id: "Φ" for each, symbol in zip(numbers, params, strict=True) if each == "omega"}
-    return Writer(tape, omegas, tables=tables).section(when, on.operations(wanted), leaf, 4, "a", results)[0]
+    return Writer(tape, omegas, Notation(plan.single), tables=tables).section(when, on.operations(wanted), leaf, 4, "a", results)[
+        0
+    ]

@@ -9,13 +9,16 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 #: How strongly a formula holds together, by what it does last.
 CHOICE, EITHER, BOTH, NOT, COMPARISON, SUM, PRODUCT, SIGN, ATOM = range(9)
 
 #: Operations on bits, whose constants are bits.
 ON_BITS = ("and", "or", "exclusive or", "add bits", "shift up", "shift down")
 
-ALL_BITS = 2**64 - 1
+#: All bits of a number of float64, and of one of float32.
+ALL_BITS, ALL_SINGLE_BITS = 2**64 - 1, 2**32 - 1
 
 
 class Formula(NamedTuple):
@@ -40,13 +43,25 @@ class Formula(NamedTuple):
         return f"({self.text})" if self.text.startswith("−") else self.within(holds)
 
 
-def number(bits: int) -> Formula:
-    """A constant: the shortest text that is this number."""
-    (x,) = struct.unpack("<d", struct.pack("<Q", bits))
+def number(bits: int, single: bool = False) -> Formula:
+    """A constant: the shortest text that is this number, of float64 or of float32."""
+    x = number_of(bits, single)
     if x != x:
         return bit_pattern(bits)
-    text = repr(abs(x)).removesuffix(".0").replace("inf", "∞")
-    return Formula(f"−{text}", SIGN) if bits >> 63 else Formula(text)
+    text = shortest(abs(x), single).removesuffix(".0").replace("inf", "∞")
+    return Formula(f"−{text}", SIGN) if bits >> (31 if single else 63) else Formula(text)
+
+
+def number_of(bits: int, single: bool) -> float:
+    """The number of these bits."""
+    kinds = ("<I", "<f") if single else ("<Q", "<d")
+    (x,) = struct.unpack(kinds[1], struct.pack(kinds[0], bits))
+    return float(x)
+
+
+def shortest(x: float, single: bool) -> str:
+    """The shortest text that is read as this number, of float64 or of float32."""
+    return repr(float(str(np.float32(x)))) if single else repr(float(x))
 
 
 def bit_pattern(bits: int) -> Formula:
@@ -54,11 +69,11 @@ def bit_pattern(bits: int) -> Formula:
     return Formula(hex(bits))
 
 
-def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
-    """An operation of these; ``bits`` are those of the operands that are constants."""
+def formula(name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None], all_bits: int = ALL_BITS) -> Formula:
+    """An operation of these; ``bits`` are those of the operands that are constants, ``all_bits`` those of what is true."""
     if name in ON_BITS:
-        if all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True)):
-            return _of_truths(name, of, bits)
+        if all(each.is_truth or known in (0, all_bits) for each, known in zip(of, bits, strict=True)):
+            return _of_truths(name, of, bits, all_bits)
         of = [each if known is None else bit_pattern(known) for each, known in zip(of, bits, strict=True)]
     match name:
         case "add":
@@ -116,18 +131,27 @@ class Notation:
     Attributes:
         longest: characters of a line, its name not counted, beyond which it becomes several.
         called: functions of one number that are written by name in place of their operations.
+        single: whether numbers are those of float32.
     """
 
     longest = 72
     called: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
+    def __init__(self, single: bool = False) -> None:
+        self.single = single
+
+    @property
+    def all_bits(self) -> int:
+        """The bits of what is true."""
+        return ALL_SINGLE_BITS if self.single else ALL_BITS
+
     def number(self, bits: int) -> Formula:
         """A constant."""
-        return number(bits)
+        return number(bits, self.single)
 
     def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
         """An operation of these; ``bits`` are those of the operands that are constants."""
-        return formula(name, of, given, bits)
+        return formula(name, of, given, bits, self.all_bits)
 
     def named(self, name: str, value: Formula) -> Formula:
         """A value that has a line of its own, where it is used."""
@@ -147,10 +171,10 @@ def _minus(x: Formula) -> Formula:
     return Formula(f"−{x.behind(PRODUCT)}", PRODUCT if x.holds == PRODUCT else SIGN)
 
 
-def _of_truths(name: str, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
+def _of_truths(name: str, of: Sequence[Formula], bits: Sequence[int | None], all_bits: int) -> Formula:
     """Of truths the bits are all alike."""
     a, b = of
-    if name == "exclusive or" and ALL_BITS in bits:
+    if name == "exclusive or" and all_bits in bits:
         return Formula(f"not {(b if bits[0] is not None else a).within(COMPARISON)}", NOT, True)
     if name == "and":
         return Formula(f"{a.within(BOTH)} and {b.within(NOT)}", BOTH, True)

@@ -23,7 +23,7 @@ from ..reference import adaptive, increments
 from ..reference.signal import Constant, Held, Sine
 from ..reference.tape import Operation, in_order, needed
 from ..reference.traced import Tracer
-from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number
+from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number, number_of
 
 #: Characters of an increment of its own line; shorter ones stand where they are used.
 SHORT = 12
@@ -196,13 +196,13 @@ def coefficients(plan: Plan) -> list[str]:
 # ---- values on a tape
 
 
-def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None]) -> Any:
+def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None], single: bool = False) -> Any:
     """The same operation on another tape, where products that were fused into sums stand by themselves; None if it has none."""
     if any(each is None for each in of):
         return None
     match name:
         case "state" | "parameter" | "constant" | "step" | "time":
-            return _leaf(tape, name, given)
+            return _leaf(tape, name, given, single)
         case "add" | "subtract" | "multiply" | "divide" | "less" | "at most" | "and" | "or":
             return ARITHMETIC[name](*of)
         case "multiply add" | "multiply subtract" | "subtract multiply":
@@ -247,34 +247,34 @@ ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
-def _leaf(tape: Any, name: str, given: int) -> Any:
+def _leaf(tape: Any, name: str, given: int, single: bool) -> Any:
     match name:
         case "state":
             return tape.state(given)
         case "parameter":
             return tape.param(given)
         case "constant":
-            return tape.number(float(np.uint64(given).view(np.float64)))
+            return tape.number(number_of(given, single))
         case "step":
             return tape.step()
         case _:
             return tape.time()
 
 
-def increments_last(tracer: Named, roots: Sequence[Any]) -> tuple[Any, dict[int, str], dict[int, str]]:
+def increments_last(tracer: Named, roots: Sequence[Any], single: bool = False) -> tuple[Any, dict[int, str], dict[int, str]]:
     """The tape of a step in which increments are multiplied last; names of its values, and which increments they are left of."""
     listed, places = tracer.tape.operations([*roots, *(symbol for symbol, _ in tracer.called)])
     lines, place = increments.negated_sums([Operation(name, tuple(of), given) for name, of, given in listed])
     places = [place[each] for each in places]
     order = in_order(lines, places[: len(roots)])
     kept, moved = needed(lines, places[: len(roots)])
-    work = increments.Rewriting(kept, moved)
+    work = increments.Rewriting(kept, moved, single)
     work.run()
-    tape = _core.Tape()
+    tape = _core.Tape(single=single)
     symbols: list[Any] = []
     for name, of, given in work.made:
         bits = [work.made[each].given if work.made[each].name == "constant" else None for each in of]
-        symbols.append(again(tape, name, [symbols[each] for each in of], given, bits))
+        symbols.append(again(tape, name, [symbols[each] for each in of], given, bits, single))
     names: dict[int, str] = {}
     left: dict[int, str] = {}
     for (_, name), place in zip(tracer.called, places[len(roots) :], strict=True):
@@ -366,7 +366,7 @@ class Writer:
             if name in self.notation.called:
                 symbol = None if symbols[0] is None else self.notation.called[name](symbols[0])
             else:
-                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts])
+                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts], self.notation.single)
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
@@ -384,7 +384,7 @@ class Writer:
 
         for place, (name, of, given) in enumerate(operations):
             if name == "constant":
-                values.append(_Value(self.notation.number(given), _leaf(self.tape, name, given), 0, given))
+                values.append(_Value(self.notation.number(given), _leaf(self.tape, name, given, self.notation.single), 0, given))
                 continue
             if not of:
                 text, symbol, rank_of_leaf = leaf(name, given)
@@ -413,7 +413,7 @@ class Writer:
 
 def written(plan: Plan, attempts: bool = False) -> dict[str, int]:
     """Operations of a step as it is written down, by kind, of values that change between steps."""
-    tape = _core.Tape()
+    tape = _core.Tape(single=plan.single)
     return tape.written(_traced(Tracer(plan.system, tape), plan, attempts))
 
 
@@ -427,12 +427,12 @@ def _traced(tracer: Tracer, plan: Plan, attempts: bool) -> list[Any]:
 
 def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Section, ...]:
     """The sections of a step that is one tape, cut as the core did."""
-    tape = _core.Tape()
+    tape = _core.Tape(single=plan.single)
     tracer = Named(plan.system, tape)
     roots = _traced(tracer, plan, attempts)
     names, notes = tracer.names, dict[int, str]()
     if plan.fused:
-        tape, names, notes = increments_last(tracer, roots)
+        tape, names, notes = increments_last(tracer, roots, plan.single)
     numbers, tables = parameters(plan)
     of_state, next_state = states(plan, attempts), states(plan, attempts, "'")
     params = [tape.param(i) for i in range(len(numbers))]
@@ -459,7 +459,7 @@ def lines_of_tape(plan: Plan, split: dict[str, Any], attempts: bool) -> tuple[Se
     def in_step(name: str, i: int) -> Leaf:
         return given(i) if name == "uniform" else Leaf(Formula("t"), tape.time(), 3)
 
-    writer = Writer(tape, names, notes=notes)
+    writer = Writer(tape, names, Notation(plan.single), notes=notes)
     run, uniforms = writer.section("run", split["run"], before, 1, "c")
     member, rows = writer.section("member", split["member"], before, 2, "c")
     step, entries = writer.section("step", split["step"], in_step, 3, "s")

@@ -111,6 +111,7 @@ class Explanation(Value):
         members: number of trajectories.
         fused: whether it uses fused multiply-adds.
         attempt: whether it is an attempt at an adaptive step.
+        dtype: ``"float64"`` or ``"float32"``, of its numbers.
         form: ``"direct"`` or ``"matrix"``.
         sections: the values, by how often they are computed. Of a step that is too long for one tape, what the method does to
             blocks.
@@ -162,6 +163,7 @@ class Explanation(Value):
     about: int = 0
     form: str = "direct"
     beside: tuple[Section, ...] = ()
+    dtype: str = "float64"
 
     @property
     def listing(self) -> str:
@@ -185,6 +187,7 @@ class Explanation(Value):
         what = "an attempt at a step" if self.attempt else "a step"
         fused = ", with fused multiply-adds" if self.fused else ""
         fused += ", by its transition matrix" if self.form == "matrix" else ""
+        fused += "" if self.dtype == "float64" else f", in {self.dtype}"
         return f"{self.method.title}: {what} of {self.system!r}, {self.members} member{'s' * (self.members > 1)}{fused}"
 
     @property

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _checks, engine
+from .. import _checks, _single, engine
 from .._checks import Array, Shape
 from ..control import AnyControl, ConstraintControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
@@ -53,6 +53,7 @@ def export(
     control: AnyControl | None = None,
     fused: bool = False,
     name: str | None = None,
+    dtype: Any = "float64",
 ) -> ExportedStep:
     """A step of a system by a method as source code: one file without dependencies.
 
@@ -74,6 +75,8 @@ def export(
         control: the control of the energy, as in ``integrate``.
         fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has them from 3.13 on.
         name: the name of functions and types, or its beginning; from the system and the method if None.
+        dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it. In float32 numbers are those of C's ``float`` and Rust's
+            ``f32``; JavaScript rounds each operation by ``Math.fround``, and Python needs NumPy.
 
     Returns:
         An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
@@ -95,8 +98,16 @@ def export(
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     t0 = _checks.number("t0", t0, unit="units of time")
     fused = _checks.flag("fused", fused)
+    single = _checks.is_single(dtype)
     if fused and kind.fma is None:
         raise UnsupportedError(f"fused: {kind.title} has no fused multiply-add; export without, or to another language")
+    if fused and single and kind.of_single.get("fma", kind.fma) is None:
+        raise UnsupportedError(
+            f"fused: {kind.title} has no fused multiply-add of float32; export without, or to another language"
+        )
+    if single:
+        dt = _single.step(system, how, "direct", dt)
+        _single.check_inputs(system, t0)
     choice = how.start_choice(start)
     control = a_control(control)
     called = prefix(f"{snake(system.kind_name)}_{how.name}" if name is None else name)
@@ -108,19 +119,30 @@ def export(
     for argument, block, shape in (("v", blocks[0], system.v_shape), ("y", blocks[1], system.y_shape)):
         if block is not None:
             shapes[argument] = block.shape[len(shape) :]
+    if single:
+        blocks = [None if each is None else _rounded(name, each) for name, each in zip("vy", blocks, strict=True)]
     batch = _checks.batch_shape(shapes)
     index = _member(member, batch)
     if control is not None:
         system = _under(system, control, blocks, batch, dt)
         fits_together(system, how)
         system = system.stepped_by(how)
+        if single:
+            _single.check_control(system)
     example = _example(system, blocks, batch, index)
-    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused)
+    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused, single=single)
     traced = Traced(plan, index)
-    writer = kind(called, Names(MEMBERS))
+    writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
     text = writer.file(written, writer.remark(head(written, *example)))
-    return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count)
+    of = "float32" if single else "float64"
+    return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
+
+
+def _rounded(name: str, block: Array) -> Array:
+    """A block in numbers of float32."""
+    _checks.fits_single(name, block)
+    return np.asarray(np.asarray(block, np.float32), np.float64)
 
 
 def _member(member: Any, batch: Shape) -> Shape:

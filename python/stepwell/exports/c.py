@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from .language import Assignment, Language, indented
 from .written import Written
 
-TYPES = {"number": "double", "truth": "int", "bits": "uint64_t"}
+TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double"}
+SINGLE_TYPES = {"number": "float", "truth": "int", "bits": "uint32_t", "wide": "double"}
 
 BEGIN = """
 #include <float.h>
@@ -19,7 +20,7 @@ BEGIN = """
 #error "compile without -ffast-math: it computes other numbers"
 #endif
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "compile for arithmetic in double precision, on x86 with -msse2 -mfpmath=sse"
+#error "compile for arithmetic in the precision of its numbers, on x86 with -msse2 -mfpmath=sse"
 #endif
 """
 
@@ -55,6 +56,27 @@ def _on_bits(name: str, arguments: str, made: str) -> str:
 
 TWO, SHIFT = "uint64_t a, uint64_t b", "uint64_t a, int n"
 
+HELPERS = {
+    "bits_of": BITS_OF,
+    "number_of": NUMBER_OF,
+    "turn_sign": TURN_SIGN,
+    "mask_of": _on_bits("mask_of", "int truth", "truth ? ~UINT64_C(0) : 0"),
+    "choose_bits": _on_bits("choose_bits", "uint64_t mask, uint64_t a, uint64_t b", "(mask & a) | (~mask & b)"),
+    "and_bits": _on_bits("and_bits", TWO, "a & b"),
+    "or_bits": _on_bits("or_bits", TWO, "a | b"),
+    "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
+    "add_bits": _on_bits("add_bits", TWO, "a + b"),
+    "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
+    "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+}
+
+
+def _narrow(text: str) -> str:
+    """The same function of numbers of 32 bits."""
+    for wide, single in (("double", "float"), ("uint64_t", "uint32_t"), ("UINT64_C", "UINT32_C"), ("<< 63", "<< 31")):
+        text = text.replace(wide, single)
+    return text
+
 
 class C(Language):
     """Functions and types that begin with a prefix; bits by ``memcpy``."""
@@ -66,20 +88,21 @@ class C(Language):
     truths = ("0", "1")
     me = "m->"
     time = "m->t0 + (double)s->step * m->dt"
-    helpers: ClassVar[dict[str, str]] = {
-        "bits_of": BITS_OF,
-        "number_of": NUMBER_OF,
-        "turn_sign": TURN_SIGN,
-        "mask_of": _on_bits("mask_of", "int truth", "truth ? ~UINT64_C(0) : 0"),
-        "choose_bits": _on_bits("choose_bits", "uint64_t mask, uint64_t a, uint64_t b", "(mask & a) | (~mask & b)"),
-        "and_bits": _on_bits("and_bits", TWO, "a & b"),
-        "or_bits": _on_bits("or_bits", TWO, "a | b"),
-        "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
-        "add_bits": _on_bits("add_bits", TWO, "a + b"),
-        "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
-        "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
-        "sample": SAMPLE,
+    types: ClassVar[dict[str, str]] = TYPES
+    helpers: ClassVar[dict[str, str]] = HELPERS | {"sample": SAMPLE}
+    of_single: ClassVar[dict[str, Any]] = {
+        "root": "sqrtf",
+        "floor": "floorf",
+        "fma": "fmaf",
+        "bits_literal": "UINT32_C({})",
+        "time": "(float)(m->t0 + (double)s->step * (double)m->dt)",
+        "types": SINGLE_TYPES,
+        "helpers": {name: _narrow(text) for name, text in HELPERS.items()},
     }
+
+    def literal(self, x: float) -> str:
+        """A finite number: the shortest text that is read as it."""
+        return super().literal(x) + "f" * self.single
 
     def helper(self, name: str) -> str:
         """With the prefix, so that several files may be compiled together."""
@@ -87,7 +110,7 @@ class C(Language):
 
     def declare(self, line: Assignment, note: str) -> str:
         """A value that gets a name."""
-        return f"const {TYPES[line.kind]} {line.name} = {line.text};{note}"
+        return f"const {self.types[line.kind]} {line.name} = {line.text};{note}"
 
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
@@ -96,7 +119,8 @@ class C(Language):
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
-        return "\n".join([f"// The {name} of x.", f"static double PREFIX_{name}(double x) {{", *indented(lines), "}"])
+        of = self.types["number"]
+        return "\n".join([f"// The {name} of x.", f"static {of} PREFIX_{name}({of} x) {{", *indented(lines), "}"])
 
     def how(self, w: Written) -> list[str]:
         """How to compile and call it."""
@@ -122,7 +146,11 @@ class C(Language):
             "int main(void) {",
             f"    {p} m;",
             f"    {p}_state s;",
-            *(line for n, a in blocks for line in self.listed(f"const double {n}[{len(a)}] = {{", a, "};", "    ")),
+            *(
+                line
+                for n, a in blocks
+                for line in self.listed(f"const {self.types['number']} {n}[{len(a)}] = {{", a, "};", "    ")
+            ),
             "",
             f"    {p}_defaults(&m);",
             f"    {p}_start(&m, &s{''.join(f', {name}' for name, _ in blocks)});",
@@ -149,13 +177,15 @@ class C(Language):
         lines = ["// What a step is described by.", "typedef struct {"]
         for each in w.parameters:
             size = "".join(f"[{n}]" for n in each.shape)
-            lines.append(f"    double {each.name}{size};" + (f" // {each.about}" if each.about != each.name else ""))
+            lines.append(
+                f"    {self.type_of(each)} {each.name}{size};" + (f" // {each.about}" if each.about != each.name else "")
+            )
         if w.made:
             lines += ["", f"    // Made of these by {p}_prepare."]
-            lines += [f"    {TYPES[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
+            lines += [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
-        lines += [f"    double {name}[{n}];" for name, _, n in w.blocks]
-        lines += ["    double tally; // what the control has added up"] * bool(w.evaluations)
+        lines += [f"    {self.types['number']} {name}[{n}];" for name, _, n in w.blocks]
+        lines += [f"    {self.types['number']} tally; // what the control has added up"] * bool(w.evaluations)
         return "\n".join([*lines, "    int64_t step; // k; the time is t0 + k*dt", f"}} {p}_state;"])
 
     def _tables(self, w: Written) -> list[str]:
@@ -164,7 +194,9 @@ class C(Language):
                 [
                     f"// The samples of {each.about}.",
                     *self.listed(
-                        f"static const double {self.prefix}_{each.name}_samples[{len(each.values)}] = {{", each.values, "};"
+                        f"static const {self.types['number']} {self.prefix}_{each.name}_samples[{len(each.values)}] = {{",
+                        each.values,
+                        "};",
                     ),
                 ]
             )
@@ -181,18 +213,18 @@ class C(Language):
         for each in w.parameters:
             if each.shape:
                 size = "".join(f"[{n}]" for n in each.shape)
-                table = f"static const double {each.name}[{len(each.values)}] = {{"
+                table = f"static const {self.type_of(each)} {each.name}[{len(each.values)}] = {{"
                 tables += self.listed(table, each.values, f"}}; // {size}" if len(each.shape) > 1 else "};")
                 lines.append(f"memcpy(m->{each.name}, {each.name}, sizeof m->{each.name});")
             else:
-                lines.append(f"m->{each.name} = {self.signed(each.values[0])};")
+                lines.append(f"m->{each.name} = {self.value(each)};")
         inside = indented([*tables, *([""] if tables else []), *lines, f"{p}_prepare(m);"])
         return "\n".join(["// The parameters with which it was exported.", f"void {p}_defaults({p} *m) {{", *inside, "}"])
 
     def _start(self, w: Written) -> str:
         p, start = self.prefix, w.functions.get("start")
-        arguments = "".join(f", const double {of}[{n}]" for _, of, n in w.blocks)
-        lines = ["s->step = 0;"] + ["s->tally = 0.0;"] * bool(w.evaluations)
+        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for _, of, n in w.blocks)
+        lines = ["s->step = 0;"] + [f"s->tally = {self.literal(0.0)};"] * bool(w.evaluations)
         lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
         if start:
             lines += [
@@ -214,11 +246,12 @@ class C(Language):
         p, f = self.prefix, w.functions["finish"]
         lines = ["(void)m;"] * (not f.needs_fields)
         lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
-        begin = f"void {p}_finish(const {p} *m, const {p}_state *s, double velocities[{w.n_v}]) {{"
+        begin = f"void {p}_finish(const {p} *m, const {p}_state *s, {self.types['number']} velocities[{w.n_v}]) {{"
         return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
 
     def _work(self, w: Written) -> str:
         p = self.prefix
         begin = f"double {p}_work(const {p} *m, const {p}_state *s) {{"
         about = "// The energy that the control has given since the start."
-        return "\n".join([about, begin, f"    return s->tally / ({w.evaluations}.0 * m->dt);", "}"])
+        wide = "(double)" * self.single
+        return "\n".join([about, begin, f"    return {wide}s->tally / ({w.evaluations}.0 * {wide}m->dt);", "}"])

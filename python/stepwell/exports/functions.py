@@ -18,15 +18,15 @@ Operation = tuple[str, tuple[int, ...], int]
 
 
 @cache
-def operations_of(function: str) -> Body:
-    """The operations of a function of one number, which is the state 0."""
-    tape = _core.Tape()
+def operations_of(function: str, single: bool = False) -> Body:
+    """The operations of a function of one number, which is the state 0; of float32 if ``single``."""
+    tape = _core.Tape(single=single)
     return tape.operations([FUNCTIONS[function](tape.state(0))])
 
 
-def argument(function: str, operations: Sequence[Operation], line: int) -> int | None:
+def argument(function: str, operations: Sequence[Operation], line: int, single: bool = False) -> int | None:
     """The argument if this line is a value of the function, else None."""
-    pattern, (root,) = operations_of(function)
+    pattern, (root,) = operations_of(function, single)
     found: dict[int, int] = {}
 
     def fits(place: int, line: int) -> bool:
@@ -51,12 +51,12 @@ def argument(function: str, operations: Sequence[Operation], line: int) -> int |
     return next(found[place] for place, (name, _, _) in enumerate(pattern) if name == "state")
 
 
-def named(operations: list[Operation]) -> None:
+def named(operations: list[Operation], single: bool = False) -> None:
     """Replace functions by calls; operations that are then unused are left where they are."""
-    roots = {function: operations_of(function) for function in FUNCTIONS}
+    roots = {function: operations_of(function, single) for function in FUNCTIONS}
     kinds = {function: body[0][body[1][0]][0] for function, body in roots.items()}
     for line in range(len(operations) - 1, -1, -1):
         for function, kind in kinds.items():
-            if operations[line][0] == kind and (of := argument(function, operations, line)) is not None:
+            if operations[line][0] == kind and (of := argument(function, operations, line, single)) is not None:
                 operations[line] = function, (of,), 0
                 break

@@ -36,7 +36,7 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
         f"State:   {layout}",
         "Time:    t0 + k*dt at step k, which the state counts",
         f"Written by stepwell {_core.__version__}. The numbers are those of stepwell.integrate"
-        f"{'(..., fused=True)' if plan.fused else ''}, to the last bit.",
+        f"{_options(plan.fused, plan.single)}, to the last bit.",
         "",
         *language.how(w),
         "",
@@ -44,6 +44,12 @@ def head(w: Written, v: list[float], y: list[float]) -> list[str]:
         "",
         *indented(language.example(w, v, y, STEPS)),
     ]
+
+
+def _options(fused: bool, single: bool) -> str:
+    """The arguments of integrate that decide on the bits."""
+    options = [text for text, given in (("fused=True", fused), ('dtype="float32"', single)) if given]
+    return f"(..., {', '.join(options)})" if options else ""
 
 
 def _layout(name: str, shape: Shape) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
+from ..explanation.formula import Formula
 from .language import Assignment, Language, indented
 from .names import camel
 from .written import Written
@@ -31,6 +33,24 @@ function turn_sign(x, y) {
   return halves[low] & 1 ? -x : x;
 }"""
 
+SINGLE_VIEWS = """// The bits of a number of float32, by views of the same memory.
+const number = new Float32Array(1);
+const whole = new Uint32Array(number.buffer);"""
+
+FROUND = """// The nearest number of float32. Of a sum, product, quotient or root of such numbers that was rounded to 53 bits,
+// it is the one that a single rounding gives.
+const fround = Math.fround;"""
+
+SINGLE = """// Numbers rounded to float32.
+function single(x) {
+  return Array.isArray(x) ? x.map(single) : fround(x);
+}"""
+
+SINGLE_TURN_SIGN = """// x, its sign turned if the last bit of y is set.
+function turn_sign(x, y) {
+  return bits_of(y) & 1 ? -x : x;
+}"""
+
 SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
 function sample(samples, start, interval, t) {
   let i = Math.floor((t - start) / interval + 1e-6); // t may miss a sample's time by rounding
@@ -43,10 +63,15 @@ def _on_bits(name: str, arguments: str, made: str) -> str:
     return f"function {name}({arguments}) {{\n  return {made};\n}}"
 
 
+#: Operations whose result is rounded.
+ROUNDED = ("add", "subtract", "multiply", "divide", "square root")
+
+
 class JavaScript(Language):
     """A class in an ES module, for browsers and Node; bits by views of a typed array, whole numbers of 64 bits as BigInt."""
 
     title = "JavaScript"
+    array = "Float64Array"
     endings = (".js", ".mjs")
     infinity, root, floor, fma = "Infinity", "Math.sqrt", "Math.floor", None
     bits_literal = "{}n"
@@ -67,10 +92,36 @@ class JavaScript(Language):
         "shift_down": _on_bits("shift_down", "a, n", "a >> BigInt(n)"),
         "sample": SAMPLE,
     }
+    of_single: ClassVar[dict[str, Any]] = {
+        "array": "Float32Array",
+        "bits_literal": "{}",
+        "time": "fround(this.t0 + s.step * this.dt)",
+        "helpers": {
+            "fround": FROUND,
+            "single": SINGLE,
+            "number": SINGLE_VIEWS,
+            "bits_of": BITS_OF,
+            "number_of": NUMBER_OF,
+            "turn_sign": SINGLE_TURN_SIGN,
+            "mask_of": _on_bits("mask_of", "truth", "truth ? 0xffffffff : 0"),
+            "choose_bits": _on_bits("choose_bits", "mask, a, b", "((mask & a) | (~mask & b)) >>> 0"),
+            "and_bits": _on_bits("and_bits", "a, b", "(a & b) >>> 0"),
+            "or_bits": _on_bits("or_bits", "a, b", "(a | b) >>> 0"),
+            "xor_bits": _on_bits("xor_bits", "a, b", "(a ^ b) >>> 0"),
+            "add_bits": _on_bits("add_bits", "a, b", "(a + b) >>> 0"),
+            "shift_up": _on_bits("shift_up", "a, n", "(a << n) >>> 0"),
+            "shift_down": _on_bits("shift_down", "a, n", "a >>> n"),
+        },
+    }
 
     def literal(self, x: float) -> str:
-        """A finite number: the shortest text that is read as it."""
+        """A finite number: the shortest text that is read as it, by a language whose numbers are all float64."""
         return repr(float(x)).removesuffix(".0")
+
+    def formula(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
+        """An operation of these, in float32 rounded at once."""
+        made = super().formula(name, of, given, bits)
+        return Formula(f"fround({made.text})") if self.single and name in ROUNDED else made
 
     def declare(self, line: Assignment, note: str) -> str:
         """A value that gets a name."""
@@ -137,7 +188,7 @@ class JavaScript(Language):
             if each.shape:
                 lines += self.nested(f"this.{each.name} = ", each.values, each.shape, ";")
             else:
-                lines.append(f"this.{each.name} = {self.signed(each.values[0])};{about}")
+                lines.append(f"this.{each.name} = {self.value(each)};{about}")
         lines += [
             "for (const name of Object.keys(given)) {",
             "  if (!Object.prototype.hasOwnProperty.call(this, name)) throw new RangeError(`there is no parameter ${name}`);",
@@ -148,7 +199,9 @@ class JavaScript(Language):
         return ["constructor(given = {}) {", *indented(lines, "  "), "}"]
 
     def _prepare(self, w: Written) -> list[str]:
-        lines = [f"{each.name} = {each.text};" for each in w.made]
+        rounded = [each.name for each in w.parameters if self.single and not each.wide]
+        lines = [f"this.{name} = single(this.{name});" for name in rounded]
+        lines += [f"{each.name} = {each.text};" for each in w.made]
         about = "// What does not change from step to step. To be called after a change of a parameter."
         return [about, "prepare() {", *indented(lines, "  "), "}"]
 
@@ -162,7 +215,7 @@ class JavaScript(Language):
         lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
         for name, of, n in w.blocks:
             carried = start and name == w.slot
-            lines.append(f"s.{name} = new Float64Array({n});" if carried else f"s.{name} = Float64Array.from({of});")
+            lines.append(f"s.{name} = new {self.array}({n});" if carried else f"s.{name} = {self.array}.from({of});")
         if start:
             lines += [
                 "",
@@ -178,7 +231,7 @@ class JavaScript(Language):
         return ["// One step.", "step(s) {", *indented(lines, "  "), "}"]
 
     def _finish(self, w: Written) -> list[str]:
-        lines = [f"const velocities = new Float64Array({w.n_v});"]
+        lines = [f"const velocities = new {self.array}({w.n_v});"]
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )

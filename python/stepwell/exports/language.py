@@ -10,16 +10,16 @@ import re
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from .. import _core
 from .._checks import Shape
 from ..errors import UnsupportedError
 from ..explanation import formula as plain
-from ..explanation.formula import ALL_BITS, ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
+from ..explanation.formula import ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
 from ..explanation.listing import Leaf, Writer
 from .functions import FUNCTIONS, operations_of
-from .names import Names
+from .names import Field, Names
 
 if TYPE_CHECKING:
     from .written import Table, Written
@@ -34,8 +34,8 @@ ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
 BIT_FUNCTIONS = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}
 BIT_FUNCTIONS |= {"shift up": "shift_up", "shift down": "shift_down"}
 
-#: The shift that moves the last bit of a number to its sign: it sets the sign of a sine.
-LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), 63\)")
+#: The shift that moves the last bit of a number to its sign, by as many places: it sets the sign of a sine.
+LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), (\d+)\)")
 
 
 class Assignment(NamedTuple):
@@ -92,6 +92,8 @@ class Language(Notation, ABC):
         endings: endings of its files.
         comment: the beginning of a comment.
         helpers: the text of each function that a file may need.
+        types: of the values, by "number", "truth" and "bits", where a language has types; and "wide", of t0.
+        of_single: those attributes that are others in float32.
         kinds: of each value with a name of its own, as it is used: "number", "truth" or "bits".
     """
 
@@ -105,6 +107,8 @@ class Language(Notation, ABC):
     root: ClassVar[str]
     floor: ClassVar[str]
     fma: ClassVar[str | None]
+    types: ClassVar[dict[str, str]] = {}
+    of_single: ClassVar[dict[str, Any]]
     bits_literal: ClassVar[str]
     #: The prefix of a field and a parameter.
     me: ClassVar[str]
@@ -116,7 +120,10 @@ class Language(Notation, ABC):
     longest = 88
     called = FUNCTIONS
 
-    def __init__(self, prefix: str, fields: Names) -> None:
+    def __init__(self, prefix: str, fields: Names, single: bool = False) -> None:
+        super().__init__(single)
+        if single:
+            vars(self).update(self.of_single)
         self.prefix, self.fields = prefix, fields
         self.names = Names()
         self.kinds: dict[str, str] = {}
@@ -126,15 +133,20 @@ class Language(Notation, ABC):
 
     def number(self, bits: int) -> Formula:
         """A constant; one that is not finite is made from its bits."""
-        (x,) = struct.unpack("<d", struct.pack("<Q", bits))
+        x = plain.number_of(bits, self.single)
         if x != x:
             return Formula(self.call("number_of", self.whole(bits)))
         text = self.infinity if abs(x) == float("inf") else self.literal(abs(x))
-        return Formula(f"−{text}", SIGN) if bits >> 63 else Formula(text)
+        return Formula(f"−{text}", SIGN) if bits >> self.sign_place else Formula(text)
+
+    @property
+    def sign_place(self) -> int:
+        """Which bit is the sign."""
+        return 31 if self.single else 63
 
     def literal(self, x: float) -> str:
         """A finite number: the shortest text that is read as it."""
-        return repr(float(x))
+        return plain.shortest(x, self.single)
 
     def whole(self, bits: int) -> str:
         """Bits."""
@@ -220,12 +232,12 @@ class Language(Notation, ABC):
         return f"{truth.within(EITHER)} ? {a.within(EITHER)} : {b.within(EITHER)}"
 
     def _on_bits(self, name: str, of: Sequence[Formula], given: int, bits: Sequence[int | None]) -> Formula:
-        alike = all(each.is_truth or known in (0, ALL_BITS) for each, known in zip(of, bits, strict=True))
+        alike = all(each.is_truth or known in (0, self.all_bits) for each, known in zip(of, bits, strict=True))
         if name in ("and", "or", "exclusive or") and alike and any(each.is_truth for each in of):
             return self._of_truths(name, of, bits)
         if name == "exclusive or":
             for x, turning in (of, of[::-1]):
-                if (last := LAST_BIT.fullmatch(turning.text)) and not x.is_truth:
+                if (last := LAST_BIT.fullmatch(turning.text)) and int(last[2]) == self.sign_place and not x.is_truth:
                     return Formula(self.call("turn_sign", self.as_number(x).text, last[1]))
         operands = [self.as_bits(each, known).text for each, known in zip(of, bits, strict=True)]
         more = [str(given)] if name.startswith("shift") else []
@@ -234,14 +246,14 @@ class Language(Notation, ABC):
     def _of_truths(self, name: str, of: Sequence[Formula], bits: Sequence[int | None]) -> Formula:
         negation, both, either = self.words
         a, b = (
-            each if known is None else Formula(self.truths[known == ALL_BITS], is_truth=True)
+            each if known is None else Formula(self.truths[known == self.all_bits], is_truth=True)
             for each, known in zip(of, bits, strict=True)
         )
         if name == "and":
             return Formula(f"{a.within(NOT)} {both} {b.within(NOT)}", BOTH, True)
         if name == "or":  # compilers warn unless an `and` inside an `or` has parentheses
             return Formula(f"{a.within(NOT)} {either} {b.within(NOT)}", EITHER, True)
-        if ALL_BITS in bits:
+        if self.all_bits in bits:
             text = f"{negation}{(b if bits[0] is not None else a).within(ATOM)}"
             return Formula(f"({text})" if negation.isalpha() else text, ATOM, True)
         return Formula(f"{a.within(SIGN)} != {b.within(SIGN)}", COMPARISON, True)
@@ -254,8 +266,17 @@ class Language(Notation, ABC):
 
     def signed(self, x: float) -> str:
         """A finite number, of either sign."""
-        (bits,) = struct.unpack("<Q", struct.pack("<d", x))
+        kinds = ("<I", "<f") if self.single else ("<Q", "<d")
+        (bits,) = struct.unpack(kinds[0], struct.pack(kinds[1], x))
         return self.text(self.number(bits).text)
+
+    def value(self, field: Field) -> str:
+        """The number of a field that is one number."""
+        return repr(float(field.values[0])) if field.wide and self.single else self.signed(field.values[0])
+
+    def type_of(self, field: Field) -> str:
+        """The type of its numbers."""
+        return self.types["wide" if field.wide else "number"]
 
     def functions(self, text: str) -> list[str]:
         """The functions that this text of a file needs, in their order; each may need those before it."""
@@ -269,10 +290,10 @@ class Language(Notation, ABC):
 
     def _of_one_number(self, name: str) -> str:
         """A function of one number, from its operations."""
-        operations, (root,) = operations_of(name)
+        operations, (root,) = operations_of(name, self.single)
         self.names = Names(("x",))
         body = [*operations, ("copy", [root], 0)], [len(operations)]
-        section, _ = Writer(_core.Tape(), {}, self).section(
+        section, _ = Writer(_core.Tape(single=self.single), {}, self).section(
             "member step", body, lambda *_: Leaf(Formula("x"), None, 4), 4, "a", ["result"]
         )
         *lines, result = [(self.names(line.name), self.text(line.formula)) for line in section.lines]

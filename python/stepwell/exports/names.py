@@ -121,12 +121,14 @@ class Field(NamedTuple):
         about: what it is.
         values: its numbers by default, in the order of C.
         shape: of an array; () of a number.
+        wide: whether it is of float64 in any case.
     """
 
     name: str
     about: str
     values: list[float]
     shape: Shape = ()
+    wide: bool = False
 
 
 def fields(numbers: list[tuple[str, float]], used: set[int], names: Names) -> tuple[list[Field], dict[int, tuple[str, Shape]]]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..explanation import formula as plain
 from ..explanation.formula import CHOICE, EITHER, Formula
-from .language import Assignment, Language, indented
+from .language import Assignment, Language, indented, listed
 from .names import camel
 from .written import Written
 
@@ -54,9 +54,26 @@ SAMPLE = '''def sample(samples, start, interval, t):
 
 ALL_BITS = "0xFFFFFFFFFFFFFFFF"
 
+SINGLE = '''def single(x):
+    """Numbers rounded to float32."""
+    return [single(each) for each in x] if isinstance(x, (list, tuple)) else float32(x)'''
+
 
 def _on_bits(name: str, arguments: str, made: str) -> str:
     return f"def {name}({arguments}):\n    return {made}"
+
+
+HELPERS = {
+    "turn_sign": TURN_SIGN,
+    "mask_of": _on_bits("mask_of", "truth", f"{ALL_BITS} if truth else 0"),
+    "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (~mask & b)"),
+    "and_bits": _on_bits("and_bits", "a, b", "a & b"),
+    "or_bits": _on_bits("or_bits", "a, b", "a | b"),
+    "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
+    "add_bits": _on_bits("add_bits", "a, b", f"(a + b) & {ALL_BITS}"),
+    "shift_up": _on_bits("shift_up", "a, n", f"(a << n) & {ALL_BITS}"),
+    "shift_down": _on_bits("shift_down", "a, n", "a >> n"),
+}
 
 
 class Python(Language):
@@ -79,21 +96,35 @@ class Python(Language):
         "fused": FMA,
         "bits_of": BITS_OF,
         "number_of": NUMBER_OF,
-        "turn_sign": TURN_SIGN,
-        "mask_of": _on_bits("mask_of", "truth", f"{ALL_BITS} if truth else 0"),
-        "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (~mask & b)"),
-        "and_bits": _on_bits("and_bits", "a, b", "a & b"),
-        "or_bits": _on_bits("or_bits", "a, b", "a | b"),
-        "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
-        "add_bits": _on_bits("add_bits", "a, b", f"(a + b) & {ALL_BITS}"),
-        "shift_up": _on_bits("shift_up", "a, n", f"(a << n) & {ALL_BITS}"),
-        "shift_down": _on_bits("shift_down", "a, n", "a >> n"),
+        **HELPERS,
         "sample": SAMPLE,
     }
+    of_single: ClassVar[dict[str, Any]] = {
+        "infinity": "float32(numpy.inf)",
+        "root": "numpy.sqrt",
+        "floor": "numpy.floor",
+        "fma": None,
+        "time": "float32(self.t0 + s.step * float(self.dt))",
+        "helpers": {
+            "float32": "float32 = numpy.float32",
+            "single": SINGLE,
+            "bits_of": _on_bits("bits_of", "x", "int(x.view(numpy.uint32))"),
+            "number_of": _on_bits("number_of", "b", "numpy.uint32(b).view(float32)"),
+            **{name: text.replace(ALL_BITS, "0xFFFFFFFF") for name, text in HELPERS.items()},
+        },
+    }
+
+    def literal(self, x: float) -> str:
+        """A finite number."""
+        return f"float32({float(x)!r})" if self.single else super().literal(x)
+
+    def decorated(self, function: list[str]) -> list[str]:
+        """A function that computes: NumPy tells of infinities, which are no errors here."""
+        return ['@numpy.errstate(all="ignore")'] * self.single + function
 
     def quotient(self, a: Formula, b: Formula, divisor: int | None) -> Formula:
         """A quotient; by a constant that is not zero Python's own."""
-        if divisor is not None and divisor & (2**63 - 1):
+        if self.single or (divisor is not None and divisor & (2**63 - 1)):
             return plain.formula("divide", (a, b), 0, (None, divisor))
         return Formula(self.call("quotient", a.text, b.text))
 
@@ -120,6 +151,7 @@ class Python(Language):
         needs = (
             "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs only the standard library."
         )
+        needs = "Needs NumPy, which has numbers of float32." if self.single else needs
         lines = [
             needs,
             f"m = {p}(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",
@@ -138,7 +170,7 @@ class Python(Language):
         return [
             f"from {self.prefix} import {p}",
             "",
-            *(line for name, each in blocks for line in self.listed(f"{name} = [", each, "]")),
+            *(line for name, each in blocks for line in listed(f"{name} = [", list(map(repr, each)), "]", "")),
             f"m = {p}()",
             f"s = m.start({', '.join(name for name, _ in blocks)})",
             f"for _ in range({steps}):",
@@ -164,7 +196,7 @@ class Python(Language):
         whole = "\n\n\n".join([*tables, "\n".join(state), step])
         functions = self.functions(whole)
         used = "\n".join([*functions, whole])
-        imports = [f"import {name}" for name in ("math", "struct") if f"{name}." in used]
+        imports = [f"import {name}" for name in ("math", "struct", "numpy") if f"{name}." in used]
         begin = "\n".join(head) + "\n\n" + ("\n".join(imports) + "\n\n\n" if imports else "\n")
         return begin + "\n\n\n".join([*functions, whole]) + "\n"
 
@@ -173,7 +205,7 @@ class Python(Language):
     def _state(self, w: Written) -> list[str]:
         arguments = ", ".join(name for name, _, _ in w.blocks)
         lines = ["self.step = 0  # k; the time is t0 + k*dt", *(f"self.{name} = {name}" for name, _, _ in w.blocks)]
-        lines += ["self.tally = 0.0  # what the control has added up"] * bool(w.evaluations)
+        lines += [f"self.tally = {self.literal(0.0)}  # what the control has added up"] * bool(w.evaluations)
         return [f"def __init__(self, {arguments}):", *indented(lines)]
 
     def _init(self, w: Written) -> list[str]:
@@ -183,7 +215,7 @@ class Python(Language):
             if each.shape:
                 lines += self.nested(f"self.{each.name} = ", each.values, each.shape, "")
             else:
-                lines.append(f"self.{each.name} = {self.signed(each.values[0])}{about}")
+                lines.append(f"self.{each.name} = {self.value(each)}{about}")
         lines += [
             "for name, value in given.items():",
             "    if name not in vars(self):",
@@ -195,7 +227,9 @@ class Python(Language):
 
     def _prepare(self, w: Written) -> list[str]:
         lines = ['"""What does not change from step to step. To be called after a change of a parameter."""']
-        return ["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made)])]
+        rounded = [each.name for each in w.parameters if self.single and not each.wide]
+        lines += [f"self.{name} = single(self.{name})" for name in rounded]
+        return self.decorated(["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made)])])
 
     def _start(self, w: Written) -> list[str]:
         start = w.functions.get("start")
@@ -203,27 +237,30 @@ class Python(Language):
         for _, of, n in w.blocks:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines += [f"if len({of}) != {n}:", f'    raise ValueError(f"{of}: expected {numbers}, got {{len({of})}}")']
-            lines.append(f"{of} = [float(each) for each in {of}]")
-        given = [f"[0.0] * {n}" if start and name == w.slot else of for name, of, n in w.blocks]
+            lines.append(f"{of} = [{'float32' if self.single else 'float'}(each) for each in {of}]")
+        given = [f"[{self.literal(0.0)}] * {n}" if start and name == w.slot else of for name, of, n in w.blocks]
         lines.append(f"s = {camel(self.prefix)}State({', '.join(given)})")
         if start:
             lines += [
                 "",
                 *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
             ]
-        return [f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])]
+        return self.decorated([f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])])
 
     def _step(self, w: Written) -> list[str]:
         of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
-        return ["def step(self, s):", *indented(['"""One step."""', *self.body(w.functions["step"], of, of), "s.step += 1"])]
+        lines = ['"""One step."""', *self.body(w.functions["step"], of, of), "s.step += 1"]
+        return self.decorated(["def step(self, s):", *indented(lines)])
 
     def _finish(self, w: Written) -> list[str]:
-        lines = ['"""The velocities at a state."""', f"velocities = [0.0] * {w.n_v}"]
+        lines = ['"""The velocities at a state."""', f"velocities = [{self.literal(0.0)}] * {w.n_v}"]
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )
-        return ["def finish(self, s):", *indented([*lines, "return velocities"])]
+        return self.decorated(["def finish(self, s):", *indented([*lines, "return velocities"])])
 
     def _work(self, w: Written) -> list[str]:
         about = '    """The energy that the control has given since the start."""'
+        if self.single:
+            return ["def work(self, s):", about, f"    return float(s.tally) / ({w.evaluations} * float(self.dt))"]
         return ["def work(self, s):", about, f"    return s.tally / ({w.evaluations} * self.dt)"]

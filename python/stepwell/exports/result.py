@@ -28,6 +28,7 @@ class ExportedStep(Value):
         member: which trajectory of the system's batch.
         fused: whether it uses fused multiply-adds.
         operations: how many operations are written out, including those before the steps.
+        dtype: ``"float64"`` or ``"float32"``, of its numbers.
 
     Example:
         >>> step = sw.export(sw.Oscillator(), "false_euler", "c")
@@ -46,6 +47,7 @@ class ExportedStep(Value):
     member: Shape
     fused: bool
     operations: int
+    dtype: str = "float64"
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the file.
@@ -72,4 +74,5 @@ class ExportedStep(Value):
         return self.source
 
     def __repr__(self) -> str:
-        return f"<{self.name} in {self.language}: {self.method.title}, {self.system!r}, {self.operations} operations>"
+        single = "" if self.dtype == "float64" else f", {self.dtype}"
+        return f"<{self.name} in {self.language}: {self.method.title}, {self.system!r}, {self.operations} operations{single}>"

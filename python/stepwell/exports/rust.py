@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from .._checks import Shape
 from .language import Assignment, Language, indented
 from .names import camel
 from .written import Written
 
-TYPES = {"number": "f64", "truth": "bool", "bits": "u64"}
+TYPES = {"number": "f64", "truth": "bool", "bits": "u64", "wide": "f64"}
+SINGLE_TYPES = {"number": "f32", "truth": "bool", "bits": "u32", "wide": "f64"}
 
 TURN_SIGN = """/// `x`, its sign turned if the last bit of `y` is set.
 #[inline(always)]
@@ -31,6 +32,25 @@ def _on_bits(name: str, arguments: str, made: str) -> str:
 
 TWO, SHIFT = "a: u64, b: u64", "a: u64, n: u32"
 
+HELPERS = {
+    "bits_of": _on_bits("bits_of", "x: f64", "x.to_bits()"),
+    "number_of": "#[inline(always)]\nfn number_of(b: u64) -> f64 {\n    f64::from_bits(b)\n}",
+    "turn_sign": TURN_SIGN,
+    "mask_of": _on_bits("mask_of", "truth: bool", "if truth { u64::MAX } else { 0 }"),
+    "choose_bits": _on_bits("choose_bits", "mask: u64, a: u64, b: u64", "(mask & a) | (!mask & b)"),
+    "and_bits": _on_bits("and_bits", TWO, "a & b"),
+    "or_bits": _on_bits("or_bits", TWO, "a | b"),
+    "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
+    "add_bits": _on_bits("add_bits", TWO, "a.wrapping_add(b)"),
+    "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
+    "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+}
+
+
+def _narrow(text: str) -> str:
+    """The same function of numbers of 32 bits."""
+    return text.replace("f64", "f32").replace("u64", "u32").replace("<< 63", "<< 31")
+
 
 class Rust(Language):
     """A structure and its functions, without ``unsafe`` and without other crates."""
@@ -41,19 +61,17 @@ class Rust(Language):
     bits_literal = "{}u64"
     me = "self."
     time = "self.t0 + s.step as f64 * self.dt"
-    helpers: ClassVar[dict[str, str]] = {
-        "bits_of": _on_bits("bits_of", "x: f64", "x.to_bits()"),
-        "number_of": "#[inline(always)]\nfn number_of(b: u64) -> f64 {\n    f64::from_bits(b)\n}",
-        "turn_sign": TURN_SIGN,
-        "mask_of": _on_bits("mask_of", "truth: bool", "if truth { u64::MAX } else { 0 }"),
-        "choose_bits": _on_bits("choose_bits", "mask: u64, a: u64, b: u64", "(mask & a) | (!mask & b)"),
-        "and_bits": _on_bits("and_bits", TWO, "a & b"),
-        "or_bits": _on_bits("or_bits", TWO, "a | b"),
-        "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
-        "add_bits": _on_bits("add_bits", TWO, "a.wrapping_add(b)"),
-        "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
-        "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
-        "sample": SAMPLE,
+    types: ClassVar[dict[str, str]] = TYPES
+    helpers: ClassVar[dict[str, str]] = HELPERS | {"sample": SAMPLE}
+    of_single: ClassVar[dict[str, Any]] = {
+        "infinity": "f32::INFINITY",
+        "root": "f32::sqrt",
+        "floor": "f32::floor",
+        "fma": "f32::mul_add",
+        "bits_literal": "{}u32",
+        "time": "(self.t0 + s.step as f64 * self.dt as f64) as f32",
+        "types": SINGLE_TYPES,
+        "helpers": {name: _narrow(text) for name, text in HELPERS.items()},
     }
 
     def declare(self, line: Assignment, note: str) -> str:
@@ -71,7 +89,8 @@ class Rust(Language):
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
-        begin = [f"/// The {name} of `x`.", "#[allow(clippy::all)]", f"fn {name}(x: f64) -> f64 {{"]
+        of = self.types["number"]
+        begin = [f"/// The {name} of `x`.", "#[allow(clippy::all)]", f"fn {name}(x: {of}) -> {of} {{"]
         return "\n".join([*begin, *indented(lines), "}"])
 
     def how(self, w: Written) -> list[str]:
@@ -118,7 +137,7 @@ class Rust(Language):
         inside = "\n\n".join("\n".join(indented(each)) for each in methods)
         tables = []
         for each in w.tables:
-            begin = f"static {each.name.upper()}_SAMPLES: [f64; {len(each.values)}] = ["
+            begin = f"static {each.name.upper()}_SAMPLES: [{self.types['number']}; {len(each.values)}] = ["
             tables.append("\n".join([f"/// The samples of {each.about}.", *self.listed(begin, each.values, "];")]))
         allowed = "#[allow(clippy::all, dead_code)]\n"
         default = f"impl Default for {p} {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}"
@@ -137,13 +156,14 @@ class Rust(Language):
         lines += ["#[derive(Clone, Debug)]", f"pub struct {p} {{"]
         for each in w.parameters:
             lines += [f"    /// {each.about}."] if each.about != each.name else []
-            lines.append(f"    pub {each.name}: {_type(each.shape)},")
+            lines.append(f"    pub {each.name}: {_type(self.type_of(each), each.shape)},")
         if w.made:
             lines += ["", "    // Made of these by `prepare`."]
-            lines += [f"    {each.name.removeprefix(self.me)}: {TYPES[each.kind]}," for each in w.made]
+            lines += [f"    {each.name.removeprefix(self.me)}: {self.types[each.kind]}," for each in w.made]
         lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
-        lines += [f"    pub {name}: [f64; {n}]," for name, _, n in w.blocks]
-        lines += ["    /// What the control has added up.", "    pub tally: f64,"] * bool(w.evaluations)
+        of = self.types["number"]
+        lines += [f"    pub {name}: [{of}; {n}]," for name, _, n in w.blocks]
+        lines += ["    /// What the control has added up.", f"    pub tally: {of},"] * bool(w.evaluations)
         return "\n".join([*lines, "    /// k; the time is t0 + k*dt.", "    pub step: u64,", "}"])
 
     def _new(self, w: Written) -> list[str]:
@@ -152,7 +172,7 @@ class Rust(Language):
             if each.shape:
                 lines += self.nested(f"{each.name}: ", each.values, each.shape, ",")
             else:
-                lines.append(f"{each.name}: {self.signed(each.values[0])},")
+                lines.append(f"{each.name}: {self.value(each)},")
         zero = {"number": "0.0", "truth": "false", "bits": "0"}
         lines += [f"{each.name.removeprefix(self.me)}: {zero[each.kind]}," for each in w.made]
         inside = ["let mut m = Self {", *indented(lines), "};", "m.prepare();", "m"]
@@ -165,7 +185,8 @@ class Rust(Language):
 
     def _start(self, w: Written) -> list[str]:
         p, start = camel(self.prefix), w.functions.get("start")
-        arguments = "".join(f", {of}: [f64; {n}]" for _, of, n in w.blocks)
+        number = self.types["number"]
+        arguments = "".join(f", {of}: [{number}; {n}]" for _, of, n in w.blocks)
         given = [f"{name}: [0.0; {n}]" if start and name == w.slot else f"{name}: {of}" for name, of, n in w.blocks]
         given += ["tally: 0.0"] * bool(w.evaluations) + ["step: 0"]
         state = f"{p}State {{ {', '.join(given)} }}"
@@ -191,18 +212,18 @@ class Rust(Language):
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )
-        begin = f"pub fn finish(&self, s: &{camel(self.prefix)}State) -> [f64; {w.n_v}] {{"
+        begin = f"pub fn finish(&self, s: &{camel(self.prefix)}State) -> [{self.types['number']}; {w.n_v}] {{"
         return ["/// The velocities at a state.", begin, *indented([*lines, "velocities"]), "}"]
 
     def _work(self, w: Written) -> list[str]:
         about = "/// The energy that the control has given since the start."
         begin = f"pub fn work(&self, s: &{camel(self.prefix)}State) -> f64 {{"
-        return [about, begin, f"    s.tally / ({w.evaluations}.0 * self.dt)", "}"]
+        wide = " as f64" * self.single
+        return [about, begin, f"    s.tally{wide} / ({w.evaluations}.0 * self.dt{wide})", "}"]
 
 
-def _type(shape: Shape) -> str:
-    """The type of an array."""
-    text = "f64"
+def _type(text: str, shape: Shape) -> str:
+    """The type of an array of numbers of that type."""
     for n in reversed(shape):
         text = f"[{text}; {n}]"
     return text

@@ -148,7 +148,7 @@ class Traced:
         if self.count > MAX_OPERATIONS:
             raise too_long(plan, str(self.count))
         if not plan.fused:  # else their products would be fused with the sums around them
-            named(self.operations.all)
+            named(self.operations.all, plan.single)
         names, tables = parameters(plan)
 
         def own(values: Any, before: int = 0) -> Any:
@@ -157,6 +157,8 @@ class Traced:
             return np.broadcast_to(wide, (*values.shape[:before], *plan.batch))[(slice(None),) * before + member]
 
         self.numbers = [(name, float(own(value))) for name, value in zip(names, of_step.numbers, strict=True)]
+        if plan.single:
+            self.numbers = [(name, float(np.float32(value))) for name, value in self.numbers]
         held: list[Held] = of_step.tables
         self.tables = [
             Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
@@ -164,7 +166,7 @@ class Traced:
         ]
 
     def _part(self, which: str) -> tuple[Part, Named]:
-        plan, tape = self.plan, _core.Tape()
+        plan, tape = self.plan, _core.Tape(single=self.plan.single)
         tracer = Named(plan.system, tape)
         method, v_shape = plan.method, plan.system.v_shape
         symbols = (
@@ -173,7 +175,7 @@ class Traced:
         told, roots = _fused(tape, symbols) if plan.fused else tape.operations(symbols)
         names = tracer.names
         if plan.fused:
-            tape, names, _ = increments_last(tracer, symbols)
+            tape, names, _ = increments_last(tracer, symbols, plan.single)
         slot = method.carry or "v"
         before, after = {"step": (slot, slot), "start": ("v", slot), "finish": (slot, "v")}[which]
         inputs = elements(before, v_shape) + elements("y", plan.system.y_shape)

@@ -57,7 +57,10 @@ class Written:
         names = language.fields
         operations = traced.operations
         used = {given for name, _, given in operations.all if name == "parameter"}
-        self.parameters = [Field(names("dt"), "the step", [plan.dt]), Field(names("t0"), "the time of step 0", [plan.t0])]
+        self.parameters = [
+            Field(names("dt"), "the step", [plan.dt]),
+            Field(names("t0"), "the time of step 0", [plan.t0], wide=True),
+        ]
         own, self._where = fields(traced.numbers, used, names)
         self.parameters += own
         self.tables: list[Table] = []

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from .. import _checks
 from .._checks import Array
-from ..errors import ArgumentError, ShapeError
+from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..methods import Method
 from ..world import World
 
@@ -34,13 +34,17 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         substeps: how many of these steps there are for an action.
         max_episode_steps: after how many actions an episode is truncated; None for never.
         render_mode: None; there are no pictures.
+        dtype: ``"float64"`` or ``"float32"``, in which the world is stepped. What is seen and rewarded is computed in float64 of
+            the states; what is seen is float32 in any case.
 
     Attributes:
         world: the ``World``; its arrays are the states.
         steps: how many actions each environment has had since it began.
+        dtype: NumPy's type of the world's arrays, for ``make_world``.
 
     Raises:
         ArgumentError: what is wrong with which argument.
+        UnsupportedError: if ``make_world`` makes arrays of another type than was asked for.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -59,6 +63,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         substeps: int,
         max_episode_steps: int | None,
         render_mode: None = None,
+        dtype: Any = "float64",
     ) -> None:
         if render_mode is not None:
             raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {_checks.short(render_mode)}")
@@ -69,13 +74,24 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self.single_observation_space, self.single_action_space = self.one_observation, self.one_action
         self.observation_space = batch_space(self.one_observation, self.num_envs)
         self.action_space = batch_space(self.one_action, self.num_envs)
+        self.dtype: np.dtype[Any] = np.dtype(np.float32 if _checks.is_single(dtype) else np.float64)
         self.world = self.make_world(method, _checks.number("dt", dt, positive=True, unit="seconds"))
+        if self.world.y.dtype != self.dtype:
+            raise UnsupportedError(
+                f"dtype: {type(self).__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
+                f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
+            )
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
 
+    @property
+    def states(self) -> tuple[Array, Array]:
+        """The blocks v and y in float64, to compute with; the world's own arrays, not copies, if it is stepped in float64."""
+        return np.asarray(self.world.v, np.float64), np.asarray(self.world.y, np.float64)
+
     @abstractmethod
     def make_world(self, method: str | Method, dt: float) -> World:
-        """The world, at any state."""
+        """The world, at any state, of arrays of ``self.dtype``."""
 
     @abstractmethod
     def draw(self, count: int) -> tuple[Array, Array]:
@@ -141,7 +157,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def _seen(self) -> Observations:
         # Rounding to float32 may pass a bound by one unit of its last place.
         space = self.one_observation
-        return np.clip(self.observe().astype(np.float32), space.low, space.high)
+        return np.clip(self.observe().astype(np.float32, copy=False), space.low, space.high)
 
 
 class WorldEnv(gymnasium.Env):  # type: ignore[misc]

@@ -73,14 +73,15 @@ class CartPoleVectorEnv(WorldVectorEnv):
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
         render_mode: None = None,
+        dtype: Any = "float64",
     ) -> None:
-        super().__init__(
-            num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
-        )
+        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Carts with poles."""
-        return World(cart_pole(), method, v=np.zeros((2, self.num_envs)), y=np.zeros((3, self.num_envs)), dt=dt)
+        v, y = np.zeros((2, self.num_envs), self.dtype), np.zeros((3, self.num_envs), self.dtype)
+        return World(cart_pole(), method, v=v, y=y, dt=dt, dtype=self.dtype)
 
     def draw(self, count: int) -> tuple[Array, Array]:
         """Near rest."""
@@ -98,7 +99,7 @@ class CartPoleVectorEnv(WorldVectorEnv):
 
     def judge(self, actions: Any) -> tuple[Array, Truths]:
         """One for each step."""
-        place, angle = np.abs(self.world.y[:2])
+        place, angle = np.abs(self.states[1][:2])
         return np.ones(self.num_envs), (place > END) | (angle > TILT)
 
 

@@ -54,18 +54,19 @@ class DoubleRodVectorEnv(WorldVectorEnv):
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
         render_mode: None = None,
+        dtype: Any = "float64",
     ) -> None:
-        super().__init__(
-            num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
-        )
+        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Two rods that hang from an anchor."""
-        v, self._force = np.zeros((2, 2, self.num_envs)), np.zeros((2, 2, self.num_envs))
+        v, self._force = (np.zeros((2, 2, self.num_envs), self.dtype) for _ in range(2))
         y = np.zeros_like(v)
         y[:, 1] = [[-1.0], [-2.0]]
         rods = Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0, gravity=GRAVITY)
-        return World(rods, method, v=v, y=y, dt=dt, force=self._force, control=Projection("length"))
+        acting: Any = {"force": self._force, "control": Projection("length")}
+        return World(rods, method, v=v, y=y, dt=dt, dtype=self.dtype, **acting)
 
     def draw(self, count: int) -> tuple[Array, Array]:
         """Near rest."""
@@ -77,7 +78,7 @@ class DoubleRodVectorEnv(WorldVectorEnv):
 
     def _rods(self) -> tuple[Array, Array]:
         """Where the rods point, and how fast they turn."""
-        v, y = self.world.v, self.world.y
+        v, y = self.states
         along, across = np.stack([y[0], y[1] - y[0]]), np.stack([v[0], v[1] - v[0]])
         square = along[:, 0] * along[:, 0] + along[:, 1] * along[:, 1]
         turning = (along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]) / square

@@ -49,16 +49,16 @@ class PendulumVectorEnv(WorldVectorEnv):
         substeps: int = 1,
         max_episode_steps: int | None = episode_steps,
         render_mode: None = None,
+        dtype: Any = "float64",
     ) -> None:
-        super().__init__(
-            num_envs, method=method, dt=dt, substeps=substeps, max_episode_steps=max_episode_steps, render_mode=render_mode
-        )
+        how: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
+        super().__init__(num_envs, **how, render_mode=render_mode, dtype=dtype)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Rods on hinges."""
         # A uniform rod on its end: its moment of inertia is m·l²/3.
-        v, y, self._force = (np.zeros(self.num_envs) for _ in range(3))
-        return World(Pendulum(np.sqrt(1.5 * GRAVITY / LENGTH)), method, v=v, y=y, dt=dt, force=self._force)
+        v, y, self._force = (np.zeros(self.num_envs, self.dtype) for _ in range(3))
+        return World(Pendulum(np.sqrt(1.5 * GRAVITY / LENGTH)), method, v=v, y=y, dt=dt, force=self._force, dtype=self.dtype)
 
     def draw(self, count: int) -> tuple[Array, Array]:
         """At any angle."""
@@ -75,14 +75,15 @@ class PendulumVectorEnv(WorldVectorEnv):
 
     def observe(self) -> Array:
         """Cosine and sine of the angle from upright, angular velocity."""
-        # y is the angle from below.
-        return np.stack([-cos(self.world.y), -sin(self.world.y), self.world.v], axis=-1)
+        v, y = self.states  # y is the angle from below
+        return np.stack([-cos(y), -sin(y), v], axis=-1)
 
     def rewards_before(self, actions: Any) -> Array:
         """How far from upright, how fast, and what the motor does."""
-        turns = np.floor(self.world.y / (2.0 * np.pi))
-        above = self.world.y - 2.0 * np.pi * turns - np.pi
-        torque, speed = self._torque(actions), self.world.v
+        speed, y = self.states
+        turns = np.floor(y / (2.0 * np.pi))
+        above = y - 2.0 * np.pi * turns - np.pi
+        torque = self._torque(actions)
         return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque))
 
     def judge(self, actions: Any) -> tuple[Array, Truths]:

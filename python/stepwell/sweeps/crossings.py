@@ -113,12 +113,12 @@ class _Seeing(Reduction):
         self.before: _State | None = None
 
     def see(self, piece: Piece) -> None:
-        value = piece.of(self.outcome.of)
+        value = np.asarray(piece.of(self.outcome.of), np.float64)
         if value.ndim != 2:
             raise ShapeError(
                 f"of: expected one number for each member of {name_of(self.outcome.of)}, got the shape {value.shape[1:-1]}"
             )
-        t, v, y = piece.t, piece.run.v[piece.since :], piece.run.y[piece.since :]
+        t, (v, y) = piece.t, (np.asarray(block[piece.since :], np.float64) for block in (piece.run.v, piece.run.y))
         if self.before is not None:
             old = self.before
             t, value = np.concatenate([[old.t], t]), np.concatenate([old.value[np.newaxis], value])

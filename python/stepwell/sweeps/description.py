@@ -57,6 +57,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         **_steps_told(task, grid),
         "t0": task.given["t0"],
         "fused": int(task.given["fused"]),
+        **({"dtype": "float32"} if task.single else {}),
         **({} if task.every is None else {"every": task.every}),
         **({"control": repr(task.given["control"])} if "control" in task.given else {}),
         SWEEP: json.dumps(told, ensure_ascii=False),
@@ -85,9 +86,9 @@ def _times(
     every = task.every or task.steps
     k = task.transient + np.append(np.arange(0, task.steps, every), task.steps).astype(np.float64)
     if not grid.of_dt:
-        return ("t",), task.given["t0"] + k * task.given["dt"], attrs
+        return ("t",), task.given["t0"] + k * task.rounded(np.asarray(task.given["dt"])), attrs
     axis = next(axis for axis in grid.axes if axis.argument == "dt")
-    return (*axis.dims, renamed["t"]), task.given["t0"] + k * axis.values[..., np.newaxis], attrs
+    return (*axis.dims, renamed["t"]), task.given["t0"] + k * task.rounded(axis.values)[..., np.newaxis], attrs
 
 
 def _digest(value: Any) -> str:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, _single
 from .._brief import counted
-from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning
+from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning, UnsupportedError
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import System
@@ -75,6 +75,7 @@ def sweep(
     control: AnyControl | None = None,
     force: Any = None,
     fused: bool = False,
+    dtype: Any = "float64",
     t0: float = 0.0,
     start: str | None = None,
     units: Mapping[str, str] | None = None,
@@ -120,6 +121,8 @@ def sweep(
         control: as for ``integrate``, the same for all members.
         force: likewise.
         fused: likewise.
+        dtype: ``"float64"`` or ``"float32"``, in which steps are made, as for ``integrate``. In float32 states are float32 and
+            what is found of them is computed in float64; a dt is rounded to float32. With fixed steps only.
         t0: time of step 0.
         start: likewise.
         units: words for "t", "v", "y", parameters and results, by name; they become attributes.
@@ -136,7 +139,8 @@ def sweep(
 
     Raises:
         ArgumentError: before any work: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, or a package is missing.
+        UnsupportedError: if the method cannot do the system, if float32 does not go with what is asked for, or a package is
+            missing.
         KeyboardInterrupt: at Ctrl-C. The store has all chunks that were finished.
 
     Warns:
@@ -161,6 +165,9 @@ def sweep(
     given = {name: value for name, value in fixed.items() if value is not None}
     given |= {"t0": _checks.number("t0", t0, unit="units of time"), "fused": _checks.flag("fused", fused), "threads": 1}
     given |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
+    if _checks.is_single(dtype):
+        _fits_single(grid, paced)
+        given["dtype"] = "float32"
     every = None if every is None else _checks.count("every", every, 1)
     kept_of_each = _outcomes(outcomes, every)
     times = None
@@ -209,6 +216,16 @@ def _fits_axes(system: Any, varied: set[str], fixed: Mapping[str, Any], needed: 
             )
     elif not callable(system):
         raise DTypeError(f"system: expected a system, or what makes one of parameters by name, got {type(system).__name__}")
+
+
+def _fits_single(grid: Grid, paced: bool) -> None:
+    """Raise if members do not go with float32: with adaptive steps, or numbers that it does not have."""
+    if paced:
+        raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
+    for axis in grid.axes:
+        _checks.fits_single(f"axes: {axis.argument}", axis.values)
+        if axis.argument == "dt":
+            _single.rounded_step(float(axis.values.min()))
 
 
 def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:

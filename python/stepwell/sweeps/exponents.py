@@ -16,7 +16,7 @@ class Exponents(Outcome):
     """The largest Lyapunov exponents, ``lyapunov``, by ``stepwell.lyapunov`` over the steps after the transient.
 
     NumPy makes the steps and their derivatives here, some hundred times slower than ``integrate``. Not with ``control``,
-    ``force``, ``fused`` or ``start``.
+    ``force``, ``fused``, ``start`` or float32.
 
     Args:
         exponents: how many, or "all".
@@ -43,7 +43,7 @@ class Exponents(Outcome):
         """Of members that start so."""
         from ..dynamics import lyapunov
 
-        if refused := [name for name in ("control", "force", "fused", "start") if given.get(name)]:
+        if refused := [name for name in ("control", "dtype", "force", "fused", "start") if given.get(name)]:
             raise ArgumentError(f"{', '.join(refused)}: goes without Lyapunov exponents, which are those of plain steps")
         start = {name: given[name] for name in ("v", "y", "dt", "t0") if name in given}
         found = lyapunov(system, method, steps=steps, transient=transient, exponents=self.exponents, every=self.every, **start)

@@ -35,7 +35,10 @@ class Piece(NamedTuple):
         return self.run.t[self.since :]
 
     def of(self, what: Of) -> Array:
-        """A quantity of the new states, shape (states, *its own axes, members)."""
+        """A quantity of the new states, shape (states, *its own axes, members).
+
+        Of states of float32, v and y are float32; all else is computed of them in float64.
+        """
         run, since = self.run, self.since
         if isinstance(what, str) and what in ("v", "y"):
             return np.asarray(getattr(run, what)[since:])
@@ -43,7 +46,7 @@ class Piece(NamedTuple):
             return np.asarray(getattr(run, what[0])[(slice(since, None), *what[1:])])
         if isinstance(what, str):
             return np.asarray(run.quantity(what)[since:])
-        v, y = (np.moveaxis(a[since:], 0, -2) for a in (run.v, run.y))
+        v, y = (np.moveaxis(np.asarray(a[since:], np.float64), 0, -2) for a in (run.v, run.y))
         with np.errstate(all="ignore"):
             found = np.asarray(what(self.t[:, np.newaxis], v, y), dtype=np.float64)
         shape = (len(self.t), run.status.size)

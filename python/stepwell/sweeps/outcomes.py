@@ -232,7 +232,7 @@ class _Mean(Reduction):
         all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
         # State after state, so that the order of the sum does not depend on the piece.
         for k, t in enumerate(piece.t.tolist()):
-            now = [each[k] for each in all_of]
+            now = [np.asarray(each[k], np.float64) for each in all_of]
             if not self.before:
                 self.sums, self.begin = [np.zeros(each.shape) for each in now], t
             else:

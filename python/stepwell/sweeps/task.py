@@ -67,6 +67,15 @@ class Task(NamedTuple):
         return [each for each in self.outcomes if isinstance(each, kind)]
 
     @property
+    def single(self) -> bool:
+        """Whether steps are made in float32."""
+        return self.given.get("dtype") == "float32"
+
+    def rounded(self, dt: Array) -> Array:
+        """The steps that are made of those that were given."""
+        return dt.astype(np.float32).astype(np.float64) if self.single else dt
+
+    @property
     def reductions(self) -> list[Outcome]:
         """The outcomes that are found piece by piece."""
         return [each for each in self.outcomes if not isinstance(each, (Function, Exponents))]
