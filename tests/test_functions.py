@@ -21,7 +21,17 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ShapeError
 from stepwell.reference import functions as fn
-from stepwell.reference.functions import exponential, hyperbolic, inverse, logarithms, powers, roots, rounding, trigonometric
+from stepwell.reference.functions import (
+    exponential,
+    hyperbolic,
+    inverse,
+    logarithms,
+    pieces,
+    powers,
+    roots,
+    rounding,
+    trigonometric,
+)
 from true_functions import OF_ONE, OF_TWO, PRECISION, SPECIALS, TRUE, arguments, errors, same, sizes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -112,6 +122,23 @@ def test_a_wrong_constant_is_noticed(module: ModuleType, constant: str, name: st
     """Its second part is wrong by a hundredth; π/4's by ten times itself, since it is below an ulp. That is more than an ulp."""
     first, second, *rest = getattr(module, constant)
     monkeypatch.setattr(module, constant, (first, second * (10.0 if constant == "QUARTER_PI" else 1.01), *rest))
+    assert worst(name, 1000, 1) > 1.0
+
+
+@pytest.mark.parametrize("name", ["exp", "expm1", "exp2"])
+@pytest.mark.parametrize(
+    ("piece", "wrong"),
+    [
+        (
+            "by_parity",
+            lambda x, z, coefficients: pieces.polynomial(z, coefficients[::2]) + pieces.polynomial(z, coefficients[1::2]),
+        ),
+        ("magic", lambda low: pieces.MAGIC + pieces.BIAS),
+    ],
+    ids=["odd powers without their x", "one scale for all exponents"],
+)
+def test_a_wrong_piece_is_noticed(name: str, piece: str, wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exponential, piece, wrong)
     assert worst(name, 1000, 1) > 1.0
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from .operations import either_bits, elementary, sign_of, where
-from .pieces import MAGIC, fast_sum, halves, polynomial, power_of_two, scaled
+from .pieces import MAGIC, by_parity, fast_sum, halves, magic, power_of_two, scaled
 
 #: ln 2; n times the first part, of 33 bits, is exact.
 LN2 = (0.6931471806019545, -4.2009150726810846e-11)
@@ -55,22 +55,28 @@ def held(x: Any, least: float, most: float) -> Any:
 
 
 class Reduced(NamedTuple):
-    """x = n·ln 2 + upper − lower, and eʳ = 1 + upper + rest where r is upper − lower, rounded."""
+    """x = n·ln 2 + upper − lower, and r is upper − lower, rounded; n stands in the low bits of ``turn``, and z is r²."""
 
+    turn: Any
     n: Any
     upper: Any
     lower: Any
     r: Any
-    rest: Any
+    z: Any
+
+    @property
+    def rest(self) -> Any:
+        """Accurate where 1 + upper cancels: eʳ = 1 + upper + rest."""
+        return (0.5 * self.z + (self.z * self.r) * by_parity(self.r, self.z, EXP)) - self.lower
 
 
-def reduced(x: Any) -> Reduced:
-    """Of a number that is small enough for n to be far below 2²⁰."""
-    n = (x * LOG2_E + MAGIC) - MAGIC
+def reduced(x: Any, to_whole: Any = MAGIC) -> Reduced:
+    """Of a number that is small enough for n to be far below 2²⁰; ``to_whole`` is added to round, as ``MAGIC`` is."""
+    turn = x * LOG2_E + to_whole
+    n = turn - to_whole
     upper, lower = x - n * LN2[0], n * LN2[1]
     r = upper - lower
-    z = r * r
-    return Reduced(n, upper, lower, r, (0.5 * z + (z * r) * polynomial(r, EXP)) - lower)
+    return Reduced(turn, n, upper, lower, r, r * r)
 
 
 @elementary
@@ -82,35 +88,39 @@ def exp(x: Any) -> Any:
         2.718281828459045
     """
     x = held(x, UNDERFLOW_UNTIL, OVERFLOW_FROM)
-    p = reduced(x)
+    low = x < 0.0
+    p = reduced(x, magic(low))
+    rest = p.z * by_parity(p.r, p.z, (0.5, *EXP)) - p.lower
     s, lost = fast_sum(1.0, p.upper)
-    return scaled(s + (lost + p.rest), p.n, x < 0.0)
+    return scaled(s + (lost + rest), p.turn, low)
 
 
 @elementary
 def expm1(x: Any) -> Any:
     """Exponential of x less 1, eˣ − 1, also where that is small."""
     y = held(x, MINUS_ONE_UNTIL, OVERFLOW_FROM)
-    p = reduced(y)
+    low = y < 0.25  # small y are not halved: they may be subnormal
+    p = reduced(y, magic(low))
     # eˣ − 1 = 2ⁿ·((1 − 2⁻ⁿ) + (eʳ − 1)); for n = 1024 half of 2¹⁻ⁿ is still a number.
     one, one_rest = fast_sum(1.0, -0.5 * power_of_two(1.0 - p.n))
     s, lost = fast_sum(one, p.upper)
     # Just above ln 2/2 the rounding error of r matters.
     rest = p.rest + (p.r * ((p.upper - p.r) - p.lower) + one_rest)
-    value = scaled(s + (lost + rest), p.n, y < 0.25)  # small y are not halved: they may be subnormal
-    return either_bits(value, sign_of(x))
+    return either_bits(scaled(s + (lost + rest), p.turn, low), sign_of(x))
 
 
 def exp2_of_sum(x: Any, tail: Any, low: Any) -> Any:
     """Two to the power x + tail, for |x| below 1100 and a tail that is small beside it; ``low`` is whether x is below 0."""
-    n = (x + MAGIC) - MAGIC
-    upper = x - n  # exact
+    to_whole = magic(low)
+    turn = x + to_whole
+    upper = x - (turn - to_whole)  # exact
     r = upper + tail
     r1, _ = halves(r)
     r2 = (upper - r1) + tail
     s, lost = fast_sum(1.0, r1 * LN2_UPPER[0])
-    rest = (r2 * (LN2_UPPER[0] + LN2_UPPER[1]) + r1 * LN2_UPPER[1]) + (r * r) * polynomial(r, EXP2)
-    return scaled(s + (lost + rest), n, low)
+    z = r * r
+    rest = (r2 * (LN2_UPPER[0] + LN2_UPPER[1]) + r1 * LN2_UPPER[1]) + z * by_parity(r, z, EXP2)
+    return scaled(s + (lost + rest), turn, low)
 
 
 @elementary

@@ -26,6 +26,11 @@ def polynomial(x: Any, coefficients: Sequence[float]) -> Any:
     return value
 
 
+def by_parity(x: Any, z: Any, coefficients: Sequence[float]) -> Any:
+    """The same polynomial, with z = x²: even and odd powers are summed apart, so that neither sum waits for the other."""
+    return polynomial(z, coefficients[::2]) + x * polynomial(z, coefficients[1::2])
+
+
 def halves(x: Any) -> tuple[Any, Any]:
     """The first 26 bits, and the other 27."""
     upper = and_bits(x, UPPER)
@@ -52,10 +57,15 @@ def power_of_two(n: Any) -> Any:
     return shift_up(n + (MAGIC + BIAS), 52)
 
 
-def scaled(x: Any, n: Any, low: Any) -> Any:
-    """x·2ⁿ, rounded once, for |x| near 1 and n from −1100 to 1024; ``low`` is true where n < 0, perhaps also where n = 0.
+def magic(low: Any) -> Any:
+    """What a number is added to for ``scaled``: it is rounded as by ``MAGIC``, and an exponent's bits stand in the low ones."""
+    return where(low, MAGIC + (BIAS + 100.0), MAGIC + (BIAS - 1.0))
 
-    No single number of normal size is 2ⁿ for all of these, so there are two factors: one of them is 2⁻¹⁰⁰ or 2.
+
+def scaled(x: Any, turn: Any, low: Any) -> Any:
+    """x·2ⁿ, rounded once, for |x| near 1 and n from −1100 to 1024; ``turn`` is n + ``magic(low)``.
+
+    No single number of normal size is 2ⁿ for all of these, so there are two factors: one of them is 2⁻¹⁰⁰ or 2. ``low`` is true
+    where n < 0, perhaps also where n = 0.
     """
-    first = shift_up(n + where(low, MAGIC + (BIAS + 100.0), MAGIC + (BIAS - 1.0)), 52)
-    return (x * first) * where(low, 2.0**-100, 2.0)
+    return (x * shift_up(turn, 52)) * where(low, 2.0**-100, 2.0)

@@ -26,7 +26,7 @@ from .operations import (
     where,
 )
 from .operations import sqrt as root
-from .pieces import UPPER, halves, polynomial
+from .pieces import UPPER, by_parity, halves
 
 #: 3·(artanh s − s − s³/3)/s⁵ in powers of s².
 LOG_LONG = (
@@ -60,7 +60,8 @@ def log2_in_two(x: Any) -> tuple[Any, Any]:
     s = s1 + s2
     # s·(3 + s² + s⁴·P(s²)), where 3 + s² must be exact.
     z, z1 = s * s, s1 * s1
-    rest = (z * z) * polynomial(z, LOG_LONG) + s2 * (s1 + s)
+    square = z * z
+    rest = square * by_parity(z, square, LOG_LONG) + s2 * (s1 + s)
     t1 = and_bits((3.0 + z1) + rest, UPPER)
     t2 = rest - ((t1 - 3.0) - z1)
     u = s1 * t1

@@ -118,7 +118,7 @@ fn interleaving(body: &Body, level: Level) -> usize {
 }
 
 /// Latency and reciprocal throughput of an operation on a vector of 512 bits, in cycles.
-fn timing(op: Op) -> (f64, f64) {
+pub(super) fn timing(op: Op) -> (f64, f64) {
     match op {
         _ if op.is_leaf() => (0.0, 0.0),
         Op::Add(..) | Op::Sub(..) | Op::Mul(..) => (3.0, 0.5),

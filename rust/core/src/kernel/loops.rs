@@ -4,13 +4,15 @@ use super::{
     machine::{Base, Counter, Machine, Place},
     plan::{Plan, Source},
     registers::{Registers, Uses},
+    schedule::Order,
     shape::Shape,
     write::{Value, Where, Writer},
 };
 
-/// The code of a plan in a shape, and how many vectors of scratch it needs. None if it cannot be done with the registers there are.
-pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape) -> Option<(Vec<u8>, usize)> {
-    let mut writer = Writer::new(plan, code, shape);
+/// The code of a plan in a shape, its operations in this order, and how many vectors of scratch it needs. None if it cannot be done with
+/// the registers there are.
+pub fn function<M: Machine>(plan: &Plan<M::Doing>, code: M, shape: Shape, order: &Order) -> Option<(Vec<u8>, usize)> {
+    let mut writer = Writer::new(plan, code, shape, order);
     let pinned = writer.share_out();
     writer.code.enter();
     if shape.resident {
@@ -42,7 +44,7 @@ struct Pressure {
 }
 
 impl<'a, M: Machine> Writer<'a, M> {
-    fn new(plan: &'a Plan<M::Doing>, code: M, shape: Shape) -> Writer<'a, M> {
+    fn new(plan: &'a Plan<M::Doing>, code: M, shape: Shape, order: &Order) -> Writer<'a, M> {
         let values = plan.sources.len() * shape.block_vectors;
         let mut replaces = vec![None; plan.sources.len()];
         for (s, id) in plan.next.iter().enumerate() {
@@ -50,17 +52,12 @@ impl<'a, M: Machine> Writer<'a, M> {
                 replaces[*id as usize] = Some(s as u32);
             }
         }
-        let mut order = Vec::with_capacity(plan.steps.len() * shape.block_vectors);
-        for first in (0..shape.block_vectors).step_by(shape.interleaved) {
-            let team = first..shape.block_vectors.min(first + shape.interleaved);
-            order.extend(plan.steps.iter().flat_map(|step| team.clone().map(move |vector| (step, vector))));
-        }
         let leaf = |source: &Source| if *source == Source::Made { Where::Nowhere } else { Where::Leaf };
         Writer {
             plan,
             shape,
             width: shape.width,
-            order,
+            order: order.iter().map(|(i, vector)| (&plan.steps[*i], *vector)).collect(),
             code,
             registers: Registers::new(shape.registers() as u8, values),
             uses: Uses::new(values),

@@ -79,6 +79,12 @@ pub trait Machine: Sized {
     /// A comparison of the first two that chooses of the third and the fourth; None where that takes two instructions anyway.
     fn pick(&self, comparison: Op) -> Option<Self::Doing>;
 
+    /// The lesser of two numbers, or the greater: `a` if a < b, or if a > b, and else `b`, as where one is a NaN. None where that takes more
+    /// than one instruction.
+    fn min_or_max(&self, _is_greater: bool) -> Option<Self::Doing> {
+        None
+    }
+
     /// What moves numbers of one member between lanes. Asked for only if it [packs](Machine::PACKS).
     fn moving(&self, _to: Move) -> Self::Doing {
         self.doing(Op::Copy(0))

@@ -14,6 +14,7 @@ mod pages;
 mod plan;
 mod registers;
 pub mod runner;
+mod schedule;
 mod shape;
 mod write;
 mod written;
@@ -24,6 +25,7 @@ pub mod writer {
     pub use super::{
         choose::{choose, choose_long, choose_trail},
         frame::Frame,
+        schedule::{Order, Waits, in_turn},
         shape::Shape,
         written::{Assembled, Written, allowed, assemble, write, write_if_it_gains, write_packed},
     };

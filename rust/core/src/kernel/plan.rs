@@ -126,8 +126,8 @@ impl<D: Copy> Plan<D> {
         }
         let masks = masks(body);
         let adds_doubles = has_more_products(body);
-        let picks = picks(body, machine);
-        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && picks[*id].is_none()) {
+        let joined = joined(body, machine);
+        for (id, op) in body.ops.iter().enumerate().filter(|(id, op)| !op.is_leaf() && joined[*id].is_none()) {
             let ([a, b, c], n) = op.with(|operand| same[operand as usize]).operands();
             let (doing, of, n) = match *op {
                 Op::Neg(_) => match machine.negate() {
@@ -141,8 +141,9 @@ impl<D: Copy> Plan<D> {
                         (doing, [a, constant, 0, 0], 2)
                     }
                 },
-                Op::Select(m, ..) => match picks[m as usize] {
-                    Some(doing) => {
+                Op::Select(m, ..) => match joined[m as usize] {
+                    Some(Joined::Extreme(doing)) => (doing, [b, c, 0, 0], 2),
+                    Some(Joined::Pick(doing)) => {
                         let [p, q, _] = body.ops[m as usize].with(|operand| same[operand as usize]).operands().0;
                         (doing, [p, q, b, c], 4)
                     }
@@ -226,22 +227,37 @@ pub fn masks(body: &Body) -> Vec<bool> {
     masks
 }
 
+/// What a comparison and a choice by it are made by.
+#[derive(Clone, Copy, Debug)]
+enum Joined<D> {
+    /// It compares two numbers and chooses of two others.
+    Pick(D),
+    /// The lesser or the greater of the numbers that are chosen of.
+    Extreme(D),
+}
+
 /// For each value that is a comparison and used by one choice only: the instruction that does both, if there is one.
-fn picks<M: Machine>(body: &Body, machine: &M) -> Vec<Option<M::Doing>> {
+fn joined<M: Machine>(body: &Body, machine: &M) -> Vec<Option<Joined<M::Doing>>> {
     let mut uses = vec![0u32; body.ops.len()];
-    let mut chooses = vec![false; body.ops.len()];
+    let mut chosen: Vec<Option<[Id; 2]>> = vec![None; body.ops.len()];
     for op in &body.ops {
         let (operands, n) = op.operands();
         operands[..n].iter().for_each(|id| uses[*id as usize] += 1);
-        if let Op::Select(m, ..) = *op {
-            chooses[m as usize] = true;
+        if let Op::Select(m, a, b) = *op {
+            chosen[m as usize] = Some([a, b]);
         }
     }
     body.next.iter().for_each(|id| uses[*id as usize] += 1);
-    let is_comparison = |op: &Op| matches!(op, Op::Less(..) | Op::LessEqual(..) | Op::Equal(..));
-    let pick = |id: usize| {
-        let op = &body.ops[id];
-        (chooses[id] && uses[id] == 1 && is_comparison(op)).then(|| machine.pick(*op)).flatten()
+    let join = |id: usize| {
+        let of = chosen[id].filter(|_| uses[id] == 1)?;
+        // Where p < q is false, of a NaN for example, the second is chosen. p <= q would choose the first of two zeros.
+        let extreme = match body.ops[id] {
+            Op::Less(p, q) if of == [p, q] => machine.min_or_max(false),
+            Op::Less(p, q) if of == [q, p] => machine.min_or_max(true),
+            Op::Less(..) | Op::LessEqual(..) | Op::Equal(..) => None,
+            _ => return None,
+        };
+        extreme.map(Joined::Extreme).or_else(|| machine.pick(body.ops[id]).map(Joined::Pick))
     };
-    (0..body.ops.len()).map(pick).collect()
+    (0..body.ops.len()).map(join).collect()
 }

@@ -8,6 +8,7 @@ use super::{
     pack::{self, MOST_LANES, Packed, Verdict},
     pages::Pages,
     plan::{Plan, is_sound},
+    schedule,
     shape::Shape,
     x86,
 };
@@ -61,7 +62,12 @@ fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape)
         None => Plan::new(body, &machine)?,
         Some(packed) => Plan::packed(body, packed, &machine)?,
     };
-    let (code, spills) = loops::function(&plan, machine, shape)?;
+    let order = match packed {
+        None => schedule::order(&plan, &body.ops, shape),
+        // Its order is that of the model by which the packing was chosen.
+        Some(_) => schedule::in_turn(plan.steps.len(), shape),
+    };
+    let (code, spills) = loops::function(&plan, machine, shape, &order)?;
     let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));
     let frame = Frame {
         pool: (plan.constants.len() + body.uniforms) * shape.pool_copies(),

@@ -115,14 +115,14 @@ fn is_known(mnemonic: Mnemonic, is_single: bool) -> bool {
     use Mnemonic::*;
     #[rustfmt::skip]
     let double = [
-        Vaddpd, Vaddsd, Vsubpd, Vsubsd, Vmulpd, Vmulsd, Vdivpd, Vdivsd, Vsqrtpd, Vsqrtsd, Vcmppd, Vcmpsd, Vroundpd, Vroundsd,
+        Vaddpd, Vaddsd, Vsubpd, Vsubsd, Vmulpd, Vmulsd, Vminpd, Vminsd, Vmaxpd, Vmaxsd, Vdivpd, Vdivsd, Vsqrtpd, Vsqrtsd, Vcmppd, Vcmpsd, Vroundpd, Vroundsd,
         Vrndscalepd, Vrndscalesd, Vandpd, Vandnpd, Vorpd, Vxorpd, Vpaddq, Vpsllq, Vpsrlq, Vblendmpd, Vblendvpd, Vpternlogq, Vpmovm2q,
         Vmovupd, Vmovapd, Vmovsd, Vbroadcastsd,
         Vshufpd, Vinsertf128, Vinsertf64x2, Vextractf128, Vextractf64x2, Vpermpd,
     ];
     #[rustfmt::skip]
     let single = [
-        Vaddps, Vaddss, Vsubps, Vsubss, Vmulps, Vmulss, Vdivps, Vdivss, Vsqrtps, Vsqrtss, Vcmpps, Vcmpss, Vroundps, Vroundss,
+        Vaddps, Vaddss, Vsubps, Vsubss, Vmulps, Vmulss, Vminps, Vminss, Vmaxps, Vmaxss, Vdivps, Vdivss, Vsqrtps, Vsqrtss, Vcmpps, Vcmpss, Vroundps, Vroundss,
         Vrndscaleps, Vrndscaless, Vandps, Vandnps, Vorps, Vxorps, Vpaddd, Vpslld, Vpsrld, Vblendmps, Vblendvps, Vpternlogd, Vpmovm2d,
         Vmovups, Vmovaps, Vmovss, Vbroadcastss,
     ];

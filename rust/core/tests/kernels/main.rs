@@ -8,6 +8,7 @@ mod inputs;
 mod packed;
 mod process;
 mod random;
+mod schedule;
 
 use inputs::{Inputs, same, shape};
 use random::Random;

@@ -62,6 +62,9 @@ pub const ADD: Form = arithmetic(0x58);
 pub const MUL: Form = arithmetic(0x59);
 pub const SUB: Form = arithmetic(0x5C);
 pub const DIV: Form = arithmetic(0x5E);
+/// The lesser, or the greater of two; the second if either is a NaN or both are zeros.
+pub const MINIMUM: Form = arithmetic(0x5D);
+pub const MAXIMUM: Form = arithmetic(0x5F);
 pub const SQRT: Form = arithmetic(0x51);
 pub const COMPARE: Form = arithmetic(0xC2);
 /// Rounds to a whole number as the byte behind says.

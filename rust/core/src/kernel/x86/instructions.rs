@@ -145,6 +145,10 @@ impl Machine for Code {
         self.evex.then(|| Doing::Pick(predicate(comparison)))
     }
 
+    fn min_or_max(&self, is_greater: bool) -> Option<Doing> {
+        Some(Doing::Two(if is_greater { x::MAXIMUM } else { x::MINIMUM }, false))
+    }
+
     fn moving(&self, to: Move) -> Doing {
         Doing::Move(to)
     }

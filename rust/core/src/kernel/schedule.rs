@@ -1,0 +1,179 @@
+//! In which order the operations of a step are written.
+//!
+//! A CPU executes out of order, but only among the next few hundred operations. Several interleaved vectors give it enough to do. A long
+//! step leaves no registers for a second vector, and a single member has none: written function after function, such a step is a row of
+//! chains, each longer than what the CPU sees. So an operation that would wait for its operands is put off, and the first one after it that
+//! need not wait goes before it.
+
+use std::collections::BTreeSet;
+
+use super::{choose::timing, plan::Plan, shape::Shape};
+use crate::tape::Op;
+
+/// The operations in their order: the index of each among those of the plan, and its vector.
+pub type Order = Vec<(usize, usize)>;
+
+/// The CPU overlaps shorter steps of a vector with those of the next vector by itself.
+const MIN_STEP_OPERATIONS: usize = 128;
+/// If interleaved vectors share more numbers than this, these are read from memory: once for all vectors, if one follows the other.
+const MAX_SHARED: usize = 12;
+/// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case: fewer waits
+/// then gain more than spills cost.
+const MAX_WAITING_PER_REGISTER: usize = 2;
+/// Of the operations whose operands are made or under way, so many are compared, from the first one on.
+const MAX_COMPARED: usize = 64;
+/// A CPU begins two operations on long vectors in a cycle.
+const CYCLES_PER_OPERATION: f64 = 0.5;
+
+/// Operation after operation, each for all vectors that are interleaved.
+pub fn in_turn(operations: usize, shape: Shape) -> Order {
+    let mut order = Vec::with_capacity(operations * shape.block_vectors);
+    for first in (0..shape.block_vectors).step_by(shape.interleaved) {
+        let team = first..shape.block_vectors.min(first + shape.interleaved);
+        order.extend((0..operations).flat_map(|i| team.clone().map(move |vector| (i, vector))));
+    }
+    order
+}
+
+/// The order in which a plan is written; `ops` are the operations of its body.
+pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order {
+    let order = in_turn(plan.steps.len(), shape);
+    let interleaves = shape.interleaved.min(shape.block_vectors) > 1;
+    let is_single = shape.width == 1 && shape.block_vectors == 1;
+    let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
+    // A state that is in registers leaves none to interleaved vectors for more results that wait.
+    let is_best =
+        if interleaves { shape.resident || shared > MAX_SHARED } else { !is_single && plan.steps.len() < MIN_STEP_OPERATIONS };
+    if is_best {
+        return order;
+    }
+    let waits = Waits::of(plan, ops);
+    // The other registers hold shared numbers and the state.
+    let fit = shape.registers() * 3 / 4;
+    if interleaves {
+        return waits.shortened(&order, fit);
+    }
+    let waiting = waits.waiting(&order);
+    let most_waiting = if waiting <= fit { waiting } else { MAX_WAITING_PER_REGISTER * shape.registers() };
+    let order = if is_single { waits.longest_first(order) } else { order };
+    waits.shortened(&order, most_waiting)
+}
+
+/// What waits for what.
+pub struct Waits {
+    /// Of each operation those that make its operands.
+    operands: Vec<Vec<usize>>,
+    /// Those that use its result.
+    users: Vec<Vec<usize>>,
+    /// After how many cycles its result is there, and after how many its unit can begin another one.
+    time: Vec<[f64; 2]>,
+}
+
+impl Waits {
+    /// Of operations in an order in which operands come first: for each, those that make its operands, and its times.
+    pub fn new(operands: Vec<Vec<usize>>, time: Vec<[f64; 2]>) -> Waits {
+        let mut users = vec![Vec::new(); operands.len()];
+        for (i, of) in operands.iter().enumerate() {
+            of.iter().for_each(|made| users[*made].push(i));
+        }
+        Waits { operands, users, time }
+    }
+
+    fn of<D: Copy>(plan: &Plan<D>, ops: &[Op]) -> Waits {
+        let mut maker = vec![None; plan.sources.len()];
+        plan.steps.iter().enumerate().for_each(|(i, step)| maker[step.id as usize] = Some(i));
+        let made_by = |ids: &[u32]| {
+            let mut of: Vec<usize> = ids.iter().filter_map(|id| maker[*id as usize]).collect();
+            of.sort_unstable();
+            of.dedup();
+            of
+        };
+        let operands = plan.steps.iter().map(|step| made_by(step.of())).collect();
+        Waits::new(operands, plan.steps.iter().map(|step| timing(ops[step.id as usize]).into()).collect())
+    }
+
+    /// The most results that wait to be used at once, in an order of the operations of one vector.
+    pub fn waiting(&self, order: &Order) -> usize {
+        let mut uses: Vec<usize> = self.users.iter().map(Vec::len).collect();
+        let (mut waiting, mut most) = (0, 0);
+        for (i, _) in order {
+            waiting += usize::from(uses[*i] > 0);
+            for of in &self.operands[*i] {
+                uses[*of] -= 1;
+                waiting -= usize::from(uses[*of] == 0);
+            }
+            most = most.max(waiting);
+        }
+        most
+    }
+
+    /// The order in which that goes first which has the longest way to the end of the step: no other vector fills the waits there.
+    pub fn longest_first(&self, mut order: Order) -> Order {
+        let mut rest = vec![0.0f64; self.time.len()];
+        for i in (0..rest.len()).rev() {
+            rest[i] = self.time[i][0] + self.users[i].iter().map(|user| rest[*user]).fold(0.0, f64::max);
+        }
+        order.sort_by(|(a, _), (b, _)| rest[*b].total_cmp(&rest[*a]));
+        order
+    }
+
+    /// The order, changed where an operation would wait. At most so many results wait to be used, if that can be.
+    pub fn shortened(&self, order: &Order, most_waiting: usize) -> Order {
+        let operations = self.time.len();
+        // Of an operation for a vector its place in the order.
+        let mut place = vec![0; order.len()];
+        let number = |(i, vector): (usize, usize)| vector * operations + i;
+        order.iter().enumerate().for_each(|(at, each)| place[number(*each)] = at);
+        let mut missing: Vec<usize> = order.iter().map(|(i, _)| self.operands[*i].len()).collect();
+        let mut uses: Vec<usize> = order.iter().map(|(i, _)| self.users[*i].len()).collect();
+        let mut can_begin = vec![0.0f64; order.len()];
+        let mut ready: BTreeSet<usize> = (0..order.len()).filter(|at| missing[*at] == 0).collect();
+        let mut made = Vec::with_capacity(order.len());
+        let (mut now, mut waiting, mut slow_unit) = (0.0f64, 0, 0.0f64);
+        while !ready.is_empty() {
+            let is_full = waiting >= most_waiting;
+            let mut best: Option<(usize, (usize, f64))> = None;
+            for &at in ready.iter().take(MAX_COMPARED) {
+                let (i, vector) = order[at];
+                let begin = can_begin[at].max(now).max(if self.is_slow(i) { slow_unit } else { 0.0 });
+                let ends = || self.operands[i].iter().filter(|of| uses[place[number((**of, vector))]] == 1).count();
+                let more = if is_full { usize::from(uses[at] > 0).saturating_sub(ends()) } else { 0 };
+                if best.is_none_or(|(_, than)| (more, begin) < than) {
+                    best = Some((at, (more, begin)));
+                }
+                if more == 0 && begin <= now {
+                    break;
+                }
+            }
+            let Some((at, (_, begin))) = best else { break };
+            ready.remove(&at);
+            let (i, vector) = order[at];
+            let [latency, busy] = self.time[i];
+            if self.is_slow(i) {
+                slow_unit = begin + busy;
+            }
+            waiting += usize::from(uses[at] > 0);
+            for of in &self.operands[i] {
+                let of = place[number((*of, vector))];
+                uses[of] -= 1;
+                waiting -= usize::from(uses[of] == 0);
+            }
+            for user in &self.users[i] {
+                let user = place[number((*user, vector))];
+                can_begin[user] = can_begin[user].max(begin + latency);
+                missing[user] -= 1;
+                if missing[user] == 0 {
+                    ready.insert(user);
+                }
+            }
+            made.push((i, vector));
+            now = begin + CYCLES_PER_OPERATION;
+        }
+        made
+    }
+
+    /// Whether its unit cannot begin one in every cycle: roots and quotients.
+    fn is_slow(&self, i: usize) -> bool {
+        self.time[i][1] > 1.0
+    }
+}
