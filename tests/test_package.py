@@ -70,13 +70,16 @@ def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
 
 @pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
 def test_a_stage_of_weight_zero_is_not_evaluated(method: sw.Method) -> None:
-    """Of Fehlberg's six stages one counts only in the estimate, so a step of fixed length makes five, an attempt all six."""
+    """Of Fehlberg's six stages one counts only in the estimate, so a step of fixed length makes five, an attempt all six.
+
+    A tolerance of 1e-5 is one of order 8, that of steps of fixed length by the series.
+    """
     extra = method.name == "fehlberg"
     assert method.attempt_evaluations == (0 if method.error_order is None else method.evaluations + extra)
     if extra:
         assert (method.evaluations, 0.5 in method.nodes) == (5, False)
     if method.error_order is not None:
-        run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-6, at=[1.0])
+        run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-5, at=[1.0])
         assert run.paces is not None
         # And twice for the output time; a series finds the coefficients of that step alone.
         made = int(run.paces.accepted + run.paces.rejected) + (1 if method.has_series else 2)
