@@ -4,8 +4,10 @@
 PYTHON ?= python3
 OUT    ?= out
 BIN    := .venv/bin
+# Tests run compilers, which would look for the jobs of this make.
+PYTHON_TEST := env -u MAKEFLAGS -u MFLAGS $(BIN)/python -m pytest -q
 # On every core; a file stays on one, for its tests share what takes time to make. The order of files is that of tests/conftest.py.
-PYTEST := $(BIN)/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
+PYTEST := $(PYTHON_TEST) -n auto --dist loadfile --no-loadscope-reorder
 SOURCES := $(shell find rust python -type f \( -name "*.rs" -o -name "*.toml" -o -name "*.py" -o -name "*.pyi" -o -name py.typed \)) \
            Cargo.toml Cargo.lock pyproject.toml README.md LICENSE
 
@@ -31,7 +33,7 @@ docs: .venv/docs ## build the site into out/docs, without a network; a warning i
 
 test: ## set up, and run the tests: Rust, Python, examples, docs, formatting, lints, types, stubs
 	$(MAKE) --no-print-directory -j2 lint rust-test python-beside
-	$(BIN)/python -m pytest -q tests/test_interrupt.py
+	$(PYTHON_TEST) tests/test_interrupt.py
 
 wheel: .venv/wheel ## build the release wheel into dist/
 	@ls -l dist/*.whl
@@ -80,12 +82,12 @@ rust-test: rust-build
 
 # How soon Ctrl-C ends a run is timed when all others are done, and not from a shell's background, where Ctrl-C is ignored.
 python-test: python-beside
-	$(BIN)/python -m pytest -q tests/test_interrupt.py
+	$(PYTHON_TEST) tests/test_interrupt.py
 
 # One of the tests builds a core with one more method, which takes a minute: beside the others. It copies what was built of other
 # crates, and the checks of types leave what they know: both must be done.
 python-beside: .venv/test rust-build lint-python
-	$(BIN)/python -m pytest -q tests/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
+	$(PYTHON_TEST) tests/test_adding.py > .venv/adding.log 2>&1 & adding=$$!; \
 	$(PYTEST) --ignore=tests/test_adding.py --ignore=tests/test_interrupt.py; others=$$?; \
 	wait $$adding; added=$$?; cat .venv/adding.log; test $$others -eq 0 -a $$added -eq 0
 

@@ -80,7 +80,9 @@ def test_without_a_force_the_step_is_the_one_before(name: str) -> None:
         # h·force once for each number of v, and a sum for each that is computed; equal ones are one.
         assert pushed["multiply"] - without["multiply"] == numbers
         sums = ("add", "subtract", "negate")  # of which one may be written as another
-        assert 0 < sum(pushed[each] - without[each] for each in sums) <= numbers * method.evaluations
+        # A rate −x with a force is force − x, and its series has −xₖ from order 1 on, whose sign goes into the sums with it.
+        counted = sums[:2] if method.has_series else sums
+        assert 0 < sum(pushed[each] - without[each] for each in counted) <= numbers * method.evaluations
         others = set(without) - {"multiply", "parameter", "step", *sums}
         assert {each: without[each] for each in others} == {each: pushed[each] for each in others}
 
