@@ -45,9 +45,11 @@ def alone(expression: str) -> str:
 
 @pytest.fixture
 def _quiet() -> Iterator[None]:
+    digits = sys.get_int_max_str_digits()
     with warnings.catch_warnings():
         oracle.quiet()
         yield
+    sys.set_int_max_str_digits(digits)  # other tests want Python's own
 
 
 # ---- fuzzed calls
