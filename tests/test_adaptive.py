@@ -135,7 +135,7 @@ def test_each_state_is_that_of_its_time() -> None:
 def test_a_state_does_not_depend_on_what_else_is_asked_for(method: str, backend: str) -> None:
     """Alone, among many, at the very end of a step, or as the last: the same bits, and the same steps."""
     system, state = kepler(np.array([0.3, 0.7, 0.0]))
-    times = np.sort(np.random.default_rng(3).uniform(0.0, 20.0, 40))
+    times = np.sort(np.random.default_rng(3).uniform(0.0, 20.0 if backend == "rust" else 8.0, 40))
     tolerance = 1e-4 if sw.method(method).has_series else np.array([1e-2, 1e-4, 1e-9])  # a series has one order for all members
     ask: dict[str, Any] = {"tolerance": tolerance, "backend": backend} | state
     many = sw.integrate(system, method, at=times, **ask)
@@ -228,7 +228,7 @@ def test_a_linear_run_scales_with_its_start_to_the_bit(method: str, backend: str
     Of squares of lengths times the square of a tolerance of 1e-6 the least here is 2^−160·1e-24 or so, far above 2^−1022.
     """
     chain = sw.Chain(3, stiffness=[1.0, 30.0, 2.0, 1.0])
-    times = np.linspace(0.0, 30.0, 8)[1:]
+    times = np.linspace(0.0, 30.0 if backend == "rust" else 6.0, 8)[1:]
     for v, y in (([0.0, 1.0, -0.3], [0.2, 0.0, 0.1]), ([0.0] * 3, [0.0, 1.0, 0.0]), ([0.1, 0.0, 0.0], [0.0] * 3)):
         ask: dict[str, Any] = {"tolerance": 1e-6, "at": times, "backend": backend}
         one = sw.integrate(chain, method, v=np.array(v), y=np.array(y), **ask)

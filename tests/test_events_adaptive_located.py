@@ -12,7 +12,7 @@ import test_events_adaptive as bits
 from stepwell.events import adaptive, attempts, collected
 from stepwell.events.trials import AdaptiveTrials
 from test_events_adaptive import ABLE, U
-from test_events_located import low_end, straight
+from test_events_located import error_of_bounces, low_end, straight
 
 #: A quarter of the period of a pendulum that begins at 1 rad, at rest: π/2/agm(1, cos ½) (Gauss).
 QUARTER = float(mpmath.pi / 2 / mpmath.agm(1, mpmath.cos(0.5)))
@@ -79,25 +79,8 @@ def test_a_driven_motion_passes_in_time(method: str) -> None:
 
 @pytest.mark.parametrize("method", ABLE)
 def test_bounces(method: str) -> None:
-    """Falling from 1 under gravity 1, bouncing with half of the speed: at √2·(1, 1 + 1, 1 + 1 + 1/2, …).
-
-    All methods here are exact for a parabola; each flight adds some roundings of numbers up to 4 in each of some 30 steps.
-    """
-
-    @sw.system
-    def ball(t: Any, v: Any, y: Any, *, gravity: float = 1.0) -> Any:
-        return -gravity
-
-    ground = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
-    v, y, t, times = 0.0, 1.0, 0.0, []
-    for _ in range(6):
-        run = sw.integrate(ball(), method, v=v, y=y, tolerance=1e-9, at=[t + 10.0], t0=t, events=ground)
-        assert run.stopped_at is not None
-        v, y, t = -0.5 * float(run.v[-1]), float(run.y[-1]), float(run.stopped_at)
-        assert -1e-13 < y <= 0.0  # at or past the ground
-        times.append(t)
-    expected = 2**0.5 * (1.0 + 2.0 * np.concatenate([[0.0], np.cumsum(0.5 ** np.arange(1, 6))]))
-    assert np.abs(np.array(times) - expected).max() < 6 * 30 * 4 * 4 * U
+    """All methods here are exact for a parabola; each flight adds some roundings of numbers up to 4 in each of some 30 steps."""
+    assert error_of_bounces(method, tolerance=1e-9, at=[10.0]) < 6 * 30 * 4 * 4 * U
 
 
 # ---- mistakes

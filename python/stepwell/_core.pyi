@@ -1,7 +1,7 @@
 """The Rust core: arrays in, arrays out. Everything is checked before it gets here; use ``stepwell``, not this.
 
 Arrays are C-contiguous. Rows are arrays of two axes: what is counted, and the members, or 1 where all members have it in common.
-Plans, pacings and their arrays are read by the names of their attributes, which stand in ``engine.py``.
+Plans, pacings and their arrays are read by the names of their attributes, which stand in ``engine/``.
 """
 
 from typing import Any, NoReturn, final

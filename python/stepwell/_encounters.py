@@ -30,6 +30,22 @@ MAX_RERUN = 10_000_000
 NUMBERS_AT_ONCE = 1 << 18
 
 
+class Collision(NamedTuple):
+    """Two bodies that were nearest to each other when a member left the finite range.
+
+    Attributes:
+        member: index of the member in the batch.
+        step: number of the first step that was not finite.
+        bodies: the two.
+        distance: between them, one step before.
+    """
+
+    member: tuple[int, ...]
+    step: int
+    bodies: tuple[int, int]
+    distance: float
+
+
 class Encounter(NamedTuple):
     """Two bodies that met within one step.
 
@@ -231,3 +247,16 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         alone = np.sqrt((by_others * by_others).sum(axis=1)) <= np.sqrt(r2) * strength / _spread(r2 + soft2, newton)
         may = (strength > 0.0) & ((r2 <= near2) | (~parts & reaches & in_time & alone))
     return may.any(axis=0)
+
+
+def collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
+    """Which bodies were nearest in the last state that was finite: the member is run again up to there, alone."""
+    system, steps = plan.system, step - 1 - plan.first
+    assert isinstance(system, NBody)
+    alone, y = system.member(index, plan.batch), _checks.member(y, index)
+    if steps > 0:
+        force = None if plan.force is None else _checks.member(plan.force, index)
+        again = plan._replace(system=alone, batch=(), steps=steps, every=None, progress=None, record=(), force=force)
+        y = engine.advance(again, _checks.member(v, index), y, carried=carried).y[-1]
+    bodies, distance = alone.closest(y)
+    return Collision(index, step, bodies, distance)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext
 from functools import partial
 from math import prod
 from typing import TYPE_CHECKING, Any
@@ -15,42 +14,25 @@ from . import _checks, _core, _encounters, _memory, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
-from .control import AnyControl, EnergyControl, a_control
-from .errors import (
-    ArgumentError,
-    DivergenceWarning,
-    DTypeError,
-    ShapeError,
-    ToleranceWarning,
-    UnsupportedError,
-)
+from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
+from .adaptive_runs import adaptive_run
+from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
+from .control import AnyControl, a_control
+from .errors import ArgumentError, DivergenceWarning, UnsupportedError
 from .methods import Method
 from .methods import method as find_method
-from .methods import methods as every_method
 from .reference.types import Whole
-from .result import AdaptiveState, Collision, Paces, Run, Status
-from .systems import NBody, Sampled, Sinusoid, System
-from .systems.base import TINY, a_system
+from .result import Run
+from .systems import NBody, Sinusoid, System
+from .systems.base import a_system
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ._words import Backend, RunForm
     from .events import Event
-    from .reference.adaptive import Pace
 
-BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
 FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
-
-#: The memory of a run besides its saved states: so many numbers for each number of a state (the start, the carry, the final
-#: state), and so many bytes for each saved time (its step number and the time).
-NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
-#: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
-MOST_STEPS = 1_000_000
-
-
-#: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
-MAX_ABSOLUTE_SHARE = 0.01
 
 
 def integrate(
@@ -187,7 +169,7 @@ def integrate(
         _only_fixed(fixed)
         went = None if carry is None else (carry, carried_by)
         asked = None if events is None else _asked(events, "direct")
-        run, begun = _adapt(
+        run, begun = adaptive_run(
             system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress, asked
         )
         warn_of_nonsense(run, begun)
@@ -214,7 +196,7 @@ def integrate(
             f"use form='direct'"
         )
     if form == "power":
-        _goes_on_by_a_rule(system)
+        goes_on_by_a_rule(system)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     if single:
         from . import _single  # only such runs need it
@@ -234,7 +216,7 @@ def integrate(
     if single:
         _single.check_inputs(system, max(-begin, end))
     every = None if every is None else _checks.count("every", every, 1)
-    record = _quantities(system, record)
+    record = quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
     choice = how.start_choice(start)
     if carry is not None and how.carry is None and carried_by is not None:
@@ -275,7 +257,7 @@ def integrate(
             _checks.fits_single(name, block)
         if control is not None:  # whose target is that of the start as it is stepped
             v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
-    v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
+    v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
     if control is not None:
         system = system.controlled(control, v, y, dt)
         fits_together(system, how)
@@ -285,7 +267,7 @@ def integrate(
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
-        plan = plan._replace(force=_spread(force, system.v_shape, batch))
+        plan = plan._replace(force=spread(force, system.v_shape, batch))
     if record or system is not plan.system:
         # In float32 they are computed from the saved states, in float64.
         kept = () if single else tuple(name for name in record if name in system.quantities)
@@ -298,7 +280,7 @@ def integrate(
         ended = driver.Run(asked, v, y, before, carry is not None)
         make = ended.made
     if _checks.flag("progress", progress):
-        with _bar(f"{how.title}, {steps} steps") as told:
+        with bar_of(f"{how.title}, {steps} steps") as told:
             out = make(plan._replace(progress=told))
     else:
         out = make(plan)
@@ -321,7 +303,7 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         fused=fused,
-        collision=partial(_collision, plan, v, y, carry is not None) if collides else None,
+        collision=partial(_encounters.collision, plan, v, y, carry is not None) if collides else None,
         encounter=partial(_encounters.of_member, plan, v, y, carry is not None, steps) if collides else None,
         overshoots=partial(_encounters.overshoots, plan, v, y, carry is not None, steps) if collides else None,
         recorded=out.recorded,
@@ -352,35 +334,6 @@ def _asked(events: Any, form: str) -> list[Event]:
     return several(events)
 
 
-def forced(system: System) -> None:
-    """Raise if a system has no v̇ that a force could be added to."""
-    if prod(system.v_shape) == 0:
-        raise UnsupportedError(f"force: it is added to the rates of v, and {system!r} has no v; give it an input or a parameter")
-
-
-def velocities(system: System, v: Any) -> Any:
-    """The velocities that were given; a system without velocities needs none."""
-    if v is None and system.v_shape == (0,):
-        return 0.0
-    if v is None:
-        raise ArgumentError(
-            f"v: expected the velocities at the start, got None; {system!r} has velocities, unlike a system of first order"
-        )
-    return v
-
-
-def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) -> None:
-    """Raise if what ``resume`` says of the run so far is of another method, whose carry means something else, or another step."""
-    anew = "to go on with another, start anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
-    if dt_before is not None and dt != (so_far := _checks.number("dt_before", dt_before, unit="units of time")):
-        raise ArgumentError(f"dt: expected the step of the run that goes on, dt_before = {so_far!r}, got {dt!r}; {anew}")
-    if carried_by is not None and _checks.known("carried_by", carried_by, [each.name for each in every_method()]) != method.name:
-        raise ArgumentError(
-            f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
-            f"{anew}"
-        )
-
-
 def _times(plan: engine.Plan) -> Array:
     """t0 + k·dt of every saved state; there may be millions of them."""
     if plan.every is None:
@@ -396,352 +349,10 @@ def _only_fixed(given: dict[str, Any]) -> None:
         raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
 
 
-def _adapt(
-    system: System,
-    how: Method,
-    v: Any,
-    y: Any,
-    dt: Any,
-    tolerance: Any,
-    at: Any,
-    max_steps: Any,
-    record: Any,
-    t0: Any,
-    went: tuple[Any, Any] | None,
-    control: Any,
-    fused: bool,
-    threads: int | None,
-    backend: str,
-    progress: bool,
-    asked: list[Event] | None,
-) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
-    if how.error_order is None:
-        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
-        raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if system.rubbing is not None:
-        raise UnsupportedError(
-            f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
-            f"estimated; use dt= and steps="
-        )
-    if system.contacts:
-        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
-    control = a_control(control)
-    if how.has_series:
-        _has_series(system, control)
-    not_of_a_step(system.keeper if control is None else control)
-    if at is None or (tolerance is None) == (went is None):
-        if at is not None and went is not None:
-            raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
-        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
-    t0 = _checks.number("t0", t0, unit="units of time")
-    times = _checks.numbers("at", at, unit="units of time")
-    if times.ndim != 1 or len(times) == 0:
-        raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
-    carry = None if went is None else _paces_of(how, *went)
-    since = t0 if carry is None else float(carry[engine.TARGET].max(initial=t0))
-    if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
-        begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
-        raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
-    last = float(times[-1])
-    system.check_time(max(abs(t0), abs(last)))
-    backend = _checks.known("backend", backend, BACKENDS)
-    budget = MOST_STEPS if max_steps is None else _checks.count("max_steps", max_steps, 1)
-    v = _checks.block("v", v, system.v_shape, system.axes)
-    y = _checks.block("y", y, system.y_shape, system.axes)
-    batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-    if carry is None:
-        relative, absolute = _tolerances(tolerance)
-        first = None if dt is None else _checks.numbers("dt", dt, positive=True, unit="units of time")
-        tolerances = {"relative": relative.shape} | ({} if absolute is None else {"absolute": absolute.shape})
-        batches["tolerance"] = _checks.batch_shape(tolerances)
-        if first is not None:
-            batches["dt"] = first.shape
-    else:
-        if dt is not None:
-            raise ArgumentError("dt: the run that goes on has its next step already")
-        batches["carry"] = carry.shape[1:]
-    if control is not None:
-        batches |= {"control": control.batch}
-    batch = _checks.batch_shape(batches)
-    if carry is not None and carry.shape[1:] != batch:
-        raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.shape[1:]}")
-    record = _quantities(system, record)
-    workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
-    numbers = prod(system.v_shape) + prod(system.y_shape)
-    _checks.fits(
-        "the saved states",
-        len(times) * numbers + NUMBERS_PER_STATE * (numbers + 1),
-        batch,
-        "ask for fewer times or split the batch",
-        beside=len(times) * BYTES_PER_TIME,
-    )
-    v, y = _spread(v, system.v_shape, batch), _spread(y, system.y_shape, batch)
-    ended, adapt = None, engine.adapt
-    if asked is not None:
-        from .events import adaptive  # only such runs need it
-
-        ended = adaptive.AdaptiveRun(asked)
-        adapt = ended.adapt
-    with _bar(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
-        if control is not None:
-            system = system.controlled(control, v, y, TINY)
-        order = order_of_series(how, relative if carry is None else carry[engine.RELATIVE])
-        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
-        paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
-        out = adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
-    accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
-    # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
-    again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
-    evaluations = out.evaluations * (accepted + rejected + again)
-    stopped = np.count_nonzero(out.status) > 0
-    run = Run(
-        t=times,
-        v=out.v,
-        y=out.y,
-        status=out.status.astype(np.int8),
-        first_bad_step=np.where(out.status == 0, -1, accepted + 1) if stopped else np.full(batch, -1),
-        carry=None,
-        system=system,
-        method=how,
-        dt=1.0,
-        t0=t0,
-        start_step=0,
-        steps=0,
-        start=None,
-        paces=Paces(out.paces[engine.TIME], out.paces[engine.STEP], accepted, rejected, evaluations),
-        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, last), last, how.name),
-        fused=fused,
-        work=None if system.control is None else out.paces[engine.WORK] / engine.pushes(system.control, how.attempt_evaluations),
-    )
-    for name in record:
-        run.recorded[name] = run.quantity(name)
-    if stopped:
-        _warn_of_stops(run)
-    if np.count_nonzero(out.paces[engine.ABSOLUTE]):
-        _warn_of_lost(engine.pace_of(out.paces, batch))
-    if ended is not None:
-        ended.tell(run)
-    return run, None if carry is not None else (v, y)
-
-
-def _has_series(system: System, control: Any) -> None:
-    """Raise unless the rates are as smooth within a step as the last terms of a series say."""
-    instead = "use another method, such as dop853"
-    if system.samples[0] < np.inf:
-        raise UnsupportedError(f"tolerance: a series does not see that samples of an input change within a step; {instead}")
-    if isinstance(control or system.control, EnergyControl):
-        raise UnsupportedError(f"tolerance: EnergyControl pushes once a step, and a series has long steps; {instead}")
-    if system.chooses:
-        raise UnsupportedError(
-            f"tolerance: {system!r} chooses between values (np.where, abs, minimum, floor, …), and a series does not see that "
-            f"another one is chosen within a step; {instead}"
-        )
-
-
-def _without_work(paces: Array) -> Array:
-    """The same where no control has done anything yet in this run."""
-    paces = paces.copy()
-    paces[engine.WORK] = 0.0
-    return paces
-
-
-def _aimed(paces: Array, target: float) -> Array:
-    """The same with another output time."""
-    paces = paces.copy()
-    paces[engine.TARGET] = target
-    return paces
-
-
-def order_of_series(method: Method, relative: Array) -> int:
-    """The order of a series for relative tolerances; 0 of a method that has one order.
-
-    Raises:
-        UnsupportedError: if they ask for different orders.
-    """
-    if not method.has_series or not relative.size:
-        return 0
-    from .reference import series_pace  # only such runs need it
-
-    least, most = (relative.item(),) * 2 if relative.size == 1 else (float(relative.min()), float(relative.max()))
-    order = series_pace.order_of(least)
-    if most != least and series_pace.order_of(most) != order:
-        raise UnsupportedError(
-            f"tolerance: expected tolerances of one order for all members, so that a member does not depend on others, got "
-            f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
-        )
-    return order
-
-
-def _paces_of(method: Method, carry: Any, carried_by: Any) -> Array:
-    """The numbers that say where the members stand of a run with a tolerance that goes on."""
-    if carried_by is None:
-        raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
-    by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
-    if by != method.name:
-        raise ArgumentError(f"carry: expected that of a run by {method.name}, got one by {by}")
-    numbers = _checks.numbers("carry", carry, finite=False)
-    if numbers.shape[:1] != (engine.PACE_NUMBERS,):
-        raise ShapeError(
-            f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
-            f"axis, got shape {numbers.shape}"
-        )
-    return numbers
-
-
-def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
-    """The relative one, and the absolute one of a pair."""
-    if isinstance(tolerance, list):
-        raise DTypeError(
-            "tolerance: expected a number, an array over the batch, or a tuple (relative, absolute), got a list, which might be "
-            "meant as either; make it a NumPy array or a tuple"
-        )
-    if not isinstance(tolerance, tuple):
-        return _checks.numbers("tolerance", tolerance, positive=True), None
-    if len(tolerance) != 2:
-        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(tolerance)} of them")
-    relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in tolerance)
-    return relative, absolute
-
-
-#: Why a member of a run with a tolerance stopped, in words.
-WHY_STOPPED = {
-    Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
-    "by the errors that the tolerance allows",
-    Status.NOT_FINITE: "no step, however small, gives finite numbers",
-}
-
-
-def _warn_of_stops(run: Run) -> None:
-    assert run.paces is not None
-    stopped = run.status != 0
-    time = float(run.paces.t[stopped].min())
-    first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
-    some = int(np.count_nonzero(stopped))
-    warnings.warn(
-        f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
-        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {WHY_STOPPED[Status(int(run.status[first]))]}",
-        ToleranceWarning,
-        stacklevel=4,
-    )
-
-
-def lost_in_tolerance(pace: Pace) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Members whose absolute tolerance is most of what a step may err, and much of the motion itself, shape (*batch)."""
-    lost = np.zeros(pace.t.shape, dtype=bool)
-    if not pace.absolute.any():
-        return lost
-    for square in (pace.longest_v, pace.longest_y):
-        longest = np.sqrt(square)
-        lost |= (longest > 0.0) & (pace.absolute > pace.relative * longest) & (pace.absolute > MAX_ABSOLUTE_SHARE * longest)
-    return lost
-
-
-def _warn_of_lost(pace: Pace) -> None:
-    """Warn of members that are lost in their absolute tolerance."""
-    lost = lost_in_tolerance(pace)
-    if lost.any():
-        warnings.warn(
-            f"tolerance: for {share(int(lost.sum()), lost.shape, lost.size)} the absolute part lets a step err by more "
-            f"than {MAX_ABSOLUTE_SHARE:g} of the longest that v or y has been; give one number, which goes by these lengths, or "
-            f"a smaller absolute part",
-            ToleranceWarning,
-            stacklevel=4,
-        )
-
-
-def _collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
-    """Which bodies were nearest in the last state that was finite: the member is run again up to there, alone."""
-    system, steps = plan.system, step - 1 - plan.first
-    assert isinstance(system, NBody)
-    alone, y = system.member(index, plan.batch), _checks.member(y, index)
-    if steps > 0:
-        force = None if plan.force is None else _checks.member(plan.force, index)
-        again = plan._replace(system=alone, batch=(), steps=steps, every=None, progress=None, record=(), force=force)
-        y = engine.advance(again, _checks.member(v, index), y, carried=carried).y[-1]
-    bodies, distance = alone.closest(y)
-    return Collision(index, step, bodies, distance)
-
-
 def _kept(array: Array) -> Array:
     """A copy that is as small as what it was spread from."""
     own = array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)].copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
-
-
-def fits_together(system: System, method: Method) -> None:
-    """Raise if the method cannot do the system."""
-    if method.has_series and getattr(system, "push", None) is not None:
-        raise UnsupportedError(
-            f"control: {method.name} goes with projections, not with {system.keeper!r}, which is a part of the rates; use dop853"
-        )
-    if not method.needs_acceleration:
-        return
-    if not system.second_order:
-        raise UnsupportedError(f"{method.name} needs a second-order system, ÿ = a(t, y); {system!r} is not one")
-    if (term := system.uncontrolled.velocity_term) is not None:
-        raise UnsupportedError(
-            f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {term}; "
-            f"use false_euler{'' if term == 'forces that do' else f', or leave {term} out'}"
-        )
-    if system.keeper is not None and method.carry is not None:
-        raise UnsupportedError(
-            f"control: {method.name} goes on with {method.carry} in place of v, so it cannot be combined with {system.keeper!r}, "
-            f"which changes v between steps; use pefrl or false_euler"
-        )
-
-
-def not_of_a_step(control: Any) -> None:
-    """Raise if a control cannot go with steps whose length changes."""
-    if getattr(control, "relative", None) is not None and control.gain is None:
-        raise UnsupportedError(
-            f"tolerance: {control!r} relates its gain to steps of fixed length; give gain in place of relative"
-        )
-    if getattr(control, "of_a_step", False):
-        raise UnsupportedError(
-            f"tolerance: {control!r} is relative to steps of fixed length; use a projection, which goes with any steps"
-        )
-
-
-def _quantities(system: System, record: Any) -> list[str]:
-    """What to record, each once; raise if the system does not have it."""
-    if type(record) is tuple and not record:
-        return []
-    given = [record] if isinstance(record, str) else [] if record is None else _checks.several("record", record, "quantities")
-    known = list(dict.fromkeys(["energy", *system.quantities]))
-    for name in given:
-        _checks.known("record", name, known)
-    if "energy" in given and "energy" not in system.quantities:
-        v, y = (np.zeros((*shape, *system.batch)) for shape in (system.v_shape, system.y_shape))
-        system.energy(v, y)  # raises if there is none, before any work
-    return list(dict.fromkeys(given))
-
-
-def _goes_on_by_a_rule(system: System) -> None:
-    """Raise if an input cannot be carried by a power of the transition matrix."""
-    for name, given in system.given_inputs().items():
-        if isinstance(given, Sampled) and not given.constant:
-            raise UnsupportedError(
-                f"form: many steps are one power only if the inputs go on by a rule, as constants and sinusoids do, but {name} "
-                f"changes from sample to sample; use form='matrix' or 'direct'"
-            )
-
-
-def _spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Array:
-    """A state over the whole batch."""
-    axes = array.shape[len(block) :]
-    if axes == batch:
-        return array
-    if not array.ndim:
-        return _checks.over(array, batch)
-    return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
-
-
-def _bar(title: str) -> Any:
-    from ._progress import bar
-
-    return bar(title)
 
 
 def _warn(run: Run, before: Whole | None) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from . import _checks
 from ._brief import MAX_LINE, counted, facts, share, shortened
 from ._checks import Array
-from ._encounters import Encounter
+from ._encounters import Collision, Encounter
 from ._value import Value, by_value
 from .errors import UnsupportedError
 from .methods import Method
@@ -48,22 +48,6 @@ class Status(IntEnum):
     NOT_FINITE = 4
     #: A terminal event stopped it; ``Run.stopped_at`` says when.
     EVENT = 5
-
-
-class Collision(NamedTuple):
-    """Two bodies that were nearest to each other when a member left the finite range.
-
-    Attributes:
-        member: index of the member in the batch.
-        step: number of the first step that was not finite.
-        bodies: the two.
-        distance: between them, one step before.
-    """
-
-    member: tuple[int, ...]
-    step: int
-    bodies: tuple[int, int]
-    distance: float
 
 
 @by_value

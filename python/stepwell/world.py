@@ -11,9 +11,9 @@ import numpy as np
 from . import _checks, _core, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
+from .compatible import fits_together, forced, goes_on_alike, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
-from .integrate import fits_together, forced, goes_on_alike, velocities
 from .methods import Method
 from .methods import method as find_method
 from .systems import System

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -27,9 +28,9 @@ class Single(Workload):
 
     beside: ClassVar[tuple[str, ...]] = ("C", "C, exact")
 
+    @abstractmethod
     def growth(self) -> float:
         """How many times as large a difference may become by the end."""
-        raise NotImplementedError
 
     @cached_property
     def rounding(self) -> float:  # type: ignore[override]

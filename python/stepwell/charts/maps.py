@@ -13,8 +13,9 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from .._value import Value
+from ..compatible import fits_together
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
-from ..integrate import fits_together, integrate
+from ..integrate import integrate
 from ..methods import Method
 from ..methods import method as find_method
 from ..stability import analyse

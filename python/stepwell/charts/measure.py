@@ -13,8 +13,9 @@ import numpy as np
 
 from .. import engine
 from .._checks import Array
+from ..compatible import fits_together
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
-from ..integrate import fits_together, integrate
+from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
 from ..scenes import Scene

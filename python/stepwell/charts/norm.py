@@ -13,9 +13,10 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from .._value import Value
+from ..compatible import fits_together
 from ..control import NormControl, Projection
 from ..errors import ArgumentError, DivergenceWarning, ShapeError
-from ..integrate import fits_together, integrate
+from ..integrate import integrate
 from ..methods import Method, choice
 from ..result import Run
 from ..systems import RigidBody

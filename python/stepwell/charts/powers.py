@@ -16,8 +16,9 @@ from .. import _checks, _core
 from .._checks import Array
 from .._value import Value
 from .._words import RunForm
+from ..compatible import fits_together
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..integrate import fits_together, integrate
+from ..integrate import integrate
 from ..methods import Method
 from ..methods import method as find_method
 from ..result import Run

@@ -12,9 +12,9 @@ from .. import _checks
 from .._brief import share
 from .._checks import Array
 from .._value import Value
+from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
 from ..errors import ArgumentError, DivergenceWarning
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..reference.log import log

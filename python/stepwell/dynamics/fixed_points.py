@@ -12,8 +12,8 @@ from .. import _checks
 from .._brief import MAX_LINE, brief, shortened, table
 from .._checks import Array
 from .._value import Value
+from ..compatible import fits_together
 from ..errors import ArgumentError, ShapeError
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..stability import eigen, maps

@@ -12,9 +12,10 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 from .. import _checks, _core, _single, engine
+from ..compatible import fits_together, not_of_a_step
 from ..control import AnyControl, a_control
+from ..engine.linear import matrix_model
 from ..errors import ArgumentError, UnsupportedError
-from ..integrate import fits_together, not_of_a_step
 from ..methods import Method
 from ..methods import method as find_method
 from ..methods import methods as every_method
@@ -130,7 +131,7 @@ def explain(
 
 
 def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
-    model = engine.matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
+    model = matrix_model(plan, **matrix_of(plan)) if plan.form == "matrix" else engine.model(plan)
     what: dict[str, Any] = {"system": plan.system, "method": plan.method, "members": plan.members}
     what |= {"fused": plan.fused, "attempt": attempt, "form": plan.form, "dtype": "float32" if plan.single else "float64"}
     parts = _core.in_parts(model, plan.members, attempts=attempt)

@@ -13,9 +13,9 @@ import numpy as np
 
 from .. import _checks, _single, engine
 from .._checks import Array, Shape
+from ..compatible import fits_together
 from ..control import AnyControl, ConstraintControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import System

@@ -22,7 +22,6 @@ from ..equations.definition import Definition
 from ..equations.trace import Equations
 from ..errors import ArgumentError
 from ..events.result import Occurrences
-from ..integrate import _collision
 from ..methods import Method
 from ..methods import method as find_method
 from ..reference.traced import Tracer
@@ -34,7 +33,7 @@ Arrays = dict[str, Any]
 
 #: What goes through the steps of a run again, under the names of its attributes; see ``Run``.
 RERUNS: dict[str, Callable[..., Any]] = {
-    "collision": _collision,
+    "collision": _encounters.collision,
     "encounter": _encounters.of_member,
     "overshoots": _encounters.overshoots,
 }

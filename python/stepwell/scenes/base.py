@@ -14,9 +14,10 @@ from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
+from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
-from ..integrate import integrate, velocities
+from ..integrate import integrate
 from ..methods import Method
 from ..result import Run
 from ..systems import System

@@ -15,8 +15,8 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from .._value import Value
+from ..compatible import fits_together
 from ..errors import ArgumentError, DTypeError
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..result import Run

@@ -10,8 +10,8 @@ from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
+from ..compatible import fits_together
 from ..errors import ArgumentError, DTypeError, ShapeError
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..result import Run

@@ -6,10 +6,10 @@ from collections import Counter
 from typing import NamedTuple
 
 from .. import _core
+from ..compatible import fits_together
 from ..engine import Plan, evaluations
 from ..errors import ShapeError
 from ..explanation.listing import written
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import Oscillator, System

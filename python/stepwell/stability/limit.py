@@ -17,8 +17,8 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
+from ..compatible import fits_together
 from ..errors import UnsupportedError
-from ..integrate import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import LinearSystem, Springs, System

@@ -14,6 +14,7 @@ import numpy as np
 from .. import _checks, engine
 from .._checks import Array, Shape
 from ..derivatives import traced
+from ..engine import linear
 from ..methods import Method
 from ..reference.types import Blocks
 from ..systems import System
@@ -36,7 +37,7 @@ def transition(system: System, method: Method, dt: Array) -> Array:
     """
     free = system.without_inputs()
     if dt.ndim == 0:
-        return engine.transition(engine.Plan(free, method, free.batch, float(dt)))
+        return linear.transition(engine.Plan(free, method, free.batch, float(dt)))
     members = np.broadcast_shapes(dt.shape, free.batch)
     return rows(free, *_step(free, method, dt, (sum(size(free)), *members), *unit(free, members)))
 
@@ -48,7 +49,7 @@ def response(system: System, method: Method, dt: Array, members: Shape) -> Array
     for j, name in enumerate(system.input_names):
         held = system.with_pulse(name, np.ones(1), 1.0)
         if dt.ndim == 0:
-            one = engine.one_step(engine.Plan(held, method, held.batch, float(dt)))
+            one = linear.one_step(engine.Plan(held, method, held.batch, float(dt)))
             q[:, j] = one.reshape(n, *(1,) * (len(members) - one.ndim + 1), *one.shape[1:])
         else:
             v, y = (np.zeros((*shape, 1, *members)) for shape in (system.v_shape, system.y_shape))

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from .._checks import Array
-from ..integrate import fits_together
+from ..compatible import fits_together
 from ..methods import Method
 from ..methods import method as find_method
 from ..systems import LinearSystem, Springs

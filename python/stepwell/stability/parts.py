@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
+from ..compatible import fits_together
 from ..errors import UnsupportedError
-from ..integrate import fits_together
 from ..methods import Method
 from ..systems import LinearSystem
 from . import eigen, exact, maps

@@ -9,9 +9,9 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
 from ..engine import PACE_NUMBERS, pace_of
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..integrate import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
 from ..methods import Method
 from ..result import Run, Status
 from .axes import Grid

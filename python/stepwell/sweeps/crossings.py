@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,9 +129,9 @@ class _Seeing(Reduction):
         self.passed(_States(piece.run, self.outcome, t, value, v, y))
         self.before = _State(float(t[-1]), value[-1].copy(), v[-1].copy(), y[-1].copy())
 
+    @abstractmethod
     def passed(self, states: _States) -> None:
         """Take the passages between states into account."""
-        raise NotImplementedError
 
 
 class _States:

@@ -5,6 +5,7 @@ Reductions see the states of a run piece by piece and keep a few numbers of each
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
@@ -54,16 +55,16 @@ def together(parts: Iterable[Found]) -> Found:
     return found
 
 
-class Reduction:
+class Reduction(ABC):
     """Sees pieces of a run, in their order, and keeps what it needs."""
 
+    @abstractmethod
     def see(self, piece: Piece) -> None:
         """Take the new states of a piece into account."""
-        raise NotImplementedError
 
+    @abstractmethod
     def found(self) -> Found:
         """The results, by name."""
-        raise NotImplementedError
 
 
 class Outcome(Value):

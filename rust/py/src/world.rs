@@ -164,7 +164,7 @@ impl<T: Of> Loop<T> {
     }
 }
 
-/// What is read of a plan: see `Plan` in `engine.py`.
+/// What is read of a plan: see `Plan` in `engine/plan.py`.
 #[derive(FromPyObject)]
 struct WorldPlan {
     t0: f64,

@@ -1,0 +1,73 @@
+"""Slots in, slots out: the same run by the Rust core or by the NumPy reference, in direct, matrix or power form.
+
+A slot is the array that holds a block between steps: v for most methods, the carry for those that have one. Everything
+above this folder works with states, everything below with slots.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+
+from .. import _core
+from .adaptive import (
+    ABSOLUTE,
+    COUNTS,
+    HELD,
+    PACE_NUMBERS,
+    RELATIVE,
+    STEP,
+    TARGET,
+    TIME,
+    WORK,
+    Adapted,
+    AdaptiveArrays,
+    Pacing,
+    adapt,
+    attempt_by_numpy,
+    attempts,
+    begun,
+    evaluations,
+    pace_of,
+    paces,
+)
+from .direct import advance
+from .plan import Arrays, Outcome, Plan, Watched, model, pushes
+
+__all__ = [
+    "ABSOLUTE",
+    "COUNTS",
+    "HELD",
+    "PACE_NUMBERS",
+    "RELATIVE",
+    "STEP",
+    "TARGET",
+    "TIME",
+    "WORK",
+    "Adapted",
+    "AdaptiveArrays",
+    "Arrays",
+    "Outcome",
+    "Pacing",
+    "Plan",
+    "Watched",
+    "adapt",
+    "advance",
+    "attempt_by_numpy",
+    "attempts",
+    "begun",
+    "evaluations",
+    "model",
+    "pace_of",
+    "paces",
+    "pushes",
+]
+
+if hasattr(os, "register_at_fork"):
+    #: Whether there was another thread when the process forked: what it was compiling or had locked stays so in the child.
+    _others: list[bool] = []
+    os.register_at_fork(
+        before=lambda: _others.append(threading.active_count() > 1),
+        after_in_parent=lambda: _others.clear(),
+        after_in_child=lambda: _core.forget() if _others.pop() else None,
+    )
