@@ -20,34 +20,45 @@ const MAX_SHARED: usize = 12;
 /// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case: fewer waits
 /// then gain more than spills cost.
 const MAX_WAITING_PER_REGISTER: usize = 2;
+/// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are, by
+/// other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would leave gaps.
+const MAX_BEHIND: usize = 3;
+const MIN_OPERATIONS_PER_BEHIND: usize = 6;
 /// Of the operations whose operands are made or under way, so many are compared, from the first one on.
 const MAX_COMPARED: usize = 64;
 /// A CPU begins two operations on long vectors in a cycle.
 const CYCLES_PER_OPERATION: f64 = 0.5;
 
-/// Operation after operation, each for all vectors that are interleaved.
-pub fn in_turn(operations: usize, shape: Shape) -> Order {
+/// Operation after operation, each for all vectors that are interleaved; each vector is so many operations behind the one before it.
+pub fn in_turn(operations: usize, shape: Shape, behind: usize) -> Order {
     let mut order = Vec::with_capacity(operations * shape.block_vectors);
     for first in (0..shape.block_vectors).step_by(shape.interleaved) {
         let team = first..shape.block_vectors.min(first + shape.interleaved);
-        order.extend((0..operations).flat_map(|i| team.clone().map(move |vector| (i, vector))));
+        let moments = 0..operations + behind * (team.len() - 1);
+        let at =
+            |now: usize| team.clone().enumerate().filter_map(move |(j, vector)| Some((now.checked_sub(behind * j)?, vector)));
+        order.extend(moments.flat_map(at).filter(|(i, _)| *i < operations));
     }
     order
 }
 
 /// The order in which a plan is written; `ops` are the operations of its body.
 pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order {
-    let order = in_turn(plan.steps.len(), shape);
     let interleaves = shape.interleaved.min(shape.block_vectors) > 1;
     let is_single = shape.width == 1 && shape.block_vectors == 1;
     let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
     // A state that is in registers leaves none to interleaved vectors for more results that wait.
     let is_best =
         if interleaves { shape.resident || shared > MAX_SHARED } else { !is_single && plan.steps.len() < MIN_STEP_OPERATIONS };
+    // With 16 registers a distance gains here what it loses there.
+    let behind = if shape.registers() > 16 { MAX_BEHIND.min(plan.steps.len() / MIN_OPERATIONS_PER_BEHIND) } else { 0 };
     if is_best {
-        return order;
+        return in_turn(plan.steps.len(), shape, behind);
     }
     let waits = Waits::of(plan, ops);
+    // Roots and quotients have one unit for all vectors, for which they wait as it is.
+    let has_slow = (0..plan.steps.len()).any(|i| waits.is_slow(i));
+    let order = in_turn(plan.steps.len(), shape, if has_slow { 0 } else { behind });
     // The other registers hold shared numbers and the state.
     let fit = shape.registers() * 3 / 4;
     if interleaves {

@@ -65,7 +65,7 @@ fn assemble_plan<M: Machine>(body: &Body, packed: Option<&Packed>, shape: Shape)
     let order = match packed {
         None => schedule::order(&plan, &body.ops, shape),
         // Its order is that of the model by which the packing was chosen.
-        Some(_) => schedule::in_turn(plan.steps.len(), shape),
+        Some(_) => schedule::in_turn(plan.steps.len(), shape, 0),
     };
     let (code, spills) = loops::function(&plan, machine, shape, &order)?;
     let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));

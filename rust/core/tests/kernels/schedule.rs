@@ -1,6 +1,9 @@
 //! The order in which operations are written.
 
-use stepwell_core::kernel::writer::{Order, Waits};
+use stepwell_core::{
+    isa::Level,
+    kernel::writer::{Order, Shape, Waits, in_turn},
+};
 
 use crate::random::Random;
 
@@ -16,6 +19,22 @@ fn of_one(operations: usize) -> Order {
 
 fn indices(order: &Order) -> Vec<usize> {
     order.iter().map(|(i, _)| *i).collect()
+}
+
+fn interleaved(block_vectors: usize, interleaved: usize) -> Shape {
+    Shape { level: Level::Avx512, bytes: 8, width: 8, block_vectors, interleaved, blocks: 1, resident: false }
+}
+
+#[test]
+fn a_vector_is_behind_the_one_before() {
+    let together = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)];
+    assert_eq!(in_turn(3, interleaved(2, 2), 0), together);
+    let behind = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (2, 1)];
+    assert_eq!(in_turn(3, interleaved(2, 2), 1), behind);
+    // Three vectors, of which two are interleaved; the third comes behind both.
+    assert_eq!(in_turn(2, interleaved(3, 2), 1), [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]);
+    // Further behind than a step is long: one vector after the other.
+    assert_eq!(in_turn(2, interleaved(2, 2), 5), [(0, 0), (1, 0), (0, 1), (1, 1)]);
 }
 
 #[test]
@@ -62,7 +81,7 @@ fn each_operation_comes_once_and_after_its_operands() {
             of.dedup();
         }
         let waits = sums(operands.clone());
-        let order: Order = (0..operations).flat_map(|i| (0..vectors).map(move |vector| (i, vector))).collect();
+        let order = in_turn(operations, interleaved(vectors, vectors), round % 5);
         let order = if vectors == 1 { waits.longest_first(order) } else { order };
         for most in [2, 8, 64] {
             let made = waits.shortened(&order, most);
