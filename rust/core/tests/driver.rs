@@ -11,7 +11,7 @@ use stepwell_core::{
     isa::{Level, UnknownLevel},
     run::{
         Machine, Model,
-        batch::{Arrays, Plan, kept, run, save},
+        batch::{Arrays, Plan, Steppable, kept, run, save},
         stage::{Clock, PreparedStage, Stage},
         world::World,
     },
@@ -33,11 +33,17 @@ fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) ->
     Plan { model, clock: clock(h), machine: machine(threads), first: 0, steps, every: None, v, y, members, carried: false }
 }
 
-type Last = (Vec<f64>, Vec<f64>, Vec<i64>);
+type Last<T = f64> = (Vec<T>, Vec<T>, Vec<i64>);
 
 /// The last v and y from v = 0 and y = 1, and the steps at which members diverged.
 fn last(plan: &Plan) -> Result<Last, Error> {
-    let (mut v, mut y, mut bad) = (vec![0.0; plan.members], vec![0.0; plan.members], vec![-1; plan.members]);
+    last_of(plan)
+}
+
+/// The same, of either precision.
+fn last_of<T: Steppable>(plan: &Plan) -> Result<Last<T>, Error> {
+    let [mut v, mut y] = [(); 2].map(|()| vec![T::of(0.0); plan.members]);
+    let mut bad = vec![-1; plan.members];
     let arrays =
         Arrays { saved_v: &mut v, saved_y: &mut y, recorded: &mut [], tally: &mut [], carry: &mut [], first_bad: &mut bad };
     run(plan, arrays, &mut |_| true)?;
@@ -74,17 +80,7 @@ fn a_batch_of_any_size_is_its_members() {
     // Tiles of several interleaved vectors, narrow ones of one vector, and single members, one or several after another: sizes around
     // each.
     let omega: Vec<f64> = (0..385).map(|i| 0.5 + f64::from(i) / 200.0).collect();
-    let pendulums = |members: usize| {
-        let one = |x: &'static f64| vec![Row(std::slice::from_ref(x))];
-        let rows = [
-            ("omega", vec![Row(&omega[..members])]),
-            ("damping", one(&0.2)),
-            ("a.amplitude", one(&0.7)),
-            ("a.omega", one(&1.1)),
-            ("a.phase", one(&0.3)),
-        ];
-        model(spec("pendulum", Of { rows: &rows, ..Of::default() }), "rk4")
-    };
+    let pendulums = |members: usize| driven_pendulums(&omega[..members]);
     let (v, y, _) = last(&plan(pendulums(385), 0.1, 50, 385, 1)).unwrap();
     let whole = pendulums(385);
     let tile = |members: usize| whole.lanes::<f64>(&whole.traced().unwrap(), machine(1), members, 1e9).unwrap();
@@ -94,6 +90,46 @@ fn a_batch_of_any_size_is_its_members() {
         let (some_v, some_y, _) = last(&plan(pendulums(members), 0.1, 50, members, 1)).unwrap();
         assert_eq!((&some_v[..], &some_y[..]), (&v[..members], &y[..members]), "{members} members");
     }
+}
+
+/// Sines of the state of each member, and one of the time that all share.
+fn driven_pendulums(omega: &[f64]) -> Model<'_> {
+    let one = |x: &'static f64| vec![Row(std::slice::from_ref(x))];
+    let rows = [
+        ("omega", vec![Row(omega)]),
+        ("damping", one(&0.2)),
+        ("a.amplitude", one(&0.7)),
+        ("a.omega", one(&1.1)),
+        ("a.phase", one(&0.3)),
+    ];
+    model(spec("pendulum", Of { rows: &rows, ..Of::default() }), "rk4")
+}
+
+#[test]
+fn machine_code_has_the_bits_of_the_interpreter_in_both_precisions() {
+    fn compare<T: Steppable>() {
+        let omega: Vec<f64> = (0..101).map(|i| 0.5 + f64::from(i) / 50.0).collect();
+        let steps = 1000; // of which the last are made by machine code, even of a single member
+        let at = |level: Level, members: usize, fused: bool| {
+            let mut plan = plan(driven_pendulums(&omega[..members]), 0.1, steps, members, 1);
+            plan.machine.level = level;
+            (plan.model.scene.precision, plan.model.scene.fused) = (T::PRECISION, fused);
+            last_of::<T>(&plan).unwrap()
+        };
+        for fused in [false, true] {
+            let (v, y, _) = at(Level::Baseline, 101, fused);
+            assert!(v.iter().all(|v| v.wide().abs() < 10.0) && v[0] != v[1]);
+            for level in Level::available() {
+                for members in [1, 2, 5, 101] {
+                    let (some_v, some_y, bad) = at(level, members, fused);
+                    assert_eq!((&some_v[..], &some_y[..]), (&v[..members], &y[..members]), "{level:?}, {members} members");
+                    assert!(bad.iter().all(|step| *step == -1));
+                }
+            }
+        }
+    }
+    compare::<f64>();
+    compare::<f32>();
 }
 
 #[test]

@@ -6,7 +6,6 @@
 use super::shape::Shape;
 use crate::{
     isa::Level,
-    real::Precision,
     tape::{Op, split::Body},
 };
 
@@ -19,12 +18,7 @@ const MAX_ROW_BYTES: usize = 12 << 10;
 
 /// The shape for a run of so many members; none if the level has no machine code.
 pub fn choose(body: &Body, level: Level, members: usize) -> Option<Shape> {
-    is_written(body, level).then(|| fastest(body, level, members))
-}
-
-/// Whether there is machine code of this precision. That of NEON is for numbers of 64 bits only.
-fn is_written(body: &Body, level: Level) -> bool {
-    level > Level::Baseline && (level, body.precision) != (Level::Neon, Precision::Single)
+    (level > Level::Baseline).then(|| fastest(body, level, members))
 }
 
 /// The shape for rows of so many numbers, each a number of a long block; none if they are not whole vectors.
@@ -36,7 +30,7 @@ pub fn choose_long(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
         Level::Neon => 16 / bytes,
         _ => 32 / bytes,
     };
-    let fits = is_written(body, level) && lanes.is_multiple_of(width);
+    let fits = level > Level::Baseline && lanes.is_multiple_of(width);
     let vectors = lanes / width;
     let block_vectors = [4, 2, 1].into_iter().find(|n| vectors.is_multiple_of(*n))?;
     fits.then_some(Shape { level, bytes, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })

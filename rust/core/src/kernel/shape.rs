@@ -59,8 +59,6 @@ impl Shape {
     pub(super) fn is_possible(&self, body: &Body, most_operations: usize) -> bool {
         let is_known = match self.level {
             Level::Baseline => false,
-            // There are no instructions on single numbers of 32 bits for all operations.
-            Level::Neon if self.bytes == 4 => false,
             Level::Neon => self.width == 1 || self.width * self.bytes == 16,
             Level::Avx2 => self.width == 1 || self.width * self.bytes == 32,
             Level::Avx512 => self.width == 1 || matches!(self.width * self.bytes, 32 | 64),

@@ -1,7 +1,6 @@
 //! Kernels under an emulator.
 
 use std::{
-    collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
     process::Command,
@@ -12,17 +11,19 @@ use crate::{
     random::{self, Random},
 };
 use stepwell_core::{
+    functions,
     isa::Level,
     kernel::{
         interpret::Interpreter,
         writer::{Assembled, Shape, assemble, choose},
     },
-    tape::{Op, split::Body},
+    number::{Symbol, record},
+    real::{Precision, Real},
+    tape::{Op, Tape, split::Body},
 };
 
 const COMPILER: &str = "aarch64-linux-gnu-gcc";
 const EMULATOR: &str = "qemu-aarch64";
-const DISASSEMBLER: &str = "aarch64-linux-gnu-objdump";
 
 /// How many kernels are run with how many numbers of steps each, unless `STEPWELL_EMULATED` says how many.
 const KERNELS: u64 = 1000;
@@ -32,15 +33,15 @@ const STEPS: [usize; 3] = [1, 2, 7];
 const ROUNDING: [u64; 2] = [0, 1 << 22 | 1 << 24 | 1 << 25];
 
 /// A kernel with inputs.
-struct Case {
+pub struct Case<T> {
     seed: u64,
-    body: Body,
-    assembled: Assembled,
-    inputs: Inputs,
+    pub body: Body,
+    pub assembled: Assembled,
+    inputs: Inputs<T>,
 }
 
-impl Case {
-    fn all(seed: u64) -> Vec<Case> {
+impl<T: Real> Case<T> {
+    pub fn all(seed: u64) -> Vec<Case<T>> {
         let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95) ^ 0xA64);
         let operations = match random.below(8) {
             0 => 3 + random.below(6),
@@ -49,15 +50,20 @@ impl Case {
         };
         let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
         let body = random::body(random, operations, states);
+        Case::of(seed, random, if T::PRECISION == Precision::Single { random::in_single(body) } else { body })
+    }
+
+    /// A random body or another one, in a random shape.
+    fn of(seed: u64, random: &mut Random, body: Body) -> Vec<Case<T>> {
         let shape = if random.once_in(4) {
             choose(&body, Level::Neon, random.one_of(&[1, 2, 3, 4, 9, 60, 1000])).unwrap()
         } else {
-            let width = 1 + random.below(2);
-            shape(random, Level::Neon, width)
+            let width = random.one_of(&[1, 16 / size_of::<T>()]);
+            Shape { bytes: size_of::<T>(), ..shape(random, Level::Neon, width) }
         };
         let assembled = assemble(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
         let case = |steps| {
-            let inputs = Inputs::<f64>::new(random, &body, shape.lanes(), steps);
+            let inputs = Inputs::new(random, &body, shape.lanes(), steps);
             Case { seed, body: body.clone(), assembled: assembled.clone(), inputs }
         };
         STEPS.map(case).into()
@@ -71,18 +77,26 @@ impl Case {
         code.resize(code.len().next_multiple_of(8), 0);
         let sizes = [code.len(), inputs.state.len(), inputs.rows.len(), pool.len(), inputs.per_step.len(), inputs.held.len()];
         let rounding = ROUNDING[self.seed as usize % 2];
-        let head =
-            sizes.map(|size| size as u64).into_iter().chain([assembled.frame.scratch as u64, inputs.steps as u64, rounding, 0]);
-        let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
+        let (scratch, steps, size) = (assembled.frame.scratch as u64, inputs.steps as u64, size_of::<T>() as u64);
+        let head = sizes.map(|size| size as u64).into_iter().chain([scratch, steps, rounding, size]);
+        let bytes = |numbers: &[T]| numbers.iter().flat_map(|x| x.pattern().to_le_bytes()[..size_of::<T>()].to_vec()).collect();
         to.extend(head.flat_map(u64::to_le_bytes));
         to.extend(code);
-        let numbers = [bits(&inputs.state), bits(&inputs.rows), bits(&pool), inputs.per_step.clone(), bits(&inputs.held)];
-        to.extend(numbers.into_iter().flatten().flat_map(u64::to_le_bytes));
+        let per_step = inputs.per_step.iter().copied().flat_map(u64::to_le_bytes).collect();
+        let arrays: [Vec<u8>; 5] = [bytes(&inputs.state), bytes(&inputs.rows), bytes(&pool), per_step, bytes(&inputs.held)];
+        to.extend(arrays.concat());
     }
 }
 
+/// The next so many bytes as an integer; None if there are fewer.
+fn next(bytes: &mut &[u8], count: usize) -> Option<u64> {
+    let (of, rest) = bytes.split_at_checked(count)?;
+    *bytes = rest;
+    Some(of.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte)))
+}
+
 /// The compiled runner; None where there is no compiler or no emulator, and it has been said.
-fn runner(files: &str) -> Option<PathBuf> {
+pub fn runner(files: &str) -> Option<PathBuf> {
     for program in [COMPILER, EMULATOR] {
         if !crate::has(program) {
             crate::skipped(&format!("there is no {program}"));
@@ -99,7 +113,7 @@ fn runner(files: &str) -> Option<PathBuf> {
 
 /// Runs all and compares with the interpreter; how many numbers are the same, or what is the first that is not. Tests that run at the same
 /// time use files of their own.
-fn compare(runner: &Path, cases: &[Case], files: &str) -> Result<usize, String> {
+pub fn compare<T: Real>(runner: &Path, cases: &[Case<T>], files: &str) -> Result<usize, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let [from, to] = ["cases", "states"].map(|kind| folder.join(format!("aarch64-{files}-{kind}")));
     let mut bytes = Vec::new();
@@ -107,14 +121,14 @@ fn compare(runner: &Path, cases: &[Case], files: &str) -> Result<usize, String> 
     fs::write(&from, &bytes).unwrap();
     let ran = Command::new(EMULATOR).args([runner, &from, &to]).output().unwrap();
     let out = fs::read(&to).unwrap();
-    let mut numbers = out.as_chunks().0.iter().map(|bits| u64::from_le_bytes(*bits));
+    let mut out = &out[..];
     let mut compared = 0;
     for Case { seed, body, assembled, inputs } in cases {
         let (shape, lanes, steps) = (assembled.shape, assembled.shape.lanes(), inputs.steps);
         let about = format!("seed {seed}, {shape:?}, {steps} steps");
         let want = inputs.run(&Interpreter::new(body, lanes, Level::Baseline), &mut Vec::new());
         for (at, want) in want.iter().enumerate() {
-            let Some(got) = numbers.next().map(f64::from_bits) else {
+            let Some(got) = next(&mut out, size_of::<T>()).map(T::from_pattern) else {
                 return Err(format!("{about}: {} {}", ran.status, String::from_utf8_lossy(&ran.stderr)));
             };
             if !same(*want, got) {
@@ -122,110 +136,56 @@ fn compare(runner: &Path, cases: &[Case], files: &str) -> Result<usize, String> 
             }
             compared += 1;
         }
-        if numbers.next() != Some(0) {
+        if next(&mut out, 8) != Some(0) {
             return Err(format!("{about}: registers that belong to the caller have changed"));
         }
     }
-    if !ran.status.success() || numbers.next().is_some() {
+    if !ran.status.success() || !out.is_empty() {
         return Err(String::from_utf8_lossy(&ran.stderr).into_owned());
     }
     Ok(compared)
 }
 
 /// `STEPWELL_EMULATED` says how many kernels.
-#[test]
-fn random_bodies_have_the_bits_of_the_interpreter() {
-    let Some(runner) = runner("random") else { return };
+fn compare_random<T: Real>(files: &str) {
+    let Some(runner) = runner(files) else { return };
     let kernels = std::env::var("STEPWELL_EMULATED").ok().and_then(|n| n.parse().ok()).unwrap_or(KERNELS);
     let mut compared = 0;
     for first in (0..kernels).step_by(500) {
-        let cases: Vec<Case> = (first..kernels.min(first + 500)).flat_map(Case::all).collect();
-        compared += compare(&runner, &cases, "random").unwrap_or_else(|wrong| panic!("{wrong}"));
+        let cases: Vec<Case<T>> = (first..kernels.min(first + 500)).flat_map(Case::all).collect();
+        compared += compare(&runner, &cases, files).unwrap_or_else(|wrong| panic!("{wrong}"));
     }
     println!("{kernels} kernels, {compared} numbers compared");
     assert!(compared as u64 > 20 * kernels);
 }
 
-/// Mistakes: what is written, which bits of a word say so, and a wrong word for these bits.
-const MISTAKES: [(&str, u32, u32, u32); 12] = [
-    ("a sum for a difference", 0xFFE0_FC00, 0x4EE0_D400, 0x4E60_D400),
-    ("less or equal for less", 0xFFE0_FC00, 0x6EE0_E400, 0x6E60_E400),
-    ("less for less or equal", 0xFFE0_FC00, 0x6E60_E400, 0x6EE0_E400),
-    ("a fused sum for a fused difference", 0xFFE0_FC00, 0x4EE0_CC00, 0x4E60_CC00),
-    ("a fused difference with the wrong sign, of one number", 0xFFE0_8000, 0x1F60_8000, 0x1F40_8000),
-    ("the other choice", 0xFFE0_FC00, 0x6E60_1C00, 0x6EE0_1C00),
-    ("the other place", 0xFFE0_FC00, 0x6EA0_1C00, 0x6EE0_1C00),
-    ("to the nearest whole number for downwards", 0xFFFF_FC00, 0x4E61_9800, 0x4E61_8800),
-    ("the sign moved down with the bits", 0xFF80_FC00, 0x6F00_0400, 0x4F00_0400),
-    ("one number in the first lane only", 0xFFFF_FC00, 0x4E08_0400, 0x5E08_0400),
-    ("rounding as the caller does", u32::MAX, 0xD51B_441F, 0xD503_201F),
-    ("a register of the caller not given back", u32::MAX, 0x6D41_2FEA, 0xD503_201F),
-];
-
 #[test]
-fn every_mistake_is_noticed() {
-    let Some(runner) = runner("mistakes") else { return };
-    for (what, bits, right, wrong) in MISTAKES {
-        assert_eq!(right & !bits, 0, "{what}");
-        // Few kernels show some of them: a wrong number may be lost in a choice.
-        let is_noticed = (0..300).step_by(60).any(|first| {
-            let mut made = 0;
-            let mut cases: Vec<Case> = (first..first + 60).flat_map(Case::all).collect();
-            for word in cases.iter_mut().flat_map(|case| case.assembled.code.as_chunks_mut().0) {
-                let old = u32::from_le_bytes(*word);
-                if old & bits == right {
-                    *word = (old ^ right ^ wrong).to_le_bytes();
-                    made += 1;
-                }
-            }
-            made > 0 && compare(&runner, &cases, "mistakes").is_err()
-        });
-        assert!(is_noticed, "{what}");
-    }
+fn random_bodies_have_the_bits_of_the_interpreter() {
+    compare_random::<f64>("random");
 }
 
-/// What kernels are made of. What is not here is not exact, or not the same on all machines.
-#[rustfmt::skip]
-const KNOWN: [&str; 43] = [
-    "fadd", "fsub", "fmul", "fdiv", "fsqrt", "fneg", "frintm", "fmadd", "fmsub", "fnmsub", "fmla", "fmls", "fcmeq", "fcmgt", "fcmge",
-    "and", "orr", "eor", "bsl", "bit", "bif", "add", "shl", "ushr", "mov", "dup", "movk", "sub", "subs", "b.ne", "b.eq", "b", "ret", "nop",
-    "ldr", "str", "ldp", "stp", "mrs", "msr", "fmov", "movz", "movn",
-];
-
-/// The instructions of a kernel, as a disassembler names them.
-fn mnemonics(code: &[u8]) -> Vec<String> {
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("aarch64-code");
-    fs::write(&file, code).unwrap();
-    let out = Command::new(DISASSEMBLER).args(["-D", "-b", "binary", "-m", "aarch64"]).arg(&file).output().unwrap();
-    let lines = String::from_utf8(out.stdout).unwrap();
-    let named = |line: &str| Some(line.split('\t').nth(2)?.trim().to_string());
-    lines.lines().filter_map(named).collect()
+#[test]
+fn random_bodies_of_single_precision_have_the_bits_of_the_interpreter() {
+    compare_random::<f32>("random-single");
 }
 
-/// Read back: nothing but arithmetic of these kinds, and exactly one instruction for each operation and vector.
+/// Functions of the numbers of a row. Those of 32 bits have constants and shifts of their own.
+fn compare_functions<T: Real>(files: &str) {
+    const FUNCTIONS: [fn(Symbol) -> Symbol; 3] = [functions::sin, functions::cos, functions::log];
+    let Some(runner) = runner(files) else { return };
+    let case = |seed: u64| {
+        let (tape, made) = record(Tape::new(T::PRECISION), || FUNCTIONS[seed as usize % 3](Symbol::new(Op::Row(0))));
+        let body = Body { ops: tape.ops().to_vec(), next: vec![made.0], rows: 1, precision: T::PRECISION, ..Body::default() };
+        Case::<T>::of(seed, &mut Random(seed), body)
+    };
+    let cases: Vec<Case<T>> = (0..60).flat_map(case).collect();
+    let compared = compare(&runner, &cases, files).unwrap_or_else(|wrong| panic!("{wrong}"));
+    println!("{compared} numbers compared");
+    assert!(compared > 1000);
+}
+
 #[test]
-fn kernels_are_made_of_exact_instructions_one_for_each_operation() {
-    if !crate::has(DISASSEMBLER) {
-        return crate::skipped(&format!("there is no {DISASSEMBLER}"));
-    }
-    let known = BTreeSet::from(KNOWN);
-    for seed in 0..40 {
-        let Some(Case { body, assembled, .. }) = Case::all(seed).pop() else { continue };
-        let shape: Shape = assembled.shape;
-        let names = mnemonics(&assembled.code);
-        assert_eq!(names.len(), assembled.code.len() / 4);
-        for name in &names {
-            assert!(known.contains(name.as_str()), "seed {seed}: {name}");
-        }
-        let count = |kinds: &[&str]| names.iter().filter(|name| kinds.contains(&name.as_str())).count();
-        let want = |is: fn(&Op) -> bool| shape.block_vectors * body.ops.iter().filter(|op| is(op)).count();
-        assert_eq!(count(&["fadd"]), want(|op| matches!(op, Op::Add(..))), "seed {seed}");
-        assert_eq!(count(&["fsub"]), want(|op| matches!(op, Op::Sub(..))), "seed {seed}");
-        assert_eq!(count(&["fmul"]), want(|op| matches!(op, Op::Mul(..))), "seed {seed}");
-        assert_eq!(count(&["fdiv"]), want(|op| matches!(op, Op::Div(..))), "seed {seed}");
-        assert_eq!(count(&["fsqrt"]), want(|op| matches!(op, Op::Sqrt(_))), "seed {seed}");
-        let fused = want(|op| matches!(op, Op::MulAdd(..) | Op::MulSub(..) | Op::SubMul(..)));
-        assert_eq!(count(&["fmadd", "fmsub", "fnmsub", "fmla", "fmls"]), fused, "seed {seed}");
-        assert_eq!(count(&["b.ne"]), 1 + usize::from(shape.blocks > 1), "seed {seed}");
-    }
+fn functions_have_the_bits_of_the_interpreter() {
+    compare_functions::<f64>("functions");
+    compare_functions::<f32>("functions-single");
 }

@@ -7,6 +7,8 @@
 mod emulated;
 #[path = "../kernels/inputs.rs"]
 mod inputs;
+mod listing;
+mod mistakes;
 #[path = "../kernels/random.rs"]
 mod random;
 mod words;

@@ -1,7 +1,8 @@
 /* Runs kernels for AArch64 on their inputs: `runner FROM TO`, where FROM has one case after the other.
  *
  * A case is ten words of 64 bits (the length of the code in bytes, a multiple of 8; how many numbers state, rows, pool, table of the steps,
- * held rows and scratch have; the number of steps; the FPCR to call with; 0) and then code, state, rows, pool, table and held rows.
+ * held rows and scratch have; the number of steps; the FPCR to call with; the size of a number in bytes, but for those of the table, which have
+ * 8) and then code, state, rows, pool, table and held rows.
  * To TO go, for each, the state after it, and how many of the registers that belong to the caller have changed.
  *
  * Each array ends where memory ends, begins not far behind such a place, and can be written to only if the kernel may: a kernel that
@@ -72,12 +73,12 @@ int main(int count, char **names) {
     uint64_t head[10];
     while (fread(head, sizeof head, 1, from) == 1) {
         struct piece code = get(from, head[0], 1, PROT_READ | PROT_EXEC);
-        struct piece state = get(from, 8 * head[1], 1, PROT_READ | PROT_WRITE);
-        struct piece rows = get(from, 8 * head[2], 1, PROT_READ);
-        struct piece pool = get(from, 8 * head[3], 1, PROT_READ);
+        struct piece state = get(from, head[9] * head[1], 1, PROT_READ | PROT_WRITE);
+        struct piece rows = get(from, head[9] * head[2], 1, PROT_READ);
+        struct piece pool = get(from, head[9] * head[3], 1, PROT_READ);
         struct piece per_step = get(from, 8 * head[4], 1, PROT_READ);
-        struct piece held = get(from, 8 * head[5], 1, PROT_READ);
-        struct piece scratch = get(from, 8 * head[6], 0, PROT_READ | PROT_WRITE);
+        struct piece held = get(from, head[9] * head[5], 1, PROT_READ);
+        struct piece scratch = get(from, head[9] * head[6], 0, PROT_READ | PROT_WRITE);
         struct arguments arguments = {state.start, rows.start,    pool.start, per_step.start,
                                       held.start,  scratch.start, head[7],    {0, 0}};
         uint64_t before = head[8], after, none = 0;

@@ -3,22 +3,52 @@
 //! Every instruction is a word of 32 bits with the numbers of its registers at fixed places. Arm Architecture Reference Manual for
 //! A-profile, section C7.2 (vectors) and C6.2 (the others).
 
-/// An instruction on vectors of two numbers, and the one on a single number. All are for numbers of 64 bits.
+/// The word of an instruction for either size of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Form {
-    /// Over two numbers.
-    pub vector: u32,
-    /// Over one. It makes the other half of its register zero.
+pub struct Words {
+    /// For numbers of 64 bits.
+    pub double: u32,
+    /// For numbers of 32 bits.
     pub single: u32,
 }
 
-const fn form(vector: u32, single: u32) -> Form {
-    Form { vector, single }
+/// An instruction on vectors of 16 bytes, and the one on one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Form {
+    /// Over two numbers of 64 bits, or four of 32.
+    pub vector: Words,
+    /// Over one. It makes the rest of its register zero.
+    pub one: Words,
+}
+
+/// Set where numbers have 64 bits, in instructions of arithmetic; the other bits are the same for both sizes.
+const IS_DOUBLE: u32 = 1 << 22;
+/// Set where a vector has 16 bytes, and not 8.
+const IS_WHOLE: u32 = 1 << 30;
+/// Set where an instruction that there is for vectors is on one number.
+const IS_ONE: u32 = 1 << 28;
+
+const fn sized(double: u32) -> Words {
+    Words { double, single: double & !IS_DOUBLE }
+}
+
+const fn same(word: u32) -> Words {
+    Words { double: word, single: word }
+}
+
+const fn form(vector: u32, one: u32) -> Form {
+    Form { vector: sized(vector), one: sized(one) }
 }
 
 /// On bits: over 16 bytes, or over 8.
 const fn bitwise(vector: u32) -> Form {
-    form(vector, vector & !(1 << 30))
+    Form { vector: same(vector), one: same(vector & !IS_WHOLE) }
+}
+
+/// On numbers as whole ones. There is no instruction on one of 32 bits; that on two leaves the second, which is zero, as it is.
+const fn whole(vector: u32) -> Form {
+    let vector = sized(vector);
+    Form { vector, one: Words { double: vector.double | IS_ONE, single: vector.single & !IS_WHOLE } }
 }
 
 pub const ADD: Form = form(0x4E60_D400, 0x1E60_2800);
@@ -43,28 +73,33 @@ pub const CHOOSE: Form = bitwise(0x6E60_1C00);
 pub const INSERT_WHERE: Form = bitwise(0x6EA0_1C00);
 /// Overwrites by the first where the second is not set (BIF).
 pub const INSERT_WHERE_NOT: Form = bitwise(0x6EE0_1C00);
-pub const ADD_BITS: Form = form(0x4EE0_8400, 0x5EE0_8400);
-/// Adds first · second to what is overwritten, rounded once. Of a single number that is [`Code::fused`].
-pub const ADD_PRODUCT: u32 = 0x4E60_CC00;
+pub const ADD_BITS: Form = whole(0x4EE0_8400);
+/// Adds first · second to what is overwritten, rounded once. Of one number that is [`Code::fused`].
+pub const ADD_PRODUCT: Words = sized(0x4E60_CC00);
 /// Subtracts it.
-pub const SUB_PRODUCT: u32 = 0x4EE0_CC00;
-/// Of single numbers, with an operand for each: term + first · second, rounded once.
-pub const MUL_ADD: u32 = 0x1F40_0000;
+pub const SUB_PRODUCT: Words = sized(0x4EE0_CC00);
+/// Of one number, with an operand for each: term + first · second, rounded once.
+pub const MUL_ADD: Words = sized(0x1F40_0000);
 /// term − first · second
-pub const SUB_MUL: u32 = 0x1F40_8000;
+pub const SUB_MUL: Words = sized(0x1F40_8000);
 /// first · second − term
-pub const MUL_SUB: u32 = 0x1F60_8000;
+pub const MUL_SUB: Words = sized(0x1F60_8000);
 
-/// Moves bits up by 0 to 63 places.
-pub const fn shift_up(places: u32) -> Form {
-    let amount = (64 + places) << 16;
-    form(0x4F00_5400 | amount, 0x5F00_5400 | amount)
+/// The place of a shift's amount is also that of the size of numbers: the word is for numbers of so many bits only.
+const fn shift(vector: u32, bits: u32, amount: u32) -> Form {
+    let vector = vector | amount << 16;
+    let one = if bits == 64 { vector | IS_ONE } else { vector & !IS_WHOLE };
+    Form { vector: same(vector), one: same(one) }
 }
 
-/// Moves bits down by 1 to 64 places: there is none by 0.
-pub const fn shift_down(places: u32) -> Form {
-    let amount = (128 - places) << 16;
-    form(0x6F00_0400 | amount, 0x7F00_0400 | amount)
+/// Moves the bits of numbers of so many bits up by fewer places than that.
+pub const fn shift_up(bits: u32, places: u32) -> Form {
+    shift(0x4F00_5400, bits, bits + places)
+}
+
+/// Moves them down, by 1 place to all: there is none by 0.
+pub const fn shift_down(bits: u32, places: u32) -> Form {
+    shift(0x6F00_0400, bits, 2 * bits - places)
 }
 
 /// A general register, by its number.
@@ -79,8 +114,10 @@ const CALLERS: [u32; 4] = [8, 10, 12, 14];
 #[derive(Debug)]
 pub struct Code {
     pub bytes: Vec<u8>,
-    /// How many numbers a vector has: 1 or 2.
+    /// How many numbers a vector has: 1, or 16 bytes of them.
     pub width: usize,
+    /// The size of a number in bytes: 8 or 4.
+    pub size: usize,
 }
 
 impl Code {
@@ -88,13 +125,22 @@ impl Code {
         self.bytes.extend(word.to_le_bytes());
     }
 
-    fn of(&self, form: Form) -> u32 {
-        if self.width == 1 { form.single } else { form.vector }
+    fn of(&self, form: Form) -> Words {
+        if self.width == 1 { form.one } else { form.vector }
+    }
+
+    /// Of the two, the one for numbers of this size.
+    fn sized<T>(&self, double: T, single: T) -> T {
+        if self.size == 8 { double } else { single }
+    }
+
+    fn operands(&mut self, words: Words, operands: u32) {
+        self.word(self.sized(words.double, words.single) | operands);
     }
 
     /// `to` ← `from`.
     pub fn two(&mut self, form: Form, to: u8, from: u8) {
-        self.word(self.of(form) | u32::from(from) << 5 | u32::from(to));
+        self.operands(self.of(form), u32::from(from) << 5 | u32::from(to));
     }
 
     /// `to` ← `first`, `second`.
@@ -103,34 +149,37 @@ impl Code {
     }
 
     /// `to` ← `to`, `first`, `second`, as a word without operands says.
-    pub fn overwrite(&mut self, word: u32, to: u8, first: u8, second: u8) {
-        self.word(word | u32::from(second) << 16 | u32::from(first) << 5 | u32::from(to));
+    pub fn overwrite(&mut self, words: Words, to: u8, first: u8, second: u8) {
+        self.operands(words, u32::from(second) << 16 | u32::from(first) << 5 | u32::from(to));
     }
 
-    /// `to` ← `term` and `first` · `second`, of single numbers.
-    pub fn fused(&mut self, word: u32, to: u8, first: u8, second: u8, term: u8) {
-        self.overwrite(word | u32::from(term) << 10, to, first, second);
+    /// `to` ← `term` and `first` · `second`, of one number.
+    pub fn fused(&mut self, words: Words, to: u8, first: u8, second: u8, term: u8) {
+        let [to, first, second, term] = [to, first, second, term].map(u32::from);
+        self.operands(words, second << 16 | term << 10 | first << 5 | to);
     }
 
     pub fn move_vector(&mut self, to: u8, from: u8) {
         self.three(OR, to, from, from);
     }
 
-    /// The first number of `from` to both lanes.
+    /// The first number of `from` to all lanes.
     pub fn spread(&mut self, to: u8, from: u8) {
-        self.word(0x4E08_0400 | u32::from(from) << 5 | u32::from(to));
+        self.operands(Words { double: 0x4E08_0400, single: 0x4E04_0400 }, u32::from(from) << 5 | u32::from(to));
     }
 
     /// A vector from so many bytes behind a pointer; of one number only, if asked for. What lies far away takes `spare`.
     pub fn load_vector(&mut self, to: u8, base: General, at: u32, one: bool, spare: General) {
-        let (near, far, size) =
-            if one || self.width == 1 { (0xFD40_0000, 0xFC60_6800, 8) } else { (0x3DC0_0000, 0x3CE0_6800, 16) };
-        self.access([near, far], size, u32::from(to), base, at, spare);
+        let of_one = self.sized([0xFD40_0000, 0xFC60_6800], [0xBD40_0000, 0xBC60_6800]);
+        let is_one = one || self.width == 1;
+        let (words, size) = if is_one { (of_one, self.size as u32) } else { ([0x3DC0_0000, 0x3CE0_6800], 16) };
+        self.access(words, size, u32::from(to), base, at, spare);
     }
 
     pub fn store_vector(&mut self, from: u8, base: General, at: u32, spare: General) {
-        let (near, far, size) = if self.width == 1 { (0xFD00_0000, 0xFC20_6800, 8) } else { (0x3D80_0000, 0x3CA0_6800, 16) };
-        self.access([near, far], size, u32::from(from), base, at, spare);
+        let of_one = self.sized([0xFD00_0000, 0xFC20_6800], [0xBD00_0000, 0xBC20_6800]);
+        let (words, size) = if self.width == 1 { (of_one, self.size as u32) } else { ([0x3D80_0000, 0x3CA0_6800], 16) };
+        self.access(words, size, u32::from(from), base, at, spare);
     }
 
     pub fn load_general(&mut self, to: General, base: General, at: u32, spare: General) {
@@ -154,9 +203,9 @@ impl Code {
         }
     }
 
-    /// `to` ← `base` + 8 · `index`.
+    /// `to` ← `base` + so many numbers.
     pub fn add_numbers(&mut self, to: General, base: General, index: General) {
-        self.word(0x8B00_0C00 | index.0 << 16 | base.0 << 5 | to.0);
+        self.word(0x8B00_0000 | self.size.trailing_zeros() << 10 | index.0 << 16 | base.0 << 5 | to.0);
     }
 
     /// Adds a number to a register. One of more than 24 bits takes `spare`.

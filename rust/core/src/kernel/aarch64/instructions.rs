@@ -4,7 +4,7 @@
 //!
 //! **To add an operation**, give it a line in `doing`; if it is of a new kind, an arm in `make` as well.
 
-use super::encode::{self as n, Code, Form, General};
+use super::encode::{self as n, Code, Form, General, Words};
 use crate::{
     kernel::{
         frame::place,
@@ -66,10 +66,11 @@ impl Machine for Code {
     const MOST_OPERATIONS: usize = 1 << 20;
 
     fn new(shape: Shape, instructions: usize) -> Code {
-        Code { bytes: Vec::with_capacity(8 * instructions + 512), width: shape.width }
+        Code { bytes: Vec::with_capacity(8 * instructions + 512), width: shape.width, size: shape.bytes }
     }
 
     fn doing(&self, op: Op) -> Doing {
+        let bits = 8 * self.size as u32;
         match op {
             Op::Add(..) => Doing::Two(n::ADD),
             Op::Sub(..) => Doing::Two(n::SUB),
@@ -84,9 +85,9 @@ impl Machine for Code {
             Op::AddBits(..) => Doing::Two(n::ADD_BITS),
             Op::Sqrt(_) => Doing::One(n::SQRT),
             Op::Floor(_) => Doing::One(n::FLOOR),
-            Op::ShiftUp(_, places) => Doing::One(n::shift_up(places)),
+            Op::ShiftUp(_, places) => Doing::One(n::shift_up(bits, places)),
             Op::ShiftDown(_, 0) => Doing::Copy,
-            Op::ShiftDown(_, places) => Doing::One(n::shift_down(places)),
+            Op::ShiftDown(_, places) => Doing::One(n::shift_down(bits, places)),
             Op::Less(..) => Doing::Turned(n::GREATER),
             Op::LessEqual(..) => Doing::Turned(n::GREATER_EQUAL),
             Op::Equal(..) => Doing::Two(n::EQUAL),
@@ -116,9 +117,9 @@ impl Machine for Code {
         }
         let [a, b, c] = registers;
         match step.doing {
-            Doing::MulAdd if writer.shape.width == 2 => writer.fused(n::ADD_PRODUCT, false, step.id, vector, of),
-            Doing::MulSub if writer.shape.width == 2 => writer.fused(n::ADD_PRODUCT, true, step.id, vector, of),
-            Doing::SubMul if writer.shape.width == 2 => writer.fused(n::SUB_PRODUCT, false, step.id, vector, of),
+            Doing::MulAdd if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, false, step.id, vector, of),
+            Doing::MulSub if writer.shape.width > 1 => writer.fused(n::ADD_PRODUCT, true, step.id, vector, of),
+            Doing::SubMul if writer.shape.width > 1 => writer.fused(n::SUB_PRODUCT, false, step.id, vector, of),
             Doing::Select => {
                 let to = writer.result_over(step.id, vector, of, of, &[])?;
                 let code = &mut writer.code;
@@ -232,7 +233,7 @@ impl Machine for Code {
 
 impl Writer<'_, Code> {
     /// Of vectors, the sum overwrites its term, which may have to change its sign before: the factors must then be elsewhere.
-    fn fused(&mut self, word: u32, negated: bool, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
+    fn fused(&mut self, words: Words, negated: bool, id: u32, vector: usize, of: &[Value]) -> Option<u8> {
         let &[a, b, c] = of else { return None };
         let term = self.registers.of(c)?;
         let (first, second) = (self.registers.of(a)?, self.registers.of(b)?);
@@ -248,7 +249,7 @@ impl Writer<'_, Code> {
         } else if to != term {
             self.code.move_vector(to, term);
         }
-        self.code.overwrite(word, to, first, second);
+        self.code.overwrite(words, to, first, second);
         Some(to)
     }
 }

@@ -1,4 +1,4 @@
-//! Machine code for AArch64, with NEON: vectors of two numbers.
+//! Machine code for AArch64, with NEON: vectors of two numbers of 64 bits, or of four of 32.
 //!
 //! [`instructions`] selects them for operations, [`encode`] has their bytes.
 
