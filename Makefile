@@ -65,7 +65,7 @@ lint: lint-rust lint-python
 lint-rust: rust-build
 	cargo fmt --all --check
 	rustfmt --edition 2024 --check $(LISTED)
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
 
 lint-python: .venv/test
 	$(BIN)/ruff format --check --quiet .

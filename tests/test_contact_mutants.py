@@ -13,7 +13,7 @@ from typing import Any
 
 import contacts
 import pytest
-from stepwell import engine
+from stepwell.engine import direct
 from stepwell.reference import contact
 from stepwell.systems import base
 
@@ -101,7 +101,7 @@ def is_noticed() -> bool:
 def test_a_mistake_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
     monkeypatch.setattr(base, "contact", wrong)
-    monkeypatch.setattr(engine, "contact", wrong)
+    monkeypatch.setattr(direct, "contact", wrong)
     assert is_noticed()
 
 

@@ -80,7 +80,7 @@ def test_both_fuse_the_same(name: str, some: int | None) -> None:
     if int(np.prod(system.v_shape)) > 30:
         return  # its step is too long for one tape
     counts = []
-    for method in drawn([each for each in METHODS if fits(system, each)], some, name):
+    for method in drawn([each for each in METHODS if fits(system, each)], some and some // 2, name):
         tape = _core.Tape()
         symbols = Tracer(system, tape).step(method)
         core = operations(*tape.fused(symbols))
@@ -209,13 +209,13 @@ def test_the_core_has_the_bits_of_the_reference(name: str, kernels: str, monkeyp
 def test_with_a_tolerance() -> None:
     system, v, y = made("three bodies")
     for method in ABLE:
-        one, other = runs(system, method, v, y, tolerance=1e-6, at=[0.1, 0.25, 0.5])
+        one, other = runs(system, method, v, y, tolerance=1e-6, at=[0.05, 0.12, 0.25])
         assert_equal(one, other)
         assert one.paces == other.paces
-        plain = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.5])
+        plain = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.25])
         assert np.abs(plain.y[-1] - one.y[-1]).max() < 1e-4
-        first = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.1], fused=True)
-        on = sw.integrate(system, method, at=[0.5], **first.resume)
+        first = sw.integrate(system, method, v=v, y=y, tolerance=1e-6, at=[0.05], fused=True)
+        on = sw.integrate(system, method, at=[0.25], **first.resume)
         assert np.array_equal(on.y[-1], one.y[-1])
 
 

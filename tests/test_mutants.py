@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import stepwell as sw
-from cases import assert_same, cases
+from cases import assert_same, cases, number
 from truths import CLOSED_FORMS, forced_error, matrix_of, quadrature_error, slope
 
 #: method: what to replace, by what, and what kind of mistake it is.
@@ -77,9 +77,13 @@ def mutate(monkeypatch: pytest.MonkeyPatch) -> object:
     return replace
 
 
+#: With so many systems and forms a method is compared with the core, drawn by their names.
+COMPARED = 24
+
+
 def _equal_to_the_core(method: str) -> bool:
     try:
-        for case in cases(iter([method])):
+        for case in sorted(cases(iter([method])), key=lambda case: number("mutants", case))[:COMPARED]:
             assert_same(case.run(5), case.run(5, backend="numpy"))
     except AssertionError:
         return False

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from cases import assert_same
-from stepwell import engine
+from stepwell.engine import direct
 from stepwell.errors import DTypeError, ShapeError, UnsupportedError
 from stepwell.reference import contact
 from stepwell.systems import base
@@ -97,7 +97,7 @@ def test_no_step_adds_more_energy_than_springs_can_take(floor: str) -> None:
 def test_a_mistake_in_a_net_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
     monkeypatch.setattr(base, "contact", wrong)
-    monkeypatch.setattr(engine, "contact", wrong)
+    monkeypatch.setattr(direct, "contact", wrong)
     with pytest.raises(AssertionError):
         no_energy_beyond_the_bound(sw.Floor(), backend="numpy", heights=(0.3,))
 
@@ -171,7 +171,7 @@ def test_fixed_particles_pass_through_surfaces(way: dict[str, Any], n: int, back
 def test_a_mistake_about_fixed_particles_is_noticed(way: dict[str, Any], old: str, new: str, monkeypatch: Any) -> None:
     wrong = changed(old, new)
     monkeypatch.setattr(base, "contact", wrong)
-    monkeypatch.setattr(engine, "contact", wrong)
+    monkeypatch.setattr(direct, "contact", wrong)
     with pytest.raises(AssertionError):
         test_fixed_particles_pass_through_surfaces(way, 2, "numpy")
 
@@ -224,4 +224,4 @@ def test_what_does_not_go_together_is_refused() -> None:
 
 
 def test_the_module_that_is_changed_is_the_one_that_runs() -> None:
-    assert base.contact is engine.contact is contact
+    assert base.contact is direct.contact is contact
