@@ -23,7 +23,7 @@ import numpy as np
 import stepwell as sw
 from stepwell.advice import Advice, Row
 from stepwell.errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning, UnsupportedError
-from stepwell.methods import Method
+from stepwell.method_records import Method
 from stepwell.scenes import Scene
 from stepwell.scenes.table import tabled
 from stepwell.scenes.truth import with_truth

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import stepwell as sw
-from stepwell.methods import Method
+from stepwell.method_records import Method
 
 Step = Callable[..., Any]
 

@@ -12,29 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .contact import Floor, Sphere
-from .control import Control, EnergyControl, LengthControl, NormControl, Projection
 from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
-from .integrate import integrate
-from .methods import Method, method, methods
-from .result import Run, Status
-from .systems import (
-    Chain,
-    LinearSystem,
-    NBody,
-    Oscillator,
-    Particles,
-    Pendulum,
-    Pendulum3D,
-    RestrictedThreeBody,
-    RigidBody,
-    Rods,
-    Sampled,
-    Sinusoid,
-    Springs,
-    System,
-)
-from .world import World
 
 if TYPE_CHECKING:
     from . import (
@@ -53,18 +31,40 @@ if TYPE_CHECKING:
         sweeps,
     )
     from .advice import advise
+    from .contact import Floor, Sphere
+    from .control import Control, EnergyControl, LengthControl, NormControl, Projection
     from .dynamics import equilibria, jacobian, lyapunov
     from .equations import system
     from .events import Event
     from .explanation import Explanation, explain
     from .explorer import Explorer, explore
     from .exports import ExportedStep, export
+    from .integration import integrate
     from .interop.saving import load
     from .interop.solve_ivp import solve_ivp
+    from .method_records import Method, method, methods
+    from .result import Run, Status
     from .scenes import Scene
     from .stability import analyse, criteria, stability_along, stability_limit
     from .sweeps import sweep
-    from .systems import Aircraft
+    from .systems import (
+        Aircraft,
+        Chain,
+        LinearSystem,
+        NBody,
+        Oscillator,
+        Particles,
+        Pendulum,
+        Pendulum3D,
+        RestrictedThreeBody,
+        RigidBody,
+        Rods,
+        Sampled,
+        Sinusoid,
+        Springs,
+        System,
+    )
+    from .world import World
 
 __version__: str = _core.__version__
 
@@ -165,44 +165,49 @@ def isa_levels() -> list[str]:
     return _core.isa_levels()
 
 
-#: Attributes that are imported on first use, so that importing stepwell stays fast, and their modules.
-_LATER = {
-    "Aircraft": "systems.Aircraft",
-    "advice": "advice",
-    "Scene": "scenes.Scene",
-    "advise": "advice.advise",
-    "Event": "events.Event",
-    "Explanation": "explanation.Explanation",
-    "charts": "charts",
-    "derivatives": "derivatives",
-    "dynamics": "dynamics",
-    "equilibria": "dynamics.equilibria",
-    "jacobian": "dynamics.jacobian",
-    "lyapunov": "dynamics.lyapunov",
-    "explain": "explanation.explain",
-    "explanation": "explanation",
-    "Explorer": "explorer.Explorer",
-    "explore": "explorer.explore",
-    "explorer": "explorer",
-    "ExportedStep": "exports.ExportedStep",
-    "equations": "equations",
-    "export": "exports.export",
-    "exports": "exports",
-    "gym": "gym",  # needs gymnasium, so it is not among the names that are listed
-    "load": "interop.saving.load",
-    "paper": "paper",
-    "quaternion": "quaternion",
-    "scenes": "scenes",
-    "solve_ivp": "interop.solve_ivp.solve_ivp",
-    "sweep": "sweeps.sweep",
-    "sweeps": "sweeps",
-    "system": "equations.system",
-    "stability": "stability",
-    "analyse": "stability.analyse",
-    "criteria": "stability.criteria",
-    "stability_along": "stability.stability_along",
-    "stability_limit": "stability.stability_limit",
+#: Modules that are attributes, and are imported on first use, so that importing stepwell stays fast. ``gym`` needs gymnasium, so
+#: it is not among the names that are listed.
+_MODULES = {
+    "advice",
+    "charts",
+    "derivatives",
+    "dynamics",
+    "equations",
+    "explanation",
+    "explorer",
+    "exports",
+    "gym",
+    "paper",
+    "quaternion",
+    "scenes",
+    "stability",
+    "sweeps",
 }
+
+#: The names that are imported on first use, by the modules that define them.
+_NAMES = {
+    "advice": "advise",
+    "contact": "Floor Sphere",
+    "control": "Control EnergyControl LengthControl NormControl Projection",
+    "dynamics": "equilibria jacobian lyapunov",
+    "equations": "system",
+    "events": "Event",
+    "explanation": "Explanation explain",
+    "explorer": "Explorer explore",
+    "exports": "ExportedStep export",
+    "integration": "integrate",
+    "interop.saving": "load",
+    "interop.solve_ivp": "solve_ivp",
+    "method_records": "Method method methods",
+    "result": "Run Status",
+    "scenes": "Scene",
+    "stability": "analyse criteria stability_along stability_limit",
+    "sweeps": "sweep",
+    "systems": "Aircraft Chain LinearSystem NBody Oscillator Particles Pendulum Pendulum3D RestrictedThreeBody RigidBody Rods "
+    "Sampled Sinusoid Springs System",
+    "world": "World",
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __dir__() -> list[str]:
@@ -212,10 +217,12 @@ def __dir__() -> list[str]:
 if not TYPE_CHECKING:  # to which any name would else be one of the package
 
     def __getattr__(name: str) -> Any:
-        if name not in _LATER:
-            raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
         import importlib
 
-        module, _, attribute = _LATER[name].rpartition(".")
-        found = importlib.import_module(f"stepwell.{module or attribute}")
-        return getattr(found, attribute) if module else found
+        if name in _MODULES:
+            return importlib.import_module(f"stepwell.{name}")
+        if name not in _MODULE_OF:
+            raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+        # Kept, so that the next use is as quick as that of any attribute.
+        found = globals()[name] = getattr(importlib.import_module(f"stepwell.{_MODULE_OF[name]}"), name)
+        return found

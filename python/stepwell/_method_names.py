@@ -17,7 +17,7 @@ from ._checks import short
 from .errors import UnknownNameError
 
 if TYPE_CHECKING:
-    from .methods import Method
+    from .method_records import Method
 
 #: Below this similarity (``difflib``, 0 to 1) two names are not taken for one with a typing error.
 MIN_SIMILARITY = 0.5

@@ -12,7 +12,7 @@ from .systems import Sampled, Sinusoid
 from .systems.inputs import LAST_SINGLE_ANGLE
 
 if TYPE_CHECKING:
-    from .methods import Method
+    from .method_records import Method
     from .systems import System
 
 

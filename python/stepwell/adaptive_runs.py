@@ -16,8 +16,8 @@ from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantiti
 from .compatible import goes_with_series, not_of_a_step
 from .control import a_control
 from .errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
-from .methods import Method
-from .methods import methods as every_method
+from .method_records import Method
+from .method_records import methods as every_method
 from .result import AdaptiveState, Paces, Run, Status
 from .systems import System
 from .systems.base import TINY

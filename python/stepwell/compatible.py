@@ -10,8 +10,8 @@ import numpy as np
 from . import _checks
 from .control import EnergyControl
 from .errors import ArgumentError, UnsupportedError
-from .methods import Method
-from .methods import methods as every_method
+from .method_records import Method
+from .method_records import methods as every_method
 from .systems import Sampled, System
 
 

@@ -14,7 +14,7 @@ from ._checks import Array
 from ._encounters import Collision, Encounter
 from ._value import Value, by_value
 from .errors import UnsupportedError
-from .methods import Method
+from .method_records import Method
 from .reference.types import Whole
 from .systems import System
 

@@ -14,8 +14,8 @@ from ._checks import Array
 from .compatible import fits_together, forced, goes_on_alike, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
-from .methods import Method
-from .methods import method as find_method
+from .method_records import Method
+from .method_records import method as find_method
 from .systems import System
 from .systems.base import a_system
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, TypeVar
 from .. import _checks, _single
 from ..charts.measure import TIMED_STEP
 from ..errors import ArgumentError, TooLargeError, UnsupportedError
-from ..integrate import integrate
-from ..methods import Method, choice
+from ..integration import integrate
+from ..method_records import Method, choice
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from . import predict

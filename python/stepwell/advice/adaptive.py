@@ -16,8 +16,8 @@ import numpy as np
 
 from .._checks import Array
 from ..errors import AccuracyWarning, ToleranceWarning
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from .motion import Motion, looked_up
 from .trials import Trial

@@ -10,7 +10,7 @@ import math
 from functools import cached_property
 from typing import Protocol
 
-from ..methods import Method
+from ..method_records import Method
 from .adaptive import AdaptiveTrials
 from .motion import Grid
 from .trials import ASYMPTOTIC_ERROR, Trial, Trials, single_name

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..methods import Method
+from ..method_records import Method
 from ..scenes import Scene
 from ..stability import Mode, analyse, maps, stability_limit
 from .trials import Trials

@@ -13,8 +13,8 @@ from .._brief import one_line, table
 from .._checks import Array
 from ..charts.data import finite
 from ..errors import ArgumentError
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from ..scenes import Scene
 from .motion import grid_of

@@ -16,8 +16,8 @@ from .. import engine
 from .._checks import Array
 from ..charts.measure import MIN_GROWTH, TIMED_STEP, TIMED_TOLERANCE
 from ..errors import AccuracyWarning, ControlWarning, DivergenceWarning, ToleranceWarning
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from ..scenes import Scene
 from .motion import Motion

@@ -14,8 +14,8 @@ from .. import control as controls
 from .._checks import Array
 from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
-from ..methods import Method, choice
-from ..methods import method as find_method
+from ..method_records import Method, choice
+from ..method_records import method as find_method
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from ..systems import NBody, System

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UnknownNameError
-from ..methods import Method
+from ..method_records import Method
 from .control import ControlSweep
 from .control_runs import Held
 from .labels import at_ends, title

@@ -14,8 +14,8 @@ from .. import control as controls
 from .._checks import Array
 from .._value import Value
 from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ShapeError
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from ..systems import System
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from .._checks import file, known
 from .._files import replaced, write_text
 from .._value import Value
-from ..methods import Method
+from ..method_records import Method
 from ..scenes import Scene
 from .peers import Peer
 from .style import Drawn, drawn

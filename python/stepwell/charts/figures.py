@@ -14,9 +14,9 @@ from .. import _checks
 from .._checks import Array
 from .._value import Value
 from ..errors import ArgumentError
-from ..integrate import integrate
-from ..methods import Method, _section, choice
-from ..methods import method as find_method
+from ..integration import integrate
+from ..method_records import Method, _section, choice
+from ..method_records import method as find_method
 from ..stability import StabilityLimit, analyse, stability_limit
 from ..systems import Oscillator
 from .files import write_csv, write_json

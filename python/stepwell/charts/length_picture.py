@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..methods import Method
+from ..method_records import Method
 from .control import ControlSweep
 from .control_runs import Held
 from .style import FONT, GREY, apart, new_figure

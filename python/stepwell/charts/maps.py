@@ -15,9 +15,9 @@ from .._checks import Array
 from .._value import Value
 from ..compatible import fits_together
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ShapeError
-from ..integrate import integrate
-from ..methods import Method
-from ..methods import method as find_method
+from ..integration import integrate
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..stability import analyse
 from ..systems import Oscillator
 from .files import write_csv, write_json

@@ -15,8 +15,8 @@ from .. import engine
 from .._checks import Array
 from ..compatible import fits_together
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from ..scenes import Scene
 from .data import Curve, Point, Timing

@@ -16,8 +16,8 @@ from .._value import Value
 from ..compatible import fits_together
 from ..control import NormControl, Projection
 from ..errors import ArgumentError, DivergenceWarning, ShapeError
-from ..integrate import integrate
-from ..methods import Method, choice
+from ..integration import integrate
+from ..method_records import Method, choice
 from ..result import Run
 from ..systems import RigidBody
 from .files import write_csv, write_json

@@ -21,7 +21,7 @@ from .. import engine
 from .._checks import Array, count, known, numbers, short
 from .._value import Value
 from ..errors import DTypeError, ShapeError, UnsupportedError
-from ..methods import method
+from ..method_records import method
 from ..scenes import Scene
 from ..systems import NBody
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..methods import Method
-from ..methods import methods as every_method
+from ..method_records import Method
+from ..method_records import methods as every_method
 from .data import Curve, WorkPrecision
 from .labels import Label, beside
 from .labels import title as put_title

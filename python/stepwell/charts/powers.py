@@ -18,9 +18,9 @@ from .._value import Value
 from .._words import RunForm
 from ..compatible import fits_together
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..integrate import integrate
-from ..methods import Method
-from ..methods import method as find_method
+from ..integration import integrate
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..result import Run
 from ..stability import maps
 from ..stability.expansion import polynomials

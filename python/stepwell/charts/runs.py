@@ -14,7 +14,7 @@ from .._checks import Array
 from .._encounters import MAX_RERUN
 from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
-from ..integrate import integrate
+from ..integration import integrate
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene

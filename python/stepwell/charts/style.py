@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from .._checks import file
 from ..errors import ArgumentError, UnsupportedError
-from ..methods import Method
-from ..methods import methods as every_method
+from ..method_records import Method
+from ..method_records import methods as every_method
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _checks, _core
 from .._checks import Array
 from ..errors import ArgumentError, UnsupportedError
-from ..methods import Method, choice
+from ..method_records import Method, choice
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from . import measure

@@ -15,7 +15,7 @@ from .. import _checks
 from .._checks import Array
 from .._value import Value
 from ..errors import ArgumentError, ShapeError
-from ..methods import Method, choice
+from ..method_records import Method, choice
 from ..stability import StabilityLimit, analyse, series, stability_limit
 from ..stability.eigen import Complex
 from ..stability.expansion import text

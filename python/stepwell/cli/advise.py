@@ -13,7 +13,7 @@ from .. import _checks
 from ..advice import COSTS, advise
 from ..advice.result import COLUMNS, REASONS
 from ..errors import ArgumentError
-from ..methods import method
+from ..method_records import method
 from ..scenes import scene
 from . import show
 

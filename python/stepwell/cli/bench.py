@@ -13,7 +13,7 @@ from .. import isa
 from ..charts.measure import REPEATS, members_of, refusal, step_times
 from ..engine import evaluations
 from ..errors import UnsupportedError
-from ..methods import Method, method, methods
+from ..method_records import Method, method, methods
 from ..scenes import Scene, scene
 from . import show
 

@@ -17,7 +17,7 @@ from ..charts import Panel, WorkPrecision, work_precision
 from ..charts.data import ERRORS, TARGETS
 from ..charts.picture import title_of
 from ..charts.style import new_figure
-from ..methods import method
+from ..method_records import method
 from ..scenes import scene
 from . import show
 

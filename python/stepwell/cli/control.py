@@ -16,7 +16,7 @@ from ..charts import ControlSweep, control
 from ..charts.picture import title_of
 from ..charts.style import new_figure
 from ..errors import ArgumentError
-from ..methods import method
+from ..method_records import method
 from ..scenes import scene
 from . import show
 

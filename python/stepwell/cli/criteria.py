@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import _checks
 from ..errors import ArgumentError
-from ..methods import method
+from ..method_records import method
 from ..stability import Criteria, criteria
 from ..stability.criterion import PHI
 from . import show

@@ -11,7 +11,7 @@ from pathlib import Path
 from .. import _checks
 from ..charts import figures
 from ..charts.style import new_figure
-from ..methods import method
+from ..method_records import method
 from ..stability.criterion import signed
 from . import show
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import ArgumentError
-from ..methods import Method, method, methods
+from ..method_records import Method, method, methods
 from . import show
 
 

@@ -20,7 +20,7 @@ from ..charts.runs_animation import need as need_for_animation
 from ..charts.style import new_figure
 from ..control import WAYS, AnyControl, EnergyControl, Projection
 from ..errors import AccuracyWarning, ArgumentError, ControlWarning, DivergenceWarning, ToleranceWarning
-from ..integrate import FORMS, integrate
+from ..integration import FORMS, integrate
 from ..result import Run
 from ..scenes import Scene
 from . import show

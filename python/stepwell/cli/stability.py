@@ -14,7 +14,7 @@ from ..charts import Stability, powers, stability, stability_map
 from ..charts.style import new_figure
 from ..charts.zplane import KINDS, ladder, within
 from ..errors import ArgumentError, UnsupportedError
-from ..methods import method
+from ..method_records import method
 from . import show
 
 #: The default drawings: the pictures of all methods, and the map of each. Powers are drawn if asked for.

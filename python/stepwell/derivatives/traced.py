@@ -13,7 +13,7 @@ from .. import _checks
 from .._checks import Array, Shape
 from .._core import Symbol, Tape
 from ..errors import ShapeError, UnsupportedError
-from ..methods import Method
+from ..method_records import Method
 from ..reference.marks import Marks, recording
 from ..reference.traced import Tracer
 from ..systems import System

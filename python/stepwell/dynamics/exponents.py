@@ -15,8 +15,8 @@ from .._value import Value
 from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
 from ..errors import ArgumentError, DivergenceWarning
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..reference.log import log
 from ..reference.trig import cos
 from ..stability import maps

@@ -14,8 +14,8 @@ from .._checks import Array
 from .._value import Value
 from ..compatible import fits_together
 from ..errors import ArgumentError, ShapeError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..stability import eigen, maps
 from ..stability.analysis import Analysis, analyse, state
 from ..stability.eigen import Complex

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._checks import Array, Shape
-from ..methods import Method
+from ..method_records import Method
 from ..reference.types import Whole
 from ..systems import System
 from ..systems.base import rows

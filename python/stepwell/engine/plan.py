@@ -11,7 +11,7 @@ import numpy as np
 from .. import _checks, _core
 from .._checks import Array, Shape
 from ..control import EnergyControl
-from ..methods import Method
+from ..method_records import Method
 from ..reference.types import Whole
 from ..systems import System
 from ..systems.base import rows

@@ -16,9 +16,9 @@ from ..compatible import fits_together, not_of_a_step
 from ..control import AnyControl, a_control
 from ..engine.linear import matrix_model
 from ..errors import ArgumentError, UnsupportedError
-from ..methods import Method
-from ..methods import method as find_method
-from ..methods import methods as every_method
+from ..method_records import Method
+from ..method_records import method as find_method
+from ..method_records import methods as every_method
 from ..systems import System
 from ..systems.base import a_system
 from .beside import lines_beside

@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import _checks, _files
 from .._value import Value
-from ..methods import Method
+from ..method_records import Method
 from ..systems import System
 from .listing import Section
 

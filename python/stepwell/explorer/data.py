@@ -17,8 +17,8 @@ from .._checks import Array
 from ..charts.style import look
 from ..errors import StepwellError, UnsupportedError
 from ..exports import export
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..scenes import Scene
 from ..scenes import scene as find_scene
 from ..scenes.taylor import Orbit

@@ -17,8 +17,8 @@ from typing import Any
 from .. import _checks, _core, _files
 from .._value import Value
 from ..errors import ArgumentError
-from ..methods import Method
-from ..methods import choice as chosen_methods
+from ..method_records import Method
+from ..method_records import choice as chosen_methods
 from ..scenes import Scene, scenes
 from ..scenes import scene as find_scene
 from . import sliders

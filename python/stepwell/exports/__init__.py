@@ -16,8 +16,8 @@ from .._checks import Array, Shape
 from ..compatible import fits_together
 from ..control import AnyControl, ConstraintControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import System
 from ..systems.base import a_system, aligned
 from .c import C

@@ -10,7 +10,7 @@ from typing import Any
 from .. import _checks, _files
 from .._checks import Shape
 from .._value import Value
-from ..methods import Method
+from ..method_records import Method
 from ..systems import System
 
 

@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from .. import _checks
 from .._checks import Array
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..methods import Method
+from ..method_records import Method
 from ..world import World
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Discrete
 
 from .._checks import Array
 from ..equations import system
-from ..methods import Method
+from ..method_records import Method
 from ..world import World
 from .base import Truths, WorldEnv, WorldVectorEnv
 

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box
 
 from .._checks import Array
 from ..control import Projection
-from ..methods import Method
+from ..method_records import Method
 from ..reference.functions import cos, sin
 from ..systems import Rods
 from ..world import World

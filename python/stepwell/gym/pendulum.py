@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from .._checks import Array
-from ..methods import Method
+from ..method_records import Method
 from ..reference.functions import cos, sin
 from ..systems import Pendulum
 from ..world import World

@@ -6,9 +6,9 @@ from typing import Any
 
 from .. import _checks
 from ..errors import DTypeError, UnknownNameError, UnsupportedError
-from ..methods import Method
-from ..methods import method as find_method
-from ..methods import methods as every_method
+from ..method_records import Method
+from ..method_records import method as find_method
+from ..method_records import methods as every_method
 
 #: What is taken if no method is named. SciPy then takes RK45, which is not here.
 DEFAULT = "dop853"

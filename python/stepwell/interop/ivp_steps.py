@@ -9,7 +9,7 @@ import numpy as np
 from .. import _checks, _core, engine
 from .._checks import Array
 from ..errors import ArgumentError, ShapeError
-from ..methods import Method
+from ..method_records import Method
 from ..reference import adaptive
 
 #: How many attempts at steps a run may make in one go: as many as are exact in the controller's numbers.

@@ -22,8 +22,8 @@ from ..equations.definition import Definition
 from ..equations.trace import Equations
 from ..errors import ArgumentError
 from ..events.result import Occurrences
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..reference.traced import Tracer
 from ..result import Run
 from ..systems import System

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..charts import run_picture
-from ..integrate import integrate
+from ..integration import integrate
 from ..scenes import scene
 from ..stability import stability_limit
 from ..systems.aircraft import Aircraft

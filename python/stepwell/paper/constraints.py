@@ -13,7 +13,7 @@ from ..charts import control as control_chart
 from ..charts import norm as norm_chart
 from ..charts import run_picture
 from ..control import LengthControl, NormControl, Projection
-from ..integrate import integrate
+from ..integration import integrate
 from ..scenes import scene
 from ..systems import NBody, Oscillator, Pendulum3D, RigidBody, Springs
 from . import Finding, Section

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..charts import run_picture
 from ..contact import Floor
-from ..integrate import integrate
+from ..integration import integrate
 from ..scenes import scene
 from ..stability import analyse, criteria
 from ..systems import LinearSystem, Oscillator, Particles, Sampled

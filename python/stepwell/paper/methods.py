@@ -11,8 +11,8 @@ import numpy as np
 
 from ..charts import figures, verlet_friction
 from ..errors import UnsupportedError
-from ..integrate import integrate
-from ..methods import method
+from ..integration import integrate
+from ..method_records import method
 from ..stability import Analysis, analyse, criteria, stability_limit
 from ..systems import Oscillator
 from . import Finding, Section

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..integrate import integrate
+from ..integration import integrate
 from ..systems import Oscillator
 from . import Finding, Section
 

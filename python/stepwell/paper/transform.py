@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..charts import figures
-from ..integrate import integrate
+from ..integration import integrate
 from ..stability import analyse
 from ..stability.analysis import KINDS
 from ..systems import LinearSystem, Oscillator

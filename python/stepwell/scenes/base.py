@@ -17,8 +17,8 @@ from .._value import Value
 from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
-from ..integrate import integrate
-from ..methods import Method
+from ..integration import integrate
+from ..method_records import Method
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._checks import Array
 from ..errors import AccuracyWarning, ToleranceWarning
-from ..integrate import integrate
+from ..integration import integrate
 from ..result import Run
 from .base import Scene
 

@@ -17,8 +17,8 @@ from .._checks import Array
 from .._value import Value
 from ..compatible import fits_together
 from ..errors import ArgumentError, DTypeError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..result import Run
 from ..systems import LinearSystem, Oscillator, System
 from . import eigen, maps

@@ -12,8 +12,8 @@ from .._checks import Array, Shape
 from .._value import Value
 from ..compatible import fits_together
 from ..errors import ArgumentError, DTypeError, ShapeError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system

@@ -10,8 +10,8 @@ from ..compatible import fits_together
 from ..engine import Plan, evaluations
 from ..errors import ShapeError
 from ..explanation.listing import written
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import Oscillator, System
 from ..systems.base import a_system
 

@@ -17,7 +17,7 @@ from .. import _checks, _files
 from .._brief import MAX_LINE, shortened, table
 from .._value import by_value
 from ..errors import ArgumentError
-from ..methods import Method, choice
+from ..method_records import Method, choice
 from ..systems import Oscillator
 from .analysis import analyse
 from .counted import Operations, operations

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .._checks import Array
-from ..methods import Method
+from ..method_records import Method
 from ..systems import LinearSystem
 from . import eigen
 from .eigen import Complex

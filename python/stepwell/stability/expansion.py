@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import Oscillator, System
 from . import maps
 from .numbers import Polynomial

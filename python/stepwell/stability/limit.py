@@ -19,8 +19,8 @@ from .. import _checks
 from .._checks import Array, Shape
 from ..compatible import fits_together
 from ..errors import UnsupportedError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import LinearSystem, Springs, System
 from ..systems.base import a_system
 from . import maps

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..methods import Method
+from ..method_records import Method
 from ..systems import System
 from . import eigen, exact, maps
 from .eigen import EPS, Complex, Truths

@@ -15,7 +15,7 @@ from .. import _checks, engine
 from .._checks import Array, Shape
 from ..derivatives import traced
 from ..engine import linear
-from ..methods import Method
+from ..method_records import Method
 from ..reference.types import Blocks
 from ..systems import System
 

@@ -21,8 +21,8 @@ import numpy as np
 
 from .._checks import Array
 from ..compatible import fits_together
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import LinearSystem, Springs
 from ..systems.base import aligned
 from .limit import stability_limit

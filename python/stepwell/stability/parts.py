@@ -20,7 +20,7 @@ import numpy as np
 from .._checks import Array
 from ..compatible import fits_together
 from ..errors import UnsupportedError
-from ..methods import Method
+from ..method_records import Method
 from ..systems import LinearSystem
 from . import eigen, exact, maps
 from .eigen import EPS, Complex

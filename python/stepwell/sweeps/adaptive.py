@@ -12,7 +12,7 @@ from .._checks import Array
 from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
 from ..engine import PACE_NUMBERS, pace_of
 from ..errors import ArgumentError, ShapeError, UnsupportedError
-from ..methods import Method
+from ..method_records import Method
 from ..result import Run, Status
 from .axes import Grid
 from .exponents import Exponents

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..methods import method as find_method
+from ..method_records import method as find_method
 from ..systems import System
 from .axes import Grid
 from .layout import Layout, coordinates

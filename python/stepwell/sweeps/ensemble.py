@@ -13,8 +13,8 @@ import numpy as np
 from .. import _checks, _single
 from .._brief import counted
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning, UnsupportedError
-from ..methods import Method
-from ..methods import method as find_method
+from ..method_records import Method
+from ..method_records import method as find_method
 from ..systems import System
 from . import adaptive
 from .adaptive import Evaluations

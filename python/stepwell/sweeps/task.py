@@ -13,7 +13,7 @@ import numpy as np
 
 from .._checks import Array
 from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
-from ..integrate import integrate
+from ..integration import integrate
 from ..result import Run
 from ..systems import System
 from ..systems.base import a_system

@@ -23,7 +23,7 @@ from .inputs import Sampled
 if TYPE_CHECKING:
     from ..contact import Surface
     from ..control import AnyControl, ConstraintControl, EnergyControl, Projection
-    from ..methods import Method
+    from ..method_records import Method
     from .inputs import Input
 
 #: A description as the core takes it: names with words, whole numbers, lists of whole numbers (as bytes, four for each), rows of

@@ -15,7 +15,7 @@ from ..reference.systems.nbody import square
 from .base import System, aligned, shown
 
 if TYPE_CHECKING:
-    from ..methods import Method
+    from ..method_records import Method
 
 #: The core numbers particles and ends of springs in 32 bits.
 MOST_PARTICLES = MOST_SPRINGS = 2**30

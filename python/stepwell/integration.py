@@ -19,8 +19,8 @@ from .adaptive_runs import adaptive_run
 from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
-from .methods import Method
-from .methods import method as find_method
+from .method_records import Method
+from .method_records import method as find_method
 from .reference.types import Whole
 from .result import Run
 from .systems import NBody, Sinusoid, System
