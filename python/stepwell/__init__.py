@@ -184,7 +184,7 @@ _MODULES = {
     "sweeps",
 }
 
-#: The names that are imported on first use, by the modules that define them.
+#: The other names that are imported on first use, by the modules that define them; those that are not here are of ``systems``.
 _NAMES = {
     "advice": "advise",
     "contact": "Floor Sphere",
@@ -203,8 +203,6 @@ _NAMES = {
     "scenes": "Scene",
     "stability": "analyse criteria stability_along stability_limit",
     "sweeps": "sweep",
-    "systems": "Aircraft Chain LinearSystem NBody Oscillator Particles Pendulum Pendulum3D RestrictedThreeBody RigidBody Rods "
-    "Sampled Sinusoid Springs System",
     "world": "World",
 }
 _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -221,8 +219,9 @@ if not TYPE_CHECKING:  # to which any name would else be one of the package
 
         if name in _MODULES:
             return importlib.import_module(f"stepwell.{name}")
-        if name not in _MODULE_OF:
+        if name not in __all__:
             raise AttributeError(f"module 'stepwell' has no attribute {name!r}")
+        module = importlib.import_module(f"stepwell.{_MODULE_OF.get(name, 'systems')}")
         # Kept, so that the next use is as quick as that of any attribute.
-        found = globals()[name] = getattr(importlib.import_module(f"stepwell.{_MODULE_OF[name]}"), name)
+        found = globals()[name] = getattr(module, name)
         return found
