@@ -1,6 +1,6 @@
 //! Lists `src/steppers/*.rs` and `src/systems/*.rs`, so that a new file in either folder is its whole registration.
 //!
-//! A file in `steppers/` holds a `RECORD`, one in `systems/` a `KIND`.
+//! A file in `steppers/` holds a `RECORD`, one in `systems/` a `KIND` and a `make`.
 
 use std::{env, fs, io, path::Path};
 
@@ -19,6 +19,12 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
+const MAKE: &str = "
+/// What makes the system of that name over any numbers: generic, so that those which only tests ask for are not in the library.
+pub fn make<N: equations::Operand>(name: &str) -> Option<crate::system::Make<N>> {
+    Some(match name {
+";
+
 fn main() -> io::Result<()> {
     let root = env::current_dir()?;
     let out = env::var("OUT_DIR").map_err(io::Error::other)?;
@@ -36,6 +42,13 @@ fn main() -> io::Result<()> {
             text += &format!("    &{name}::{constant},\n");
         }
         text += "];\n";
+        if folder == "systems" {
+            text += MAKE;
+            for name in &names {
+                text += &format!("        {name:?} => {name}::make,\n");
+            }
+            text += "        _ => return None,\n    })\n}\n";
+        }
         fs::write(Path::new(&out).join(format!("{folder}.rs")), text)?;
     }
     Ok(())

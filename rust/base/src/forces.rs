@@ -285,11 +285,13 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Along<'_, D, LAW, ENERGY
                 return;
             }
             let many = (last - first) / SIDE + 1;
+            // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks. A loop, so that
+            // the sweep is compiled once.
             let count = meeting(n, last);
-            hot.sweep(0, count, first, many);
-            if count < n && many > 1 {
-                // The others meet at all distances but the last. This is for 32 bodies only, so `count` is whole chunks.
-                hot.sweep(count, n, first, many - 1);
+            let (mut start, mut end, mut distances) = (0, count, many);
+            while start < end && distances > 0 {
+                hot.sweep(start, end, first, distances);
+                (start, end, distances) = (end, n, many - 1);
             }
         }
         let (out, _) = self.out.as_chunks_mut::<D>();

@@ -109,10 +109,8 @@ pub struct Kind {
     pub operations: fn(&Given) -> usize,
     /// The rates of one large member, where they are written by hand.
     pub long: Option<Long>,
-    /// The system over numbers, for tests.
-    pub numbers: Make<f64>,
     /// The system over symbols.
-    pub symbols: Make<Symbol>,
+    pub make: Make<Symbol>,
 }
 
 impl Kind {

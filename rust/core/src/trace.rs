@@ -142,7 +142,7 @@ pub(crate) fn block(first: usize, count: usize) -> Block<Symbol> {
 
 /// The system of a scene, scaled to the step h, under its control if it has one.
 fn system(kind: &Kind, p: &Parameters<Symbol>, tally: Symbol) -> Box<dyn System<Symbol>> {
-    controls::wrap(p, contact::wrap(p, (kind.symbols)(p)), tally)
+    controls::wrap(p, contact::wrap(p, (kind.make)(p)), tally)
 }
 
 /// The kind of system that is given.
@@ -249,7 +249,7 @@ fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize
 
 fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let scaled = |h: Symbol| (kind.symbols)(&parameters(given, h));
+    let scaled = |h: Symbol| (kind.make)(&parameters(given, h));
     let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
         if given.equations.is_some() {
             return scaled(step); // the push of their control depends on the step
@@ -280,7 +280,7 @@ fn trace_begin(tape: Tape, given: &Given, method: &Record) -> Result<(Tape, Vec<
     let series = method.program().series_order() > 0;
     Ok(record(tape, || {
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let begun = pace(shape).begun((kind.symbols)(&parameters(given, Symbol::of(1.0))).as_ref(), series, &v, &y);
+        let begun = pace(shape).begun((kind.make)(&parameters(given, Symbol::of(1.0))).as_ref(), series, &v, &y);
         let mut next = ids([&v, &y]);
         next.extend(begun.numbers().map(|symbol| symbol.0));
         next
@@ -290,7 +290,7 @@ fn trace_begin(tape: Tape, given: &Given, method: &Record) -> Result<(Tape, Vec<
 /// Steps by a series of that order, and its coefficients.
 fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let system = (kind.symbols)(&parameters(given, Symbol::of(1.0)));
+    let system = (kind.make)(&parameters(given, Symbol::of(1.0)));
     let terms = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
     let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
     (attempt_by(kind, given, shape, &terms), numbers)
@@ -300,7 +300,7 @@ fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec
 fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let one = parameters(given, Symbol::of(1.0));
-    let projected = controls::wrap(&one, (kind.symbols)(&one), Symbol::of(0.0));
+    let projected = controls::wrap(&one, (kind.make)(&one), Symbol::of(0.0));
     let budget = Symbol::new(Op::Param(BUDGET));
     let (pace, v, y) = series_pace::attempt(terms, projected.as_ref(), pace(shape), budget, &v, &y);
     let mut next = ids([&v, &y]);
@@ -341,7 +341,7 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
 
 /// A system with surfaces and the force from outside: what a method's start and finish see.
 pub(crate) fn around(kind: &Kind, p: &Parameters<Symbol>) -> Box<dyn System<Symbol>> {
-    controls::force::wrap(p, contact::wrap(p, (kind.symbols)(p)))
+    controls::force::wrap(p, contact::wrap(p, (kind.make)(p)))
 }
 
 /// Traces a program that changes the block v alone.
@@ -364,7 +364,7 @@ pub fn trace_record(tape: Tape, given: &Given, names: &[String]) -> Result<(Tape
     recorded(given, names)?;
     Ok(record(tape, || {
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let s = (kind.symbols)(&parameters(given, Symbol::new(Op::Step)));
+        let s = (kind.make)(&parameters(given, Symbol::new(Op::Step)));
         let mut next = ids([&v, &y]);
         for name in names {
             next.extend(s.record(name, &v, &y).into_iter().flatten().map(|symbol| symbol.0));
@@ -404,7 +404,7 @@ fn started(how: &How, choice: usize) -> How {
 
 /// Cuts a tape.
 pub(crate) fn cut<T: Real>(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
-    Stage::new(split(tape, next, |i| i == BUDGET || given.is_common(i), |table| given.is_common_table(table)))
+    Stage::new(split(tape, next, &|i| i == BUDGET || given.is_common(i), &|table| given.is_common_table(table)))
 }
 
 /// Approximate numbers of operations of the rates of a scene and of a step.

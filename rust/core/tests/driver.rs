@@ -234,7 +234,7 @@ fn sampled(common: bool, own: bool) -> Stage {
     let time = tape.push(if own { Op::State(1) } else { Op::Time });
     let sample = tape.push(Op::Sample(0, time));
     let next = if own { vec![sample, time] } else { vec![sample] };
-    Stage::new(split(&tape, &next, |_| true, |_| common))
+    Stage::new(split(&tape, &next, &|_| true, &|_| common))
 }
 
 const LANES: usize = 8;

@@ -16,7 +16,7 @@ use stepwell_core::{
     steppers::RECORDS,
     system::{self, Make, Shape, System},
     systems::{
-        KINDS,
+        self, KINDS,
         equations::{Equations, Invariant},
     },
     tape::{Counts, Id, Op, Tape, eval},
@@ -270,7 +270,7 @@ fn trace(method: &Record, given: &Given) -> (Tape, Vec<Id>) {
         let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
         let p = Parameters { given, h: Symbol::new(Op::Step), numbers, sample: |i, t| Symbol::new(Op::Sample(i, t.0)) };
         let symbols: Vec<Symbol> = (0..=state as u32).map(|i| Symbol::new(Op::State(i))).collect();
-        step(method, kind.symbols, &p, shape, Symbol::new(Op::Time), &symbols[..state], symbols[state])
+        step(method, kind.make, &p, shape, Symbol::new(Op::Time), &symbols[..state], symbols[state])
     });
     (tape, made.into_iter().map(|symbol| symbol.0).collect())
 }
@@ -314,7 +314,7 @@ fn a_tape_makes_what_the_step_makes() {
     let (h, t) = (0.0123, 1.7);
     let mut seen = 0;
     for given in systems() {
-        let kind = system::kind(&given.system).unwrap();
+        let (kind, make) = (system::kind(&given.system).unwrap(), systems::make(&given.system).unwrap());
         let parameters = numbers(given.parameters(), 1);
         for method in RECORDS.iter().filter(|method| method.program().series_order() == 0) {
             let shape = match kind.fit(&given, method) {
@@ -325,7 +325,7 @@ fn a_tape_makes_what_the_step_makes() {
             let state = numbers(shape.v + shape.y + 1, 2);
             let (tape, roots) = trace(method, &given);
             let p = Parameters { given: &given, h, numbers: parameters.clone(), sample };
-            let stepped = step(method, kind.numbers, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
+            let stepped = step(method, make, &p, shape, t, &state[..shape.v + shape.y], state[shape.v + shape.y]);
             let stepped: Vec<u64> = stepped.into_iter().map(f64::to_bits).collect();
             assert_eq!(evaluate(&tape, &roots, h, t, &parameters, &state), stepped, "{} on {given:?}", method.name);
             assert!(stepped.iter().all(|bits| f64::from_bits(*bits).is_finite()), "{} on {given:?}", method.name);
@@ -408,7 +408,7 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
         let (v, y) = state.split_at(n * dim);
         for (name, size) in (kind.quantities)(&given) {
             let p = Parameters { given: &given, h: 0.5, numbers: parameters.clone(), sample };
-            let made = quantity(kind.numbers, &p, &name, v, y);
+            let made = quantity(systems::make(kind.name).unwrap(), &p, &name, v, y);
             assert_eq!(made.len(), size, "{name}");
             let (tape, symbols) = record(Tape::default(), || {
                 let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
@@ -420,7 +420,7 @@ fn quantities_of_bodies_are_what_they_are_said_to_be() {
                 };
                 let symbols: Vec<Symbol> = (0..2 * (n * dim) as u32).map(|i| Symbol::new(Op::State(i))).collect();
                 let (v, y) = symbols.split_at(n * dim);
-                quantity(kind.symbols, &p, &name, v, y)
+                quantity(kind.make, &p, &name, v, y)
             });
             let roots: Vec<Id> = symbols.into_iter().map(|symbol| symbol.0).collect();
             let bits: Vec<u64> = made.iter().map(|number| number.to_bits()).collect();
@@ -500,9 +500,8 @@ fn forces_of_the_velocity_are_refused_where_they_do_harm() {
 #[test]
 fn what_is_carried_turns_back_into_the_velocity() {
     let given = bodies(3, 3, "newton", &[]);
-    let kind = system::kind("nbody").unwrap();
     let p = Parameters { given: &given, h: 0.01, numbers: numbers(given.parameters(), 5), sample };
-    let system: Box<dyn System<f64>> = (kind.numbers)(&p);
+    let system: Box<dyn System<f64>> = systems::make("nbody").unwrap()(&p);
     let (v, y) = (DVector::from_vec(numbers(9, 6)), DVector::from_vec(numbers(9, 7)));
     for record in RECORDS {
         let choices = record.carry.as_ref().map_or(0, |carry| carry.starts.len().max(1));

@@ -198,9 +198,9 @@ fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], l
     let row = |at: usize| cells[at..at + lanes].as_chunks::<TOGETHER>();
     let ((to, to_end), (a, a_end), (b, b_end), (c, c_end)) = (row(to), row(a), row(b), row(c));
     macro_rules! each {
-        ($($kind:pat => $same:expr),* $(,)?) => {
+        ($($kind:pat $(if $known:expr)? => $same:expr),* $(,)?) => {
             match op {
-                $($kind => {
+                $($kind $(if $known)? => {
                     for (((to, a), b), c) in to.iter().zip(a).zip(b).zip(c) {
                         let made: [T; TOGETHER] =
                             std::array::from_fn(|l| T::apply($same, a[l].get(), b[l].get(), c[l].get()));
@@ -210,6 +210,9 @@ fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], l
                         to.set(T::apply($same, a.get(), b.get(), c.get()));
                     }
                 })*
+                Op::ShiftUp(..) | Op::ShiftDown(..) => {
+                    to.iter().flatten().chain(to_end).for_each(|to| to.set(T::from_pattern(0)));
+                }
                 // Not a wild card: the compiler asks for a line for each new operation.
                 Op::State(_) | Op::Param(_) | Op::Step | Op::Time | Op::Const(_) | Op::Sample(..) => {}
                 Op::Row(_) | Op::Uniform(_) | Op::PerStep(_) | Op::Held(_) | Op::Gather(_) => {}
@@ -217,6 +220,8 @@ fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], l
         };
     }
     const ANY: Id = 0;
+    // A loop that knows that something is left of a number need not ask in every lane.
+    let bits = 8 * size_of::<T>() as u32;
     each! {
         Op::Add(..) => Op::Add(ANY, ANY),
         Op::Sub(..) => Op::Sub(ANY, ANY),
@@ -236,8 +241,8 @@ fn apply<T: Real>(op: Op, scratch: &mut [T], to: usize, [a, b, c]: [usize; 3], l
         Op::Or(..) => Op::Or(ANY, ANY),
         Op::Xor(..) => Op::Xor(ANY, ANY),
         Op::AddBits(..) => Op::AddBits(ANY, ANY),
-        Op::ShiftUp(_, n) => Op::ShiftUp(ANY, n),
-        Op::ShiftDown(_, n) => Op::ShiftDown(ANY, n),
+        Op::ShiftUp(_, n) if n < bits => Op::ShiftUp(ANY, n),
+        Op::ShiftDown(_, n) if n < bits => Op::ShiftDown(ANY, n),
         Op::Copy(_) => Op::Copy(ANY),
     }
 }

@@ -353,6 +353,6 @@ impl Plan {
         for (row, node) in writes {
             next[*row] = known[*node].unwrap_or(0);
         }
-        Stage::new(split(&tape, &next, |_| true, |_| true))
+        Stage::new(split(&tape, &next, &|_| true, &|_| true))
     }
 }

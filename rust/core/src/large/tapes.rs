@@ -53,7 +53,7 @@ fn rate(
         let state = |i: usize| Symbol::new(Op::State(i as u32));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, Symbol::new(Op::Step));
-        let s = controls::wrap(&p, contact::wrap(&p, (kind.symbols)(&p)), state(behind(shape)));
+        let s = controls::wrap(&p, contact::wrap(&p, (kind.make)(&p)), state(behind(shape)));
         let (made, v, y) = make(s.as_ref(), v, y);
         let mut next = ids([&v, &y]);
         next.extend(made.iter().flat_map(|made| made.iter().map(|symbol| symbol.0)));
@@ -110,7 +110,7 @@ impl Rated {
             record(Tape::default(), || {
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
                 let p = parameters(given, Symbol::new(Op::Step));
-                let s = controls::force::wrap(&p, contact::wrap(&p, (kind.symbols)(&p)));
+                let s = controls::force::wrap(&p, contact::wrap(&p, (kind.make)(&p)));
                 let mut next = ids([&v, &y]);
                 let made = names.iter().filter_map(|name| s.record(name, &v, &y)).flatten();
                 next.extend(made.map(|symbol| symbol.0));

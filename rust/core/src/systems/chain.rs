@@ -19,8 +19,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |given| 6 * given.count("mass"),
     long: Some(Long { from: (6 * 64, 800), from_batch: 0, make: chain::make }),
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -36,7 +35,7 @@ struct Chain<N: Number> {
     by_mass: Vec<N>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let by_mass = p.numbers("mass").iter().map(|mass| p.h / *mass).collect();
     Box::new(Chain { h: p.h, stiffness: p.numbers("stiffness").to_vec(), by_mass })
 }

@@ -24,8 +24,7 @@ pub const KIND: Kind = Kind {
     quantities,
     operations: |given| given.equations.as_ref().map_or(0, |e| e.operations()),
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 /// An invariant that is kept, and its gradient.
@@ -256,7 +255,8 @@ fn shape(given: &Given) -> Result<Shape, Error> {
 }
 
 /// A number on which every operation is defined.
-trait Operand: Number {
+pub trait Operand: Number {
+    /// What an operation makes.
     fn made(op: Op, operands: [Self; 3]) -> Self;
 
     /// Whether a series is traced, which must know what is a function of what.
@@ -300,7 +300,7 @@ struct Own<N: Number> {
     of_y: Vec<bool>,
 }
 
-fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Operand>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let equations =
         p.given.equations.clone().unwrap_or_else(|| Equations::new(Vec::new(), Vec::new(), None, Vec::new(), None).into());
     let (of_v, of_y) = (equations.needed(&equations.dv), equations.needed(equations.dy.as_deref().unwrap_or(&[])));

@@ -20,8 +20,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |given| 2 * given.count("rows"),
     long: Some(Long { from: (2 * 19 * 19, usize::MAX), from_batch: 2 * 150 * 150, make: linear::make }),
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn input(i: usize) -> String {
@@ -55,7 +54,7 @@ struct Linear<N: Number> {
     velocities: usize,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let inputs = (0..p.given.whole("inputs")).map(|i| p.signal(&input(i)).unwrap_or(Signal::Constant(N::of(f64::NAN))));
     let inputs: Vec<_> = inputs.collect();
     let velocities = p.given.whole("n_v");

@@ -29,8 +29,7 @@ pub const KIND: Kind = Kind {
     quantities,
     operations: |given| 11 * given.count("masses").pow(2),
     long: Some(Long { from: (11 * 10 * 10, usize::MAX), from_batch: 11 * 106 * 106, make: bodies::make }),
-    numbers: make::<f64>,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -94,7 +93,7 @@ struct Bodies<N: Number> {
     half: Vec<N>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, masses, softening) = (p.h, p.numbers("masses").to_vec(), p.number("softening"));
     let strength = p.numbers("strength").iter().map(|strength| h * *strength).collect();
     let half = masses.iter().map(|mass| (N::of(0.5) * h) * *mass).collect();

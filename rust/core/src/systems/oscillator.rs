@@ -21,8 +21,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |_| 40,
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -40,7 +39,7 @@ struct Oscillator<N: Number> {
     inputs: Vec<Signal<N>>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, omega) = (p.h, p.number("omega"));
     let canonical = p.given.word("form") == "canonical";
     let stiffness = if canonical { h * omega } else { h * (omega * omega) };

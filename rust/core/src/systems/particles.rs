@@ -15,8 +15,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |given| 3 * given.count("masses") * given.whole("dim"),
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -34,7 +33,7 @@ struct Particles<N: Number> {
     drag: Option<Vec<N>>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let kick = p.numbers("gravity").iter().map(|g| p.h * *g).collect();
     let drag = p.maybe("drag").map(|drag| p.numbers("masses").iter().map(|mass| (p.h * drag) / *mass).collect());
     Box::new(Particles { h: p.h, kick, drag })

@@ -17,8 +17,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |_| 60,
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -33,7 +32,7 @@ struct Pendulum<N: Number> {
     input: Option<Signal<N>>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, omega) = (p.h, p.number("omega"));
     let input = p.signal("a").map(|a| a.scaled(h));
     // A driven pendulum always has its damping term.

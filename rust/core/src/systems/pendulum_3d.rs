@@ -16,8 +16,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| vec![("length_error".to_owned(), 1), ("angular_momentum".to_owned(), 3)],
     operations: |_| 25,
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -36,7 +35,7 @@ struct Pendulum3D<N: Number> {
     keeps: Keeps<N>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, length) = (p.h, p.number("length"));
     Box::new(Pendulum3D { h, length, square: length * length, fall: h * p.number("gravity"), keeps: Keeps::new(p) })
 }

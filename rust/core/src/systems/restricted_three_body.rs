@@ -18,8 +18,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| Vec::new(),
     operations: |_| 40,
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -34,7 +33,7 @@ struct RestrictedThreeBody<N: Number> {
     light: N,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let (h, mu) = (p.h, p.number("mu"));
     Box::new(RestrictedThreeBody { h, mu, heavy: h * (N::of(1.0) - mu), light: h * mu })
 }

@@ -20,8 +20,7 @@ pub const KIND: Kind = Kind {
     quantities: |_| vec![("angular_momentum".to_owned(), 3), ("norm_error".to_owned(), 1)],
     operations: |given| if given.has("weight") || given.whole("space_torque") > 0 { 130 } else { 50 },
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -63,7 +62,7 @@ fn along<N: Number>(p: &Parameters<N>, name: &str) -> Option<Vector<N>> {
     p.numbers(name).try_into().ok()
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let h = p.h;
     let inertia = along(p, "inertia").unwrap_or([N::of(f64::NAN); 3]); // `shape` has seen that there are three
     let by_inertia = inertia.map(|inertia| h / inertia);

@@ -24,8 +24,7 @@ pub const KIND: Kind = Kind {
     },
     operations,
     long: None,
-    numbers: make,
-    symbols: make,
+    make,
 };
 
 /// Newton's corrections of the points in a projection. Each squares the relative error of the lengths, over 2: 2 % becomes 2·10⁻⁴,
@@ -132,7 +131,7 @@ struct Rods<N: Number> {
     keeps: Keeps<N>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     let links = Links::new(p);
     Box::new(Rods {
         h: p.h,

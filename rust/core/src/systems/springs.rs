@@ -28,8 +28,7 @@ pub const KIND: Kind = Kind {
     quantities,
     operations,
     long: Some(Long { from: (MAX_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS), from_batch: 60_000, make: springs::make }),
-    numbers: make::<f64>,
-    symbols: make,
+    make,
 };
 
 fn shape(given: &Given) -> Result<Shape, Error> {
@@ -106,7 +105,7 @@ pub(crate) struct Springs<N: Number> {
     slowing: Vec<N>,
 }
 
-fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
+pub(super) fn make<N: Number>(p: &Parameters<N>) -> Box<dyn System<N>> {
     Box::new(net(p))
 }
 

@@ -116,32 +116,41 @@ impl Op {
     /// The same operation with other operands.
     #[must_use]
     pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
+        let (mut operands, n) = self.operands();
+        for id in &mut operands[..n] {
+            *id = f(*id);
+        }
+        self.over(operands)
+    }
+
+    /// The same operation over the first so many of three operands.
+    fn over(self, [a, b, c]: [Id; 3]) -> Op {
         use Op::*;
         match self {
             State(_) | Param(_) | Step | Time | Const(_) | Row(_) | Uniform(_) | PerStep(_) | Held(_) => self,
-            Sample(i, a) => Sample(i, f(a)),
-            Sqrt(a) => Sqrt(f(a)),
-            Neg(a) => Neg(f(a)),
-            Floor(a) => Floor(f(a)),
-            ShiftUp(a, n) => ShiftUp(f(a), n),
-            ShiftDown(a, n) => ShiftDown(f(a), n),
-            Copy(a) => Copy(f(a)),
-            Gather(a) => Gather(f(a)),
-            Add(a, b) => Add(f(a), f(b)),
-            Sub(a, b) => Sub(f(a), f(b)),
-            Mul(a, b) => Mul(f(a), f(b)),
-            Div(a, b) => Div(f(a), f(b)),
-            Less(a, b) => Less(f(a), f(b)),
-            LessEqual(a, b) => LessEqual(f(a), f(b)),
-            Equal(a, b) => Equal(f(a), f(b)),
-            MulAdd(a, b, c) => MulAdd(f(a), f(b), f(c)),
-            MulSub(a, b, c) => MulSub(f(a), f(b), f(c)),
-            SubMul(a, b, c) => SubMul(f(a), f(b), f(c)),
-            Select(m, a, b) => Select(f(m), f(a), f(b)),
-            And(a, b) => And(f(a), f(b)),
-            Or(a, b) => Or(f(a), f(b)),
-            Xor(a, b) => Xor(f(a), f(b)),
-            AddBits(a, b) => AddBits(f(a), f(b)),
+            Sample(i, _) => Sample(i, a),
+            Sqrt(_) => Sqrt(a),
+            Neg(_) => Neg(a),
+            Floor(_) => Floor(a),
+            ShiftUp(_, n) => ShiftUp(a, n),
+            ShiftDown(_, n) => ShiftDown(a, n),
+            Copy(_) => Copy(a),
+            Gather(_) => Gather(a),
+            Add(..) => Add(a, b),
+            Sub(..) => Sub(a, b),
+            Mul(..) => Mul(a, b),
+            Div(..) => Div(a, b),
+            Less(..) => Less(a, b),
+            LessEqual(..) => LessEqual(a, b),
+            Equal(..) => Equal(a, b),
+            MulAdd(..) => MulAdd(a, b, c),
+            MulSub(..) => MulSub(a, b, c),
+            SubMul(..) => SubMul(a, b, c),
+            Select(..) => Select(a, b, c),
+            And(..) => And(a, b),
+            Or(..) => Or(a, b),
+            Xor(..) => Xor(a, b),
+            AddBits(..) => AddBits(a, b),
         }
     }
 

@@ -42,7 +42,7 @@ impl Body {
     }
 
     /// The values of the tape named `roots`, over leaves as `leaf` names them; `None` leaves an operation as it is.
-    fn of(tape: &Tape, roots: &[Id], mut leaf: impl FnMut(Id) -> Option<Op>) -> Body {
+    fn of(tape: &Tape, roots: &[Id], leaf: &mut dyn FnMut(Id) -> Option<Op>) -> Body {
         // From the back: what is a leaf here needs nothing.
         let mut leaves: Vec<Option<Op>> = vec![None; tape.ops().len()];
         let mut needed = vec![false; tape.ops().len()];
@@ -244,12 +244,15 @@ pub struct Split {
 /// From this fraction of an interval before a sample's time on the sample is taken: rounding may put t = t₀ + k·h just before it.
 pub const HOLD_SLACK: f64 = 1e-6;
 
+/// Whether all members share a parameter, or an input, of that number.
+type IsShared<'a> = &'a dyn Fn(u32) -> bool;
+
 /// Cuts a tape. `uniform` says which parameters all members share, `common` which inputs.
-pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: impl Fn(u32) -> bool) -> Split {
+pub fn split(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared) -> Split {
     let mut tape = tape.clone();
-    let next = look_up_samples(&mut tape, next, &uniform);
-    let next = hoist_signs(&mut tape, &next, &uniform);
-    let ranks = ranks(&tape, &uniform);
+    let next = look_up_samples(&mut tape, next, uniform);
+    let next = hoist_signs(&mut tape, &next, uniform);
+    let ranks = ranks(&tape, uniform);
     let rank = |id: Id| ranks[id as usize];
     let mut split = Split::default();
 
@@ -261,7 +264,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: impl Fn(u32) -> bool, common: im
         list.len() as u32 - 1
     };
     let mut samples: Vec<(u32, Id)> = Vec::new();
-    split.body = Body::of(&tape, &next, |id| match rank(id) {
+    split.body = Body::of(&tape, &next, &mut |id| match rank(id) {
         Rank::Constant => None,
         Rank::Run => Some(Op::Uniform(number(&mut uniforms, id))),
         Rank::Member => Some(Op::Row(number(&mut rows, id))),
@@ -369,7 +372,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
 }
 
 /// Looks up samples for each member by itself, where members have times of their own.
-fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
+fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: IsShared) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let old = std::mem::replace(tape, Tape::new(tape.precision()));
     let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
@@ -389,7 +392,7 @@ fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool)
     next.iter().map(|id| place[*id as usize]).collect()
 }
 
-fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
+fn ranks(tape: &Tape, uniform: IsShared) -> Vec<Rank> {
     let mut ranks: Vec<Rank> = Vec::with_capacity(tape.ops().len());
     for op in tape.ops() {
         let rank = match *op {
@@ -412,7 +415,7 @@ fn ranks(tape: &Tape, uniform: &impl Fn(u32) -> bool) -> Vec<Rank> {
 }
 
 /// Moves a change of sign from a product that is computed in every step to its factor that is computed once.
-fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: &impl Fn(u32) -> bool) -> Vec<Id> {
+fn hoist_signs(tape: &mut Tape, next: &[Id], uniform: IsShared) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let needed = tape.needed(next.iter().copied());
     let mut uses = vec![0u32; tape.ops().len()];

@@ -209,7 +209,7 @@ fn a_tape_that_was_cut_has_them_as_well() {
             let ops = tape.ops().to_vec();
             (tape, ops, next.clone(), next)
         };
-        let stage = Stage::new(split(&tape, &next, |i| i < COMMON, |input| input == 0));
+        let stage = Stage::new(split(&tape, &next, &|i| i < COMMON, &|input| input == 0));
         let bodies = [&stage.split.run, &stage.split.member, &stage.split.step, &stage.split.body];
         ranks.iter_mut().zip(bodies).for_each(|(count, body)| *count += body.work());
         ranks[4] += stage.split.body.per_step;

@@ -15,7 +15,7 @@ use self::{
     share::{Share, add, share},
 };
 use super::{Asked, Facts, Rates};
-use crate::{isa::with_isa, run::workers::Stop, spec::Spec, systems::nbody};
+use crate::{run::workers::Stop, spec::Spec, systems::nbody};
 
 /// Bodies that are taken side by side, and parts in which sums over bodies are kept.
 const SIDE: usize = LANES;
@@ -195,10 +195,12 @@ impl Rates for Bodies {
     }
 
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
-        let (h, what, mass, half, potential) = (self.h, &self.record[..], &self.mass[..], &self.half[..], &self.potential[..]);
+        let (level, h, what, mass, half, potential) =
+            (self.kernel.level, self.h, &self.record[..], &self.mass[..], &self.half[..], &self.potential[..]);
+        let record = Record { level, h, what, mass, half, potential, v, y, rows };
         match self.kernel.dim {
-            2 => with_isa!(self.kernel.level, |isa| isa.run(Record::<2> { h, what, mass, half, potential, v, y, rows })),
-            _ => with_isa!(self.kernel.level, |isa| isa.run(Record::<3> { h, what, mass, half, potential, v, y, rows })),
+            2 => record.fill::<2>(),
+            _ => record.fill::<3>(),
         }
     }
 }

@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
 use super::SIDE;
-use crate::isa::Task;
+use crate::isa::{Level, Task, with_isa};
 
 /// A quantity of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,9 @@ pub(super) fn kinetic(dim: usize, half: &[f64], v: &[f64]) -> f64 {
 }
 
 /// Fills rows with quantities, one after the other.
-pub(super) struct Record<'a, const D: usize> {
+pub(super) struct Record<'a> {
+    /// What the search for the nearest two may use. The others are sums over bodies, which take little beside a force.
+    pub(super) level: Level,
     pub(super) h: f64,
     pub(super) what: &'a [Quantity],
     pub(super) mass: &'a [f64],
@@ -96,10 +98,10 @@ pub(super) struct Record<'a, const D: usize> {
     pub(super) rows: &'a mut [f64],
 }
 
-impl<const D: usize> Task for Record<'_, D> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { h, what, mass, half, potential, v, y, rows } = self;
+impl Record<'_> {
+    /// Does it, in so many directions.
+    pub(super) fn fill<const D: usize>(self) {
+        let Self { level, h, what, mass, half, potential, v, y, rows } = self;
         let ((places, _), (speeds, _)) = (y.as_chunks::<D>(), v.as_chunks::<D>());
         let mut at = 0;
         for quantity in what {
@@ -121,35 +123,43 @@ impl<const D: usize> Task for Record<'_, D> {
                         *row = total(mass, speeds, |i, m, v| m * (places[i][a] * v[b] - places[i][b] * v[a]));
                     }
                 }
-                Quantity::Closest => rows[0] = closest(places),
+                Quantity::Closest => with_isa!(level, |isa| isa.run(Closest { bodies: places, least: &mut rows[0] })),
             }
         }
     }
 }
 
 /// The least distance, eight partners at a time. The order of the pairs does not matter.
-#[inline(always)]
-fn closest<const D: usize>(bodies: &[[f64; D]]) -> f64 {
-    let n = bodies.len();
-    // Padding has NaN coordinates, which are never the nearest.
-    let along = n.next_multiple_of(SIDE) + SIDE;
-    let row = |c: usize| -> Vec<f64> { (0..along).map(|i| bodies.get(i).map_or(f64::NAN, |body| body[c])).collect() };
-    let rows: [Vec<f64>; D] = std::array::from_fn(row);
-    let mut parts = [f64::INFINITY; SIDE];
-    for (i, body) in bodies.iter().enumerate() {
-        for start in (i + 1..n).step_by(SIDE) {
-            let mut r2 = [0.0; SIDE];
-            for c in 0..D {
-                let partners = &rows[c][start..start + SIDE];
+struct Closest<'a, const D: usize> {
+    bodies: &'a [[f64; D]],
+    least: &'a mut f64,
+}
+
+impl<const D: usize> Task for Closest<'_, D> {
+    #[inline(always)]
+    fn run(self) {
+        let bodies = self.bodies;
+        let n = bodies.len();
+        // Padding has NaN coordinates, which are never the nearest.
+        let along = n.next_multiple_of(SIDE) + SIDE;
+        let row = |c: usize| -> Vec<f64> { (0..along).map(|i| bodies.get(i).map_or(f64::NAN, |body| body[c])).collect() };
+        let rows: [Vec<f64>; D] = std::array::from_fn(row);
+        let mut parts = [f64::INFINITY; SIDE];
+        for (i, body) in bodies.iter().enumerate() {
+            for start in (i + 1..n).step_by(SIDE) {
+                let mut r2 = [0.0; SIDE];
+                for c in 0..D {
+                    let partners = &rows[c][start..start + SIDE];
+                    for l in 0..SIDE {
+                        let d = partners[l] - body[c];
+                        r2[l] = if c == 0 { d * d } else { r2[l] + d * d };
+                    }
+                }
                 for l in 0..SIDE {
-                    let d = partners[l] - body[c];
-                    r2[l] = if c == 0 { d * d } else { r2[l] + d * d };
+                    parts[l] = if r2[l] < parts[l] { r2[l] } else { parts[l] };
                 }
             }
-            for l in 0..SIDE {
-                parts[l] = if r2[l] < parts[l] { r2[l] } else { parts[l] };
-            }
         }
+        *self.least = parts.into_iter().fold(f64::INFINITY, |least, part| if part < least { part } else { least }).sqrt();
     }
-    parts.into_iter().fold(f64::INFINITY, |least, part| if part < least { part } else { least }).sqrt()
 }
