@@ -142,6 +142,38 @@ def test_the_look_ahead_of_floats_and_of_arrays_agree(force: str) -> None:
     assert 0.02 < np.mean(found) < 0.9
 
 
+def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the others do to a pair is a sum over all bodies, so it is computed of those pairs only that would else be told of.
+
+    For every pair it would be 2·64·2016 numbers for each state, which took three times as long as the run.
+    """
+    sizes = []
+
+    def spread(square: Any, newton: bool, of: Any = _encounters._spread) -> Any:
+        sizes.append(np.size(square))
+        return of(square, newton)
+
+    monkeypatch.setattr(_encounters, "_spread", spread)
+    rng = np.random.default_rng(1)
+    bodies = sw.NBody(np.full(64, 1 / 64), force="newton", dim=3, softening=0.05)
+    v, y = 0.1 * rng.normal(size=(64, 3)), rng.normal(size=(64, 3))
+    _, text = told(bodies, "false_euler", v=v, y=y, dt=1e-4, steps=2500)
+    assert text == ""
+    pairs, states = 64 * 63 // 2, 2
+    assert 0 < sum(sizes) <= states * pairs
+
+
+@pytest.mark.parametrize("batch", [(), (3,), (2, 2)])
+@pytest.mark.parametrize("force", ["newton", "logarithmic", "printed"])
+@pytest.mark.parametrize("n", [_doubt.MIN_BODIES_BY_CORE, 65])
+def test_energies_that_are_looked_at_are_those_of_the_system(n: int, force: str, batch: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(n)
+    bodies = sw.NBody(rng.uniform(0.1, 1.0, size=n), force=force, dim=3, softening=0.05)
+    v, y = rng.normal(size=(2, n, 3, *batch))
+    run = sw.integrate(bodies, "false_euler", v=v, y=y, dt=1e-3, steps=1)
+    np.testing.assert_array_equal(_doubt._energies(run, bodies, v, y), bodies.energy(v, y))
+
+
 def test_the_look_ahead_is_right_of_two_bodies() -> None:
     """Kepler's ellipse of semi-axis 1 and pericentre q: a step h turns it by a right angle there at h·w = 2q."""
     bodies, h = sw.NBody([1.0, 0.0], force="newton"), 0.01

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _encounters
+from . import _encounters, engine
 from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
 from .control import EnergyControl
 from .errors import AccuracyWarning, ControlWarning
+from .method_records import method
 from .result import Run
 from .systems import NBody
 
@@ -27,6 +28,9 @@ FEW_BODIES, FEW_EVALUATIONS = 8, 100
 #: Other energies take NumPy: a run must make so many rate evaluations, and of so many pairs in all, not to notice it. States of
 #: more numbers than the last would take memory that was not counted.
 EVALUATIONS, PAIRS, MOST_NUMBERS = 2000, 200_000, 1_000_000
+
+#: From so many bodies on the core has an energy, with a step that is not needed, sooner than NumPy.
+MIN_BODIES_BY_CORE = 24
 
 #: Pairs are looked at in so many saved states at most.
 STATES = 32
@@ -194,7 +198,18 @@ def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:
     start = np.broadcast_to(start[0], end[0].shape), start[1]  # one number may have been given for all
     with np.errstate(all="ignore"):
         moved = np.maximum(bodies.kinetic(start[0]), bodies.kinetic(end[0]))
-        return Ends(bodies.energy(*start), bodies.energy(*end), moved)
+        return Ends(_energies(run, bodies, *start), _energies(run, bodies, *end), moved)
+
+
+def _energies(run: Run, bodies: NBody, v: Array, y: Array) -> Array:
+    """The energies of a state, which have the same bits either way."""
+    if len(y) < MIN_BODIES_BY_CORE:
+        return bodies.energy(v, y)
+    step = engine.Plan(bodies, method("false_euler"), run.status.shape, 1.0, every=1, threads=1, record=("energy",))
+    recorded = engine.advance(step, v, y).recorded
+    assert recorded is not None
+    energies: Array = recorded["energy"][0]
+    return energies
 
 
 def _least(counts: Any) -> int:

@@ -237,16 +237,20 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         reaches = energy > potential(near2 + soft2) + 2.0 * (near2 + soft2) / (h * h)
         middle = energy - potential(0.25 * r2 + soft2)
         in_time = np.sqrt(r2) <= 2.0 * time * np.sqrt(np.maximum(0.0, 2.0 * middle))
-        by_others = np.zeros_like(d)
-        for k in range(len(y)):
+        within = strength > 0.0
+        near, may = within & (r2 <= near2), within & ~parts & reaches & in_time
+        # How strongly the others pull a pair apart takes longest, and few pairs come so far.
+        far = np.flatnonzero(may.reshape(len(i), -1).any(axis=1))
+        i, j, by_others = i[far], j[far], np.zeros_like(d[far])
+        for k in range(len(y) if far.size else 0):
             to_j, to_i = y[k] - y[j], y[k] - y[i]  # pairs, coordinates, batch
             for toward, sign in ((to_i, 1.0), (to_j, -1.0)):
                 square = (toward * toward).sum(axis=1, keepdims=True) + soft2
                 pull = (bodies.G * masses[k]) * toward / _spread(square, newton)
                 by_others += sign * np.where((k != i) & (k != j), pull.T, 0.0).T
-        alone = np.sqrt((by_others * by_others).sum(axis=1)) <= np.sqrt(r2) * strength / _spread(r2 + soft2, newton)
-        may = (strength > 0.0) & ((r2 <= near2) | (~parts & reaches & in_time & alone))
-    return may.any(axis=0)
+        attraction = np.broadcast_to(np.sqrt(r2) * strength / _spread(r2 + soft2, newton), r2.shape)[far]
+        may[far] &= np.sqrt((by_others * by_others).sum(axis=1)) <= attraction
+    return (near | may).any(axis=0)
 
 
 def collision(plan: engine.Plan, v: Array, y: Array, carried: bool, index: tuple[int, ...], step: int) -> Collision:
