@@ -146,22 +146,41 @@ impl<const D: usize> Bodies<D> {
                 more[l] = const { law(LAW) }.potential(r2, pull, p.strength[l]);
             }
         }
-        // Adding −0 changes no sum. Bits, not a choice, which would become eight branches.
-        let if_met = |x: f64, l: usize| match met {
-            Some(met) => f64::from_bits(x.to_bits() & met[l] | (-0.0f64).to_bits() & !met[l]),
-            None => x,
-        };
-        for c in 0..D {
-            for l in 0..SIDE {
-                self.pull[c][l] += if_met(d[c][l] * to_i[l], l);
-                p.pull[c][l] += if_met(d[c][l] * to_j[l], l);
-            }
+        // Written out: as a loop it is so long that the compiler leaves it one, and gathers its vectors from three directions.
+        self.pull_along(0, p, &d, [&to_i, &to_j], met);
+        self.pull_along(1, p, &d, [&to_i, &to_j], met);
+        if D == 3 {
+            self.pull_along(2, p, &d, [&to_i, &to_j], met);
         }
         if ENERGY {
-            for l in 0..SIDE {
-                self.well[l] += if_met(more[l], l);
-            }
+            add(&mut self.well, more, met);
         }
+    }
+
+    /// Adds the forces in one direction.
+    #[inline(always)]
+    fn pull_along(&mut self, c: usize, p: &mut Partners<D>, d: &[Chunk; D], to: [&Chunk; 2], met: Option<&[u64; SIDE]>) {
+        let (mut of_i, mut of_j) = ([0.0; SIDE], [0.0; SIDE]);
+        for l in 0..SIDE {
+            of_i[l] = d[c][l] * to[0][l];
+            of_j[l] = d[c][l] * to[1][l];
+        }
+        add(&mut self.pull[c], of_i, met);
+        add(&mut p.pull[c], of_j, met);
+    }
+}
+
+/// Adds to sums what counts: all of it, or what the mask has bits for.
+#[inline(always)]
+fn add(sums: &mut Chunk, mut more: Chunk, met: Option<&[u64; SIDE]>) {
+    if let Some(met) = met {
+        for l in 0..SIDE {
+            // Adding −0 changes no sum. Bits, not a choice, which would become eight branches.
+            more[l] = f64::from_bits(more[l].to_bits() & met[l] | (-0.0f64).to_bits() & !met[l]);
+        }
+    }
+    for l in 0..SIDE {
+        sums[l] += more[l];
     }
 }
 
