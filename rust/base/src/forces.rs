@@ -264,16 +264,12 @@ impl<const D: usize, const LAW: u8, const ENERGY: bool> Hot<'_, D, LAW, ENERGY> 
             self.hold::<2>(start, first, many, None);
             start += 2 * SIDE;
         }
-        if start < end {
+        // What is left, chunk by chunk: the order of every sum is the same.
+        while start < end {
             let mut met = [0; SIDE];
-            let two = start + SIDE < end;
-            let left = end - start - if two { SIDE } else { 0 };
-            met[..left].fill(u64::MAX);
-            if two {
-                self.hold::<2>(start, first, many, Some(&met));
-            } else {
-                self.hold::<1>(start, first, many, Some(&met));
-            }
+            met[..SIDE.min(end - start)].fill(u64::MAX);
+            self.hold::<1>(start, first, many, Some(&met));
+            start += SIDE;
         }
     }
 }
