@@ -112,10 +112,12 @@ def draw() -> None:
         axes.plot(r.best, y, "D", color="white", markeredgecolor=best, markeredgewidth=1.6, markersize=6, zorder=2)
     axes.axvline(1.0, color="#222222", linewidth=1.0, zorder=0)
     axes.set_xscale("log")
-    ticks = [0.5, 0.7, 1.0, 1.4, 2.0]
+    every = [each for r in found for each in (r.exact, r.best)]
+    low, high = min(0.45, *every) / 1.08, max(2.0, *every) * 1.08  # no point is cut off
+    ticks = [tick for tick in (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0) if low <= tick <= high]
     axes.set_xticks(ticks, [f"{tick:g}×" for tick in ticks])
     axes.minorticks_off()
-    axes.set_xlim(0.42, 2.1)
+    axes.set_xlim(low, high)
     axes.set_ylim(-0.7, len(found) + 1.2)
     axes.set_yticks(range(len(found)), [f"{r.name}  ({r.peer})" for r in reversed(found)])
     axes.tick_params(axis="y", length=0)

@@ -88,10 +88,10 @@ def table(repeats: int, quick: bool = False) -> list[tuple[str, str, str]]:
     """What, how much, and what was aimed at."""
     return [
         ("`import stepwell` after NumPy", import_time(repeats), "≤ 20 ms"),
-        ("`World.step(1)`, one oscillator", world_step(repeats), "≤ 0.2 µs beyond arithmetic"),
+        ("`World.step(1)`, one oscillator", world_step(repeats), "≤ 0.15 µs beyond arithmetic"),
         *(
-            (f"energy control beyond the plain step, {n} bodies, False Euler", control_cost(n, repeats, quick), "≤ 15 %")
+            (f"energy control beyond the plain step, {n} bodies, False Euler", control_cost(n, repeats, quick), "≤ 5 %")
             for n in (64, 1024)
         ),
-        ("wheel", wheel(), "≤ 3 MB"),
+        ("wheel", wheel(), "≤ 2.5 MB"),
     ]
