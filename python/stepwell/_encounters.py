@@ -237,8 +237,8 @@ def may_meet_each(bodies: NBody, h: float, time: float, v: Array, y: Array) -> A
         reaches = energy > potential(near2 + soft2) + 2.0 * (near2 + soft2) / (h * h)
         middle = energy - potential(0.25 * r2 + soft2)
         in_time = np.sqrt(r2) <= 2.0 * time * np.sqrt(np.maximum(0.0, 2.0 * middle))
-        within = strength > 0.0
-        near, may = within & (r2 <= near2), within & ~parts & reaches & in_time
+        attract = strength > 0.0
+        near, may = attract & (r2 <= near2), attract & ~parts & reaches & in_time
         # How strongly the others pull a pair apart takes longest, and few pairs come so far.
         far = np.flatnonzero(may.reshape(len(i), -1).any(axis=1))
         i, j, by_others = i[far], j[far], np.zeros_like(d[far])

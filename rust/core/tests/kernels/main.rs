@@ -177,6 +177,28 @@ fn what_is_no_body_is_not_written() {
     }
 }
 
+/// Machine code has none of these; the interpreter has a loop for shifts that leave something of a number, and another for the rest.
+fn shifts_are_as_defined<T: Real>() {
+    let bits = 8 * size_of::<T>() as u32;
+    for places in [0, 1, bits - 1, bits, bits + 1, 200] {
+        for op in [Op::ShiftUp(0, places), Op::ShiftDown(0, places)] {
+            for lanes in [1, 8, 11] {
+                let body = Body { ops: vec![Op::State(0), op], next: vec![1], precision: T::PRECISION, ..Body::default() };
+                let inputs = Inputs::<T>::new(&mut Random(3), &body, lanes, 1);
+                let want = inputs.state.iter().map(|x| T::apply(op, *x, *x, *x).pattern());
+                let got = inputs.run(&Interpreter::new(&body, lanes, Level::Baseline), &mut Vec::new());
+                assert!(got.iter().map(|x| x.pattern()).eq(want), "{op:?}, {lanes} lanes");
+            }
+        }
+    }
+}
+
+#[test]
+fn shifts_by_a_number_of_bits_or_more_leave_none() {
+    shifts_are_as_defined::<f64>();
+    shifts_are_as_defined::<f32>();
+}
+
 #[test]
 #[should_panic(expected = "rows")]
 fn a_tile_that_is_too_small_is_refused() {
