@@ -6,9 +6,9 @@ import operator
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from math import isfinite
+from math import isfinite, prod
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -37,12 +37,12 @@ PATH = 1000
 def known(argument: str, name: object, names: Iterable[Word]) -> Word:
     """Return ``name`` if it is one of ``names``; otherwise say which is the nearest."""
     if type(name) is str and type(names) is tuple and name in names:
-        return cast(Word, name)
+        return name  # type: ignore[return-value]
     names = tuple(names)
     if isinstance(name, np.ndarray) and name.ndim == 0 and name.dtype.kind == "U":
         name = name.item()  # a word that was read from a file of arrays
     if isinstance(name, str) and name in names:
-        return cast(Word, str(name))
+        return str(name)  # type: ignore[return-value]
     import difflib  # a mistake may take its time; the import of stepwell may not
 
     near = difflib.get_close_matches(short(name).strip("'").lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
@@ -90,7 +90,7 @@ def _widened(value: Any) -> Array:
     """An array of float32 as one of float64; in memory that was in use, since new pages take longer than filling them."""
     from . import _memory  # which needs this module
 
-    wide = _memory.empty(value.shape)
+    wide: Array = _memory.empty(value.shape)
     wide[...] = value
     return wide
 
@@ -194,7 +194,7 @@ def block(argument: str, value: Any, shape: Shape, axes: str, *, finite: bool = 
     array = numbers(argument, value, finite=finite)
     if array.ndim == 0:
         return over(array, shape)
-    if array.shape[: len(shape)] != shape:
+    if shape and array.shape[: len(shape)] != shape:
         raise ShapeError(f"{argument}: expected shape {_shape(shape, axes)}, got {array.shape}; batch axes come last")
     return array
 
@@ -301,9 +301,7 @@ LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0.0) -> None:
     """Raise if ``rows`` numbers for each member of a batch, and so many bytes beside, do not fit in what memory is available."""
-    members = 1
-    for n in batch:
-        members *= int(n)
+    members = prod(batch)
     needed = 8.0 * rows * members + beside
     if needed <= _FEW_BYTES:
         return

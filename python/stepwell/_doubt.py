@@ -53,26 +53,28 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
         run: which.
         start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
     """
-    told = [run.system.doubt(run.y)]
-    if isinstance(run.system, NBody) and run.force is None:
-        ends = _ends(run, run.system, start) if run.system.keeps_energy else None
+    system = run.system
+    if (text := system.doubt(run.y)) is not None:
+        warnings.warn(text, AccuracyWarning, stacklevel=3)
+    if not isinstance(system, NBody):
+        return
+    if run.force is None:
+        ends = _ends(run, system, start) if system.keeps_energy else None
         energy = None if ends is None else _of_energy(run.method.name, ends)
-        met = None if run.encounter is None else _of_encounters(run, run.system, start, None if energy is None else energy[1])
-        told.append("; ".join(text for text in (None if energy is None else energy[0], met) if text is not None) or None)
-    for text in told:
-        if text is not None:
+        met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[1])
+        if text := "; ".join(text for text in (None if energy is None else energy[0], met) if text is not None):
             warnings.warn(text, AccuracyWarning, stacklevel=3)
-    if (text := _of_a_control(run, start)) is not None:
+    if (text := _of_a_control(run, system, start)) is not None:
         warnings.warn(text, ControlWarning, stacklevel=3)
 
 
-def _of_a_control(run: Run, start: State | None) -> str | None:
+def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
     """When h·C·K passed 1 under a control in the printed form, which overshoots from there on. At the start it was told before.
 
     It is looked at in saved states, and then in every state of the first such member, or of the first that diverged.
     """
-    control, bodies = run.system.control, run.system
-    if not (isinstance(control, EnergyControl) and control.form == "printed" and isinstance(bodies, NBody)):
+    control = bodies.control
+    if not (isinstance(control, EnergyControl) and control.form == "printed"):
         return None
     if run.paces is not None or start is None or run.overshoots is None or not _is_heard(ControlWarning):
         return None

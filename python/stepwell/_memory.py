@@ -63,14 +63,13 @@ def _memory(numbers: int) -> Array:
     return room[first : first + numbers]
 
 
-def empty(shape: Shape, dtype: Any = np.float64) -> Array:
-    """As ``np.empty``, of float64 or float32."""
+def empty(shape: Shape, dtype: Any = np.float64) -> Any:
+    """As ``np.empty``, of a type of four or eight bytes."""
     numbers = prod(shape)
-    if dtype != np.float64 and 4 * numbers < LEAST_LENT:
-        return np.empty(shape, dtype)
-    if dtype != np.float64:
-        whole: Array = empty((-(-numbers // 2),)).view(dtype)
-        return whole[:numbers].reshape(shape)
     if 8 * numbers < LEAST_LENT:
-        return np.empty(shape)
-    return np.asarray(_Loan(_memory(numbers), shape))
+        return np.empty(shape, dtype)
+    if dtype is np.float64:
+        return np.asarray(_Loan(_memory(numbers), shape))
+    size = np.dtype(dtype).itemsize
+    whole: Array = empty((-(-numbers * size // 8),))
+    return whole.view(dtype)[:numbers].reshape(shape)

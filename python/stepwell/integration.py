@@ -288,7 +288,7 @@ def integrate(
     if collides:
         v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
     run = Run(
-        t=_times(plan),
+        t=np.array([end]) if every is None else _times(plan),
         v=out.v,
         y=out.y,
         # Status.OK is 0 and Status.DIVERGED 1
@@ -336,9 +336,7 @@ def _asked(events: Any, form: str) -> list[Event]:
 
 def _times(plan: engine.Plan) -> Array:
     """t0 + k·dt of every saved state; there may be millions of them."""
-    if plan.every is None:
-        return np.array([plan.t0 + float(plan.first + plan.steps) * plan.dt])
-    t = _memory.empty((plan.kept,))
+    t: Array = _memory.empty((plan.kept,))
     _core.times(plan, t)
     return t
 

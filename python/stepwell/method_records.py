@@ -55,6 +55,8 @@ class Method(Fixed):
     attempt_evaluations: int
     #: The family of methods to which it belongs.
     family: str
+    #: Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work.
+    has_series: bool
     #: The undamped oscillator is stable for Φ = ω₀·dt below this; 0 means never.
     limit: float
     #: Times within a step at which rates are evaluated, as fractions of the step.
@@ -77,6 +79,7 @@ class Method(Fixed):
     def __init__(self, record: dict[str, Any]) -> None:
         for key, value in record.items():
             setattr(self, key, tuple(value) if isinstance(value, list) else value)
+        self.has_series = self.family == "Taylor"
         self.__doc__ = self._text()
 
     @property
@@ -91,11 +94,6 @@ class Method(Fixed):
     def steps(self) -> Steps:
         """The NumPy reference: the module in ``stepwell.reference.steppers`` that is the method's specification."""
         return cast(Steps, importlib.import_module(f"stepwell.reference.steppers.{self.name}"))
-
-    @property
-    def has_series(self) -> bool:
-        """Whether its steps are sums of the solution's series; with a tolerance it then has the order that takes least work."""
-        return self.family == "Taylor"
 
     def start_choice(self, start: str | None) -> int:
         """The number of a start, for the core."""

@@ -27,7 +27,7 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
     ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
     """
     if before is None:
-        before = _memory.empty(plan.batch).view(np.int64)
+        before = _memory.empty(plan.batch, np.int64)
         before.fill(-1)
     else:
         before = before.copy()
@@ -135,10 +135,7 @@ def run_by_core(
     carries = plan.method.carry is not None if carries is None else carries
     kept = plan.kept
     empty = np.empty if kept * (v.size + y.size) < _memory.LEAST_LENT // 8 else _memory.empty
-    if plan.single:
-        saved_v, saved_y = (_memory.empty((kept, *a.shape), plan.dtype) for a in (v, y))
-    else:
-        saved_v, saved_y = empty((kept, *v.shape)), empty((kept, *y.shape))
+    saved_v, saved_y = empty((kept, *v.shape), plan.dtype), empty((kept, *y.shape), plan.dtype)
     carry = np.empty(v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:

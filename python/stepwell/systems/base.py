@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 Given = list[tuple[str, Any]]
 
 
+#: The strides of an array of floats along one axis, one after the other in memory.
+CONTIGUOUS = (8,)
+
 #: A step so short that no gain of a control is too large for it.
 TINY = 1e-200
 
@@ -291,8 +294,10 @@ class System(Fixed, Value, ABC):
 
     def stepped_by(self, method: Method) -> Self:
         """The same system, its control acting between steps where v and y of the method's stages belong to different times."""
+        if self.control is None:
+            return self
         between = method.needs_acceleration or method.has_series
-        if getattr(self.control, "between", between) == between or self.control is None:
+        if getattr(self.control, "between", between) == between:
             return self
         return changed(self, control=changed(self.control, between=between))
 
@@ -371,8 +376,8 @@ def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
     """
     if not batch:
         return np.ascontiguousarray(values).reshape(-1, 1)
-    if not own and values.shape == batch and values.strides[0] and len(batch) < 2 and values.flags.c_contiguous:
-        return values.reshape(1, values.size)  # what is given most often of a batch: one number for each member along one axis
+    if not own and values.strides == CONTIGUOUS and values.shape == batch:
+        return values.reshape(1, -1)  # what is given most often of a batch: one number for each member along one axis
     own = max(0, values.ndim - len(batch)) if own is None else own
     counted, over = values.shape[:own], values.shape[own:]
     if all(size == 1 or stride == 0 for size, stride in zip(over, values.strides[own:], strict=True)):

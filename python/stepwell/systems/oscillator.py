@@ -73,11 +73,14 @@ class Oscillator(System):
         self.friction = None if friction is None else _checks.not_negative("friction", friction)
         self.x = as_input("x", x)
         self.a = as_input("a", a)
-        terms = {"damping": self.damping, "drag": self.drag, "friction": self.friction}
-        given = {name: term.shape for name, term in terms.items() if term is not None}
-        self.velocity_term = " and ".join(given) or None
-        inputs = {name: given.batch for name, given in self.given_inputs().items()}
-        self.batch = _checks.batch_shape({"omega": self.omega.shape} | given | inputs)
+        shapes = {"omega": self.omega.shape}
+        for name, term in (("damping", self.damping), ("drag", self.drag), ("friction", self.friction)):
+            if term is not None:
+                shapes[name] = term.shape
+                self.velocity_term = name if self.velocity_term is None else f"{self.velocity_term} and {name}"
+        for name, given in self.given_inputs().items():
+            shapes[name] = given.batch
+        self.batch = _checks.batch_shape(shapes)
         if self.friction is not None:
             self.linear = self.complex_step = False
             self.rubbing = self.friction if self.form == "physical" else np.asarray(self.friction / self.omega)
@@ -95,8 +98,8 @@ class Oscillator(System):
 
     def given(self, batch: Shape) -> dict[str, Any]:
         """Form, parameters, inputs."""
-        terms = {"omega": self.omega, "damping": self.damping, "drag": self.drag, "x": signal(self.x), "a": signal(self.a)}
-        return {"form": self.form, **terms}
+        inputs = {"x": signal(self.x), "a": signal(self.a)}
+        return {"form": self.form, "omega": self.omega, "damping": self.damping, "drag": self.drag, **inputs}
 
     def energy(self, v: Array, y: Array) -> Array:
         """Energy per unit of mass of spring and motion, ½ẏ² + ½ω₀²y²; in canonical form divided by ω₀², ½(v² + y²)."""

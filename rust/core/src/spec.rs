@@ -133,7 +133,7 @@ impl Given {
 #[derive(Clone, Debug, Default)]
 pub struct Spec<'a> {
     /// Names and counts.
-    pub given: Given,
+    pub given: Arc<Given>,
     /// The rows of all parameters, in the order of `given`.
     pub rows: Vec<Row<'a>>,
     /// The sampled inputs, likewise.

@@ -57,7 +57,7 @@ pub enum How {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Scene {
     /// What is given.
-    pub given: Given,
+    pub given: Arc<Given>,
     /// What makes the step.
     pub how: How,
     /// Quantities that are recorded beside states.
@@ -637,11 +637,13 @@ const MAX_CACHED_OPERATIONS: usize = 200_000;
 
 /// The cache of rates, by the system and its recorded quantities; all methods share it.
 fn rated() -> &'static Mutex<RatedCache> {
-    static CACHE: OnceLock<Generation<(Given, Vec<String>), Rated>> = OnceLock::new();
+    static CACHE: OnceLock<Generation<RatedKey, Rated>> = OnceLock::new();
     CACHE.get_or_init(Generation::default).now()
 }
 
-type RatedCache = Cache<(Given, Vec<String>), Rated>;
+/// The system, and its recorded quantities.
+type RatedKey = (Arc<Given>, Vec<String>);
+type RatedCache = Cache<RatedKey, Rated>;
 
 /// How often this process, or one that it descends from, began with new caches.
 static GENERATION: AtomicUsize = AtomicUsize::new(0);

@@ -138,7 +138,7 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
 fn spec<'a>(given: &Given, numbers: &'a [f64], members: usize) -> Spec<'a> {
     let rows: Vec<Row> = numbers.chunks(members).map(Row).collect();
     let tables = given.tables.iter().map(|_| Table { samples: rows[..9].to_vec(), start: 0.29, interval: 0.011 }).collect();
-    Spec { given: given.clone(), rows: rows[..given.parameters()].to_vec(), tables }
+    Spec { given: given.clone().into(), rows: rows[..given.parameters()].to_vec(), tables }
 }
 
 /// What a group makes of members: states, quantities and sums after some steps, by bits, its lane's first for each row.
@@ -172,7 +172,7 @@ fn scene(given: &Given, how: How) -> Scene {
     let kind = system::kind(&given.system).unwrap();
     let record = if matches!(how, How::Method { .. }) { (kind.quantities)(given) } else { Vec::new() };
     Scene {
-        given: given.clone(),
+        given: given.clone().into(),
         how,
         record: record.into_iter().map(|(name, _)| name.to_owned()).collect(),
         fused: false,
@@ -345,7 +345,9 @@ fn the_matrix_form_of_a_large_member_is_its_tape() {
         let parameters = numbers(13 * (given.parameters() + 9), n as u64);
         let spec = spec(&given, &parameters, 13);
         let traced =
-            Scene { given, how: how.clone(), record: Vec::new(), fused: false, precision: Precision::Double }.traced().unwrap();
+            Scene { given: given.into(), how: how.clone(), record: Vec::new(), fused: false, precision: Precision::Double }
+                .traced()
+                .unwrap();
         let (level, state) = (Level::choose().unwrap(), numbers(13 * n, 3));
         let mut tape = Lanes::new(&traced, &spec, level, 1, &CLOCK).unwrap();
         let of_each: Vec<_> = (2..7).map(|member| made(&mut tape, &spec, member, 1, &state)).collect();

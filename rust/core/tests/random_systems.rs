@@ -184,13 +184,13 @@ impl Case {
         };
         let how = How::Method { name: method.to_owned(), choice: 0 };
         let scene = Scene {
-            given: given.clone(),
+            given: given.clone().into(),
             how,
             record: vec!["quantity".to_owned()],
             fused: self.fused,
             precision: Precision::Double,
         };
-        Model { scene, spec: Spec { given, rows, tables: Vec::new() } }
+        Model { scene, spec: Spec { given: given.into(), rows, tables: Vec::new() } }
     }
 
     /// Rows of the members of a range.

@@ -64,9 +64,13 @@ fn sound(value: &Bound<'_, PyAny>, finite: bool, positive: bool) -> bool {
         return false;
     }
     let Ok(numbers) = array.as_slice() else { return false };
-    // Over all numbers, without an early end: so the loop is over vectors.
-    let finite = !finite || numbers.iter().fold(true, |all, x| all & x.is_finite());
-    finite && (!positive || numbers.iter().fold(true, |all, x| all & (*x > 0.0)))
+    // One after the other: both together take three times as long, since no vectors are made of them.
+    (!finite || all(numbers, |x| x.abs() < f64::INFINITY)) && (!positive || all(numbers, |x| x > 0.0))
+}
+
+/// Whether something is true of all numbers. Those of which it is not are counted, without an early end: so the loop is over vectors.
+fn all<T: Copy>(numbers: &[T], is: impl Fn(T) -> bool) -> bool {
+    numbers.iter().map(|x| u64::from(!is(*x))).sum::<u64>() == 0
 }
 
 /// The names of all systems that the core has.
@@ -153,7 +157,7 @@ fn run_with<T: Steppable + Element>(
         first_bad: arrays.first_bad.as_slice_mut()?,
     };
     interruptible(py, plan.progress, |monitor| batch::run(&plan_of_core, to_fill, monitor))?;
-    Ok(!arrays.first_bad.as_slice()?.iter().all(|step| *step < 0))
+    Ok(!all(arrays.first_bad.as_slice()?, |step| step < 0))
 }
 
 /// The numbers of an array; none if there is no array.

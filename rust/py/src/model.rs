@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::{
     prelude::*,
     types::{PyBytes, PyString, PyTuple, PyType},
@@ -118,7 +118,7 @@ impl<'py> FromPyObject<'_, 'py> for Value {
 /// A system and what makes its steps.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct ModelSpec {
-    pub given: Given,
+    pub given: Arc<Given>,
     pub how: How,
     rows: Vec<Py<PyArray2<f64>>>,
     tables: Vec<(f64, f64, Py<PyArray2<f64>>)>,
@@ -176,7 +176,7 @@ impl ModelSpec {
                 Value::Whole(whole) => names.wholes.push((name, whole)),
                 Value::List(list) => names.lists.push((name, list)),
                 Value::Rows(array) => {
-                    let [count, members] = [0, 1].map(|axis| array.bind(py).readonly().as_array().shape()[axis]);
+                    let [count, members] = [0, 1].map(|axis| array.bind(py).shape()[axis]);
                     // A force changes between steps, so it is never computed with beforehand for all members at once.
                     names.rows.push((name.clone(), vec![members == 1 && name != force::NAME; count]));
                     rows.push(array);
@@ -184,7 +184,7 @@ impl ModelSpec {
                 Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
-                    let common = array.bind(py).readonly().as_array().ncols() == 1;
+                    let common = array.bind(py).shape()[1] == 1;
                     names.tables.push((name, common));
                     tables.push((start, interval, array));
                 }
@@ -194,7 +194,7 @@ impl ModelSpec {
             None => How::Method { name: method, choice: 0 },
             Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: names, how, rows, tables, record, fused, order, precision: precision(single) }
+        ModelSpec { given: Arc::new(names), how, rows, tables, record, fused, order, precision: precision(single) }
     }
 }
 

@@ -13,6 +13,10 @@ use crate::{
 const MAX_CODE_OPERATIONS: usize = 2000;
 /// In steps of fewer operations than this, out-of-order execution overlaps several steps.
 const SHORT_STEP_OPERATIONS: usize = 48;
+/// So many vectors keep both the unit of roots and quotients and the others busy, if steps are so short that their code fits.
+const VECTORS_AROUND_SLOW: usize = 8;
+/// Longer chains, of evaluations that wait for each other, need more vectors, side by side.
+const MAX_SIDE_BY_SIDE_AROUND_SLOW: usize = 3;
 /// The most bytes of a tile's rows, so that they stay in the data cache.
 const MAX_ROW_BYTES: usize = 12 << 10;
 
@@ -68,6 +72,13 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
     }
     let most = (MAX_CODE_OPERATIONS / body.work()).max(1);
     let interleaving = interleaving(body, level).min(most);
+    if interleaving <= MAX_SIDE_BY_SIDE_AROUND_SLOW && most >= VECTORS_AROUND_SLOW && body.ops.iter().any(|op| is_slow(*op)) {
+        // One after the other: see `schedule`, where each fills the waits of the one before it.
+        let fit = MAX_ROW_BYTES / row_bytes(body, width).max(1);
+        let block_vectors = evenly(vectors, VECTORS_AROUND_SLOW.min(fit).max(1));
+        let blocks = blocks(body, width, block_vectors).min(vectors.div_ceil(block_vectors));
+        return Shape { level, bytes, width, block_vectors, interleaved: 1, blocks, resident: false };
+    }
     if interleaving == 1 {
         // Two vectors in a turn, one after the other: the second begins while the first ends. State that has a register stays there.
         let block_vectors = evenly(vectors, most.min(2));
@@ -83,8 +94,12 @@ fn fastest(body: &Body, level: Level, members: usize) -> Shape {
 
 /// How many blocks a tile may have so that its rows stay in the cache.
 fn blocks(body: &Body, width: usize, block_vectors: usize) -> usize {
-    let row = body.precision.bytes() * width * block_vectors * (body.next.len() + body.rows);
-    (MAX_ROW_BYTES / row).clamp(1, 4)
+    (MAX_ROW_BYTES / (block_vectors * row_bytes(body, width))).clamp(1, 4)
+}
+
+/// The bytes of a tile's rows for each of its vectors.
+fn row_bytes(body: &Body, width: usize) -> usize {
+    body.precision.bytes() * width * (body.next.len() + body.rows)
 }
 
 /// The number of vectors per turn, at most `most`, that divides all vectors most evenly among the turns.
@@ -109,6 +124,11 @@ fn interleaving(body: &Body, level: Level) -> usize {
         Level::Avx2 => (2.2 * longest / work).ceil().clamp(1.0, 5.0) as usize,
         _ => (3.8 * longest / work - 1.3).round().clamp(1.0, 6.0) as usize,
     }
+}
+
+/// Whether its unit cannot begin one in every cycle: roots and quotients.
+pub(super) fn is_slow(op: Op) -> bool {
+    timing(op).1 > 1.0
 }
 
 /// Latency and reciprocal throughput of an operation on a vector of 512 bits, in cycles.

@@ -7,7 +7,11 @@
 
 use std::collections::BTreeSet;
 
-use super::{choose::timing, plan::Plan, shape::Shape};
+use super::{
+    choose::{is_slow, timing},
+    plan::Plan,
+    shape::Shape,
+};
 use crate::tape::Op;
 
 /// The operations in their order: the index of each among those of the plan, and its vector.
@@ -20,6 +24,8 @@ const MAX_SHARED: usize = 12;
 /// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case: fewer waits
 /// then gain more than spills cost.
 const MAX_WAITING_PER_REGISTER: usize = 2;
+/// The same for vectors one after the other of which some wait for roots and quotients, also where there are fewer registers.
+const MAX_WAITING_AROUND_SLOW: usize = 32;
 /// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are, by
 /// other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would leave gaps.
 const MAX_BEHIND: usize = 3;
@@ -47,6 +53,13 @@ pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order 
     let interleaves = shape.interleaved.min(shape.block_vectors) > 1;
     let is_single = shape.width == 1 && shape.block_vectors == 1;
     let shared = plan.sources.iter().filter(|source| source.is_shared()).count();
+    let waits = Waits::of(plan, ops, shape);
+    let has_slow = (0..plan.steps.len()).any(|i| waits.is_slow(i));
+    if has_slow && !interleaves && !shape.resident && shape.block_vectors > 1 {
+        // Roots and quotients have one unit for all vectors. Side by side, all would come to it at once and wait for it, and then leave it
+        // idle at once. So each vector goes as far as it can, and the next one fills its waits.
+        return waits.shortened(&in_turn(plan.steps.len(), shape, 0), MAX_WAITING_AROUND_SLOW);
+    }
     // A state that is in registers leaves none to interleaved vectors for more results that wait.
     let is_best =
         if interleaves { shape.resident || shared > MAX_SHARED } else { !is_single && plan.steps.len() < MIN_STEP_OPERATIONS };
@@ -55,9 +68,7 @@ pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order 
     if is_best {
         return in_turn(plan.steps.len(), shape, behind);
     }
-    let waits = Waits::of(plan, ops);
-    // Roots and quotients have one unit for all vectors, for which they wait as it is.
-    let has_slow = (0..plan.steps.len()).any(|i| waits.is_slow(i));
+    // Roots and quotients wait as it is.
     let order = in_turn(plan.steps.len(), shape, if has_slow { 0 } else { behind });
     // The other registers hold shared numbers and the state.
     let fit = shape.registers() * 3 / 4;
@@ -90,7 +101,13 @@ impl Waits {
         Waits { operands, users, time }
     }
 
-    fn of<D: Copy>(plan: &Plan<D>, ops: &[Op]) -> Waits {
+    fn of<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Waits {
+        // Half a vector is done in half the time where a unit makes a few numbers after the other.
+        let share = if shape.width * shape.bytes < 64 { 0.5 } else { 1.0 };
+        let time = |op: Op| {
+            let (latency, busy) = timing(op);
+            [latency, if is_slow(op) { busy * share } else { busy }]
+        };
         let mut maker = vec![None; plan.sources.len()];
         plan.steps.iter().enumerate().for_each(|(i, step)| maker[step.id as usize] = Some(i));
         let made_by = |ids: &[u32]| {
@@ -100,7 +117,7 @@ impl Waits {
             of
         };
         let operands = plan.steps.iter().map(|step| made_by(step.of())).collect();
-        Waits::new(operands, plan.steps.iter().map(|step| timing(ops[step.id as usize]).into()).collect())
+        Waits::new(operands, plan.steps.iter().map(|step| time(ops[step.id as usize])).collect())
     }
 
     /// The most results that wait to be used at once, in an order of the operations of one vector.
@@ -185,6 +202,6 @@ impl Waits {
 
     /// Whether its unit cannot begin one in every cycle: roots and quotients.
     fn is_slow(&self, i: usize) -> bool {
-        self.time[i][1] > 1.0
+        self.time[i][1] > 1.0 // as `choose::is_slow`
     }
 }

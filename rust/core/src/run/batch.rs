@@ -77,8 +77,9 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
 
 /// The most steps between two checks of the clock and of whether all states are finite.
 const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 16;
-/// Numbers × steps until the first check, about, and steps at most: until then it is not known how long steps take.
-const NUMBERS_TO_FIRST_CHECK: i64 = 1 << 19;
+/// Operations until the first check, about, and steps at most: until then it is not known how long an operation takes. Interpreted, so
+/// many take some milliseconds.
+const OPERATIONS_TO_FIRST_CHECK: usize = 1 << 22;
 const STEPS_TO_FIRST_CHECK: i64 = 1 << 14;
 /// Numbers × steps between two later checks, at most.
 const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
@@ -262,12 +263,14 @@ impl<'a, T: Steppable> Worker<'a, T> {
     fn part(&mut self, mut part: Part<T>, go_on: &mut dyn FnMut(u64) -> bool) -> Result<(), Error> {
         let (plan, carries, members) = (self.plan, self.traced.carries, part.count);
         let lanes = plan.model.lanes::<T>(self.traced, self.machine, plan.members, plan.total())?;
+        let first_piece = self.traced.steps_of(lanes, OPERATIONS_TO_FIRST_CHECK).min(STEPS_TO_FIRST_CHECK);
         let mut from = 0;
         while from < members {
             let mut good = std::mem::take(&mut self.good);
             let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
-            let mut job = Job { plan, carries, group, part: &mut part, from, count, good: &mut good, checked: plan.first };
+            let (part, checked) = (&mut part, plan.first);
+            let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked };
             let ran = job.run(go_on);
             self.good = good;
             if !ran {
@@ -291,6 +294,8 @@ struct Job<'a, 'b, T: Real> {
     plan: &'a Plan<'a>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
+    /// How many steps until the first check.
+    first_piece: i64,
     group: &'a mut dyn Group<T>,
     part: &'a mut Part<'b, T>,
     from: usize,
@@ -344,8 +349,7 @@ impl<T: Real> Job<'_, '_, T> {
 
         let mut k = plan.first;
         let longest = (NUMBERS_BETWEEN_CHECKS / numbers).clamp(1, DIVERGENCE_CHECK_INTERVAL);
-        let first =
-            if numbers > LARGE_MEMBER_NUMBERS { 1 } else { (NUMBERS_TO_FIRST_CHECK / numbers).clamp(1, STEPS_TO_FIRST_CHECK) };
+        let first = if numbers > LARGE_MEMBER_NUMBERS { 1 } else { self.first_piece };
         let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
         let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;

@@ -17,6 +17,9 @@ use crate::error::Error;
 /// The longest time between two calls of the caller's monitor.
 pub const POLL: Duration = Duration::from_millis(20);
 
+/// So much memory must be left for a thread to be started: for its stack, 2 MiB, and for what it and the others allocate.
+const ROOM_FOR_A_THREAD: usize = 16 << 20;
+
 /// Is called with the amount of work done since the last call; returns whether to continue.
 pub type GoOn<'a> = &'a mut dyn FnMut(u64) -> bool;
 
@@ -65,6 +68,10 @@ pub fn share<P: Send, W: Send>(
         let mut mine = Some(mine);
         let mut helpers = Vec::new();
         for _ in usize::from(!background)..*threads {
+            // One that is started with the last of the memory may find none for itself a moment later, and the C library then ends the process.
+            if memmap2::MmapMut::map_anon(ROOM_FOR_A_THREAD).is_err() {
+                break;
+            }
             let its = if *background { mine.take() } else { None };
             busy.fetch_add(1, Relaxed);
             let guard = BusyGuard(&busy, &caller);

@@ -29,7 +29,7 @@ pub fn spec<'a>(system: &str, of: Of<'a, '_>) -> Spec<'a> {
         watched: None,
     };
     let rows = of.rows.iter().flat_map(|(_, rows)| rows.clone()).collect();
-    Spec { given, rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }
+    Spec { given: given.into(), rows, tables: of.tables.into_iter().map(|(_, table)| table).collect() }
 }
 
 /// A system stepped by a method.
