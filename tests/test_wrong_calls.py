@@ -475,7 +475,8 @@ if find_spec("pandas") and find_spec("xarray"):
     CALLS["Run.to_xarray"] = A_RUN.to_xarray, {"dims": None, "coords": None}
 
 #: A system that is not there has arguments with defaults.
-for _name, _each in vars(sw).items():
+for _name in sw.__all__:
+    _each = getattr(sw, _name)
     if isinstance(_each, type) and issubclass(_each, sw.System) and _each is not sw.System and _name not in CALLS:
         CALLS[_name] = _each, {name: each.default for name, each in inspect.signature(_each).parameters.items()}
 
