@@ -105,6 +105,30 @@ def test_threads_that_cannot_be_had_are_done_without() -> None:
 
 
 @LINUX
+def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
+    """A second one while there are 60 MB, none where there are 8: it might find nothing to allocate, and end the process."""
+    said = aside("""
+        import contextlib, os
+        from stepwell import integration
+        threads = []
+        @contextlib.contextmanager
+        def bar(title):
+            yield lambda done: threads.append(len(os.listdir("/proc/self/task")))
+        integration.bar_of = bar
+        system, given = sw.Oscillator(np.linspace(1, 2, 5000)), dict(v=0.0, y=1.0, dt=0.1, threads=2, progress=True)
+        runs = []
+        for left in (60_000_000, 8_000_000):
+            used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (used + left, resource.RLIM_INFINITY))
+            runs.append(sw.integrate(system, "rk4", steps=200_000, **given))
+            print(max(threads))
+            threads.clear()
+        print(np.array_equal(runs[0].y, runs[1].y))
+    """)
+    assert said == "2\n1\nTrue\n"
+
+
+@LINUX
 @pytest.mark.parametrize(
     "run",
     [

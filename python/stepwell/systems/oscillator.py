@@ -50,6 +50,13 @@ class Oscillator(System):
     linear = True
     input_names = ("x", "a")
 
+    # Those that are not given stay these: to assign five takes as long as to check all.
+    damping: Array | None = None
+    drag: Array | None = None
+    friction: Array | None = None
+    x: Input | None = None
+    a: Input | None = None
+
     def __init__(
         self,
         omega: Any = 1.0,
@@ -68,11 +75,16 @@ class Oscillator(System):
             self.omega = _checks.not_negative("omega", omega, "rad per unit of time")
         if damping is not None and drag is not None:
             raise ArgumentError("damping, drag: expected one of them, got both; they name one term, 2·damping·omega = drag")
-        self.damping = None if damping is None else _checks.numbers("damping", damping)
-        self.drag = None if drag is None else _checks.not_negative("drag", drag)
-        self.friction = None if friction is None else _checks.not_negative("friction", friction)
-        self.x = as_input("x", x)
-        self.a = as_input("a", a)
+        if damping is not None:
+            self.damping = _checks.numbers("damping", damping)
+        if drag is not None:
+            self.drag = _checks.not_negative("drag", drag)
+        if friction is not None:
+            self.friction = _checks.not_negative("friction", friction)
+        if x is not None:
+            self.x = as_input("x", x)
+        if a is not None:
+            self.a = as_input("a", a)
         shapes = {"omega": self.omega.shape}
         for name, term in (("damping", self.damping), ("drag", self.drag), ("friction", self.friction)):
             if term is not None:

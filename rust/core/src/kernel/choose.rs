@@ -128,7 +128,12 @@ fn interleaving(body: &Body, level: Level) -> usize {
 
 /// Whether its unit cannot begin one in every cycle: roots and quotients.
 pub(super) fn is_slow(op: Op) -> bool {
-    timing(op).1 > 1.0
+    keeps_its_unit(timing(op).1)
+}
+
+/// Whether a unit that is busy for so many cycles cannot begin an operation in every one.
+pub(super) fn keeps_its_unit(busy: f64) -> bool {
+    busy > 1.0
 }
 
 /// Latency and reciprocal throughput of an operation on a vector of 512 bits, in cycles.

@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use super::{
-    choose::{is_slow, timing},
+    choose::{is_slow, keeps_its_unit, timing},
     plan::Plan,
     shape::Shape,
 };
@@ -68,7 +68,7 @@ pub(super) fn order<D: Copy>(plan: &Plan<D>, ops: &[Op], shape: Shape) -> Order 
     if is_best {
         return in_turn(plan.steps.len(), shape, behind);
     }
-    // Roots and quotients wait as it is.
+    // Vectors that wait for the one unit of roots and quotients fall behind each other by that.
     let order = in_turn(plan.steps.len(), shape, if has_slow { 0 } else { behind });
     // The other registers hold shared numbers and the state.
     let fit = shape.registers() * 3 / 4;
@@ -200,8 +200,8 @@ impl Waits {
         made
     }
 
-    /// Whether its unit cannot begin one in every cycle: roots and quotients.
+    /// As [`is_slow`].
     fn is_slow(&self, i: usize) -> bool {
-        self.time[i][1] > 1.0 // as `choose::is_slow`
+        keeps_its_unit(self.time[i][1])
     }
 }

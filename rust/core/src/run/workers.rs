@@ -31,7 +31,8 @@ pub type Stop = Arc<AtomicBool>;
 pub struct Workers {
     /// Number of threads that work on parts.
     pub threads: usize,
-    /// Work in other threads only: a single step may take long, and the caller waits for signals, so that it can be stopped within one.
+    /// Work in other threads only: a single step may take long, and the caller waits for signals, so that it can be stopped within
+    /// one.
     pub background: bool,
     /// The whole work, in the unit of [`GoOn`].
     pub total: f64,
@@ -68,7 +69,8 @@ pub fn share<P: Send, W: Send>(
         let mut mine = Some(mine);
         let mut helpers = Vec::new();
         for _ in usize::from(!background)..*threads {
-            // One that is started with the last of the memory may find none for itself a moment later, and the C library then ends the process.
+            // One that is started with the last of the memory may find none for itself a moment later, and the C library then ends
+            // the process.
             if memmap2::MmapMut::map_anon(ROOM_FOR_A_THREAD).is_err() {
                 break;
             }
