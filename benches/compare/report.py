@@ -67,7 +67,7 @@ def table(work: Workload, rows: list[Row]) -> Table:
 def threads(rows: list[Row]) -> str:
     """How much all threads bring."""
     timed = [row for row in rows if row.name.startswith("stepwell") and row.seconds]
-    return "".join(f"{row.name}: {row.rates[1] / timed[0].rates[1]:.2f} times the speed of one." for row in timed[1:])
+    return " ".join(f"{row.name}: {row.rates[1] / timed[0].rates[1]:.2f} times the speed of one." for row in timed[1:])
 
 
 def show(title: str, head: list[str], lines: list[list[str]]) -> None:
