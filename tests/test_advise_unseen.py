@@ -193,6 +193,66 @@ def test_from_rest_under_a_force(force: float) -> None:
         assert true.state_error(run).max() <= 1e-3
 
 
+@sw.system
+def pushed(t, v, y, *, begin=1.0, end=2.0, push=1.0, omega=1.0):
+    return np.where((t > begin) & (t < end), push, 0.0) - omega**2 * y
+
+
+def pulsed(begin: float, width: float, horizon: float, v: float, y: float, push: float, omega: float) -> Scene:
+    """An oscillator that is pushed for a moment, in closed form: from each edge on a step response is added or taken away."""
+    system = pushed(begin=begin, end=begin + width, push=push, omega=omega)
+
+    def exact(t: Any) -> Any:
+        places = y * np.cos(omega * t) + v / omega * np.sin(omega * t)
+        speeds = v * np.cos(omega * t) - y * omega * np.sin(omega * t)
+        for edge, sign in ((begin, 1.0), (begin + width, -1.0)):
+            since = omega * np.maximum(t - edge, 0.0)
+            places = places + sign * push / omega**2 * (1.0 - np.cos(since))
+            speeds = speeds + sign * push / omega * np.sin(since)
+        return speeds, places
+
+    return Scene(system, v, y, horizon, exact=exact, name="pulsed")
+
+
+@pytest.mark.usefixtures("unmeasured")
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pulsed(7.3, 0.2, 20.0, 0.0, 0.0, 1.0, 1.0),
+        pulsed(7.3, 0.2, 20.0, 0.1, 0.0, 1.0, 1e-3),
+        pulsed(31.0, 0.4, 40.0, 0.0, 1e-2, -5.0, 0.5),
+        pulsed(2.1e-6, 1.3e-7, 5e-6, 0.0, 0.0, 1e9, 3e5),
+        pulsed(1.7e5, 4e3, 4e5, 1e-3, 0.0, 1e-6, 1e-4),
+    ],
+)
+def test_a_push_for_a_moment_is_not_stepped_over(scene: Scene) -> None:
+    """Its motion without a formula is that of the formula, so what is right is not rejected and what is advised is right."""
+    methods = ["leapfrog", "rk4", "merson", "dop853"]
+    advice = sw.advise(replace(scene, exact=None), frame=None, tolerance=1e-2, methods=methods, cost="evaluations")
+    assert not advice.cut
+    assert advice.ranked
+    t = np.linspace(0.0, scene.horizon, 2001)
+    for ours, true, scale in zip(advice.scene.exact(t), scene.exact(t), scene.scales, strict=True):
+        # The reference agrees with its check to a tenth of the tolerance, and is much better; near an edge it is a state within a
+        # step, which may be as wrong as the push over a thousandth of the horizon.
+        assert np.abs(ours - true).max() <= 1e-3 * scale
+    for row in advice.ranked:
+        if row.tolerance is None:
+            run = scene.run(row.method, row.dt, steps=row.steps, every=1)
+            assert scene.state_error(run).max() <= 1e-2
+
+
+@pytest.mark.parametrize("around", ["surfaces", "friction that sticks"])
+def test_a_scene_that_adaptive_steps_do_not_go_with_needs_an_exact_solution(around: str) -> None:
+    if around == "surfaces":
+        system: sw.System = sw.Particles(1, floor=sw.Floor(restitution=0.5), gravity=[0.0, -1.0])
+    else:
+        system = sw.Oscillator(1.0, friction=0.1, form="physical")
+    scene = Scene(system, v=0.0, y=1.0, horizon=3.0)
+    with pytest.raises(ArgumentError, match=f"exact: needed by unnamed, whose system has {around}, got None"):
+        sw.advise(scene, frame=None)
+
+
 @pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize(("scene", "exact"), [(lambda: sw.scenes.kepler(0.95), None), (lambda: sw.scenes.pendulum(179.0), None)])
 def test_a_hard_part_does_not_end_what_is_known(scene: Any, exact: None) -> None:
