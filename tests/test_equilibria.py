@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -126,7 +127,8 @@ def test_a_line_of_equilibria_is_not_isolated() -> None:
     assert found.y == 5.0
     assert found.v == 0.0
     assert not found.isolated
-    assert found.kind == "not decided"
+    assert found.kind == "undecided to first order"
+    assert found.stable is None
 
 
 def test_units_do_not_matter() -> None:
@@ -160,3 +162,72 @@ def test_many_starts_are_found_once() -> None:
 def test_wrong_calls_say_what_is_wrong(wrong: dict[str, Any], says: str) -> None:
     with pytest.raises(sw.errors.ArgumentError, match=says):
         sw.equilibria(**{"system": sw.Pendulum(), "near": (0.0, 0.3)} | wrong)
+
+
+# ---- an eigenvalue that is zero
+
+
+@sw.system(order=1)
+def expanded(t, y):
+    """(y − 1)² as rounding sees it."""
+    return y * y - 2.0 * y + 1.0
+
+
+@sw.system(order=1)
+def apart(t, y, *, gap=1e-4):
+    return (y - 1.0) * (y - 1.0 - gap)
+
+
+@sw.system
+def floating(t, v, y, *, k=1.0):
+    """Masses in a row with springs between them, held by nothing."""
+    stretched = [k * (b - a) for a, b in itertools.pairwise(y)]
+    return np.array([after - before for before, after in itertools.pairwise([0.0, *stretched, 0.0])])
+
+
+@pytest.mark.parametrize("at", [0.0, 1.0, -3e5])
+@pytest.mark.parametrize("p", [2, 3])
+def test_a_multiple_root_is_undecided_from_every_side(p: int, at: float) -> None:
+    """Each step of Newton's method leaves 1 − 1/p of the distance, and an eigenvalue of p·distance^(p − 1), of either sign.
+
+    Alone it has nothing to be small beside.
+    """
+    size = abs(at) or 1.0
+    for start in (at + 0.5 * size, at - 0.5 * size, at + 1e-3 * size):
+        found = sw.equilibria(definition(p, at)(), near=(None, np.array(start)))
+        assert [each.kind for each in found] == ["undecided to first order"]
+        assert not found[0].isolated
+        assert found[0].stable is None
+
+
+def definition(p: int, at: float) -> Any:
+    @sw.system(order=1)
+    def root(t, y):
+        return math.prod([y - at] * p)
+
+    return root
+
+
+@pytest.mark.parametrize("start", [2.0, 0.3, 1.001])
+def test_a_double_root_that_rounding_hides_is_undecided(start: float) -> None:
+    """It is found to about the root of a rounding, 1.5e-8, where the eigenvalue is as large."""
+    for each in sw.equilibria(expanded(), near=(None, np.array(start))):
+        assert each.kind == "undecided to first order"
+        assert not each.isolated
+
+
+def test_roots_that_are_apart_are_decided() -> None:
+    """A ten-thousandth apart, with eigenvalues of ∓1e-4; and a slow rate of 1e-7 beside one of 1."""
+    found = sw.equilibria(apart(), near=(None, np.array([0.9, 1.2])))
+    assert [each.kind for each in found] == ["sink", "source"]
+    assert all(each.isolated for each in found)
+    (slow,) = sw.equilibria(sw.LinearSystem([[-1e-7, 0.0], [1.0, -1.0]], velocities=0), near=(None, np.ones(2)))
+    assert slow.kind == "sink"
+
+
+@pytest.mark.parametrize("n", [2, 3, 6])
+def test_what_nothing_holds_is_undecided(n: int) -> None:
+    """Its double eigenvalue zero comes out of rounding as ±1e-8."""
+    (found,) = sw.equilibria(floating(k=3.7), near=(np.zeros(n), np.arange(n) + 0.1))
+    assert found.kind == "undecided to first order"
+    assert not found.isolated

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _encounters, _memory, engine
+from . import _checks, _core, _encounters, _growth, _memory, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
@@ -136,9 +136,10 @@ def integrate(
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
-            sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
-            which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+            sine; a state grew a million times by fixed steps that are beyond the stability limit at the start; bodies that
+            nothing controls ended with an energy of another size; bodies met within one step, which is then named. That is looked
+            for where it is little work against the run, or where there is reason to (docs/howto/nbody.md); not in the pieces of a
+            run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -321,7 +322,9 @@ def integrate(
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before)
-    warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
+    begun = None if carry is not None or before is not None else (v, y)
+    warn_of_nonsense(run, begun)
+    _growth.warn_of(run, begun)
     return run
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, engine
+from . import _checks, _core, _growth, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
 from .compatible import fits_together, forced, goes_on_alike, velocities
@@ -57,11 +57,15 @@ class World:
     one happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts
     again from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies,
     whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. Arrays of another library are stepped in place,
-    too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It looks at them now and then in its first calls
+    of ``step``, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
+    library are stepped in place, too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
     ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
+
+    Warns:
+        AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit.
 
     Example:
         >>> v, y = np.zeros(3), np.ones(3)
@@ -161,7 +165,7 @@ class World:
         self._given, self._system, self._method, self._dt = system, stepped, how, dt
         self._t0, self._start, self._v, self._y, self._force, self._fused = t0, start, v, y, force, plan.fused
         self._asked, self._frames = None, None
-        step = loop.step
+        step = _growth.watched(loop, stepped, how, dt, v, y)
         if events is not None:
             from .events import event, frames  # only such worlds need it
 

@@ -16,7 +16,7 @@ from ..compatible import fits_together
 from ..errors import ArgumentError, ShapeError
 from ..method_records import Method
 from ..method_records import method as find_method
-from ..stability import eigen, maps
+from ..stability import eigen, exact, maps, parts
 from ..stability.analysis import Analysis, analyse, state
 from ..stability.eigen import Complex
 from ..systems import System
@@ -40,8 +40,15 @@ SAME = 1e-8
 #: surface of equilibria, or a double root.
 SINGULAR = 1e-10
 
-#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error.
-ZERO_RATE = 1e-9
+#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by half
+#: of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a rounding
+#: only, or a part of the distance is left by each step, and the eigenvalue is as large as that distance, of either sign. Two more
+#: steps at a p-fold root make the eigenvalue (1 − 2/p)^(p − 1) ≤ 0.14 times as large.
+ZERO_RATE, LEFT = 1e-9, 2.0
+
+
+#: The kind where eigenvalues do not tell the motion nearby.
+UNDECIDED = "undecided to first order"
 
 
 class Equilibrium(Value):
@@ -53,9 +60,10 @@ class Equilibrium(Value):
         residual: the largest rate there, which rounding leaves.
         eigenvalues: λ of the Jacobian there, shape (n,), the largest real part first: small disturbances grow as e^(λt).
         kind: the motion nearby, by the eigenvalues: "sink" (all disturbances decay), "source" (all grow), "saddle" (some grow,
-            some do not), "centre" (all rotate, and to first order neither grow nor decay), or "not decided" (one neither grows
-            nor rotates, or some rotate while others decay: higher orders decide).
-        isolated: whether some neighbourhood has no other equilibrium; False where the Jacobian is singular.
+            some do not), "centre" (all rotate, and to first order neither grow nor decay), or "undecided to first order" (an
+            eigenvalue is zero, as far as the place is known, or some rotate while others decay: higher orders decide).
+        isolated: whether some neighbourhood has no other equilibrium; False where the Jacobian is singular, so that first order
+            does not tell.
         analysis: the result of ``analyse`` for a step of the method there; None if no method was given.
         starts: numbers of the starts from which it was reached.
     """
@@ -297,21 +305,38 @@ def _equilibrium(
         with np.errstate(all="ignore"):  # a step of any length may be asked for
             analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
     of_rows, of_columns = _units(matrix)
-    singular = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns, compute_uv=False)
-    isolated = bool(singular[-1] > SINGULAR * singular[0])
-    return Equilibrium(v, y, float(np.abs(rates).max()), values, _kind(matrix, values), isolated, analysis, starts)
+    _, singular, across = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns)
+    exactly, least = _known(system, at, matrix, rates, across[-1] / of_columns, t)
+    isolated = bool(singular[-1] > SINGULAR * singular[0]) and bool((np.abs(exactly) > least).all())
+    return Equilibrium(v, y, float(np.abs(rates).max()), values, _kind(exactly, least), isolated, analysis, starts)
 
 
-def _kind(matrix: Array, values: Complex) -> str:
+def _known(system: System, at: Array, matrix: Array, rates: Array, weakest: Array, t: float) -> tuple[Complex, Array]:
+    """Eigenvalues, and up to which size each is zero as far as the place of an equilibrium is known.
+
+    ``weakest`` is the direction that changes the rates least.
+    """
+    size = SAME * _size(system, at[:, np.newaxis])[:, 0]
+    along = weakest / np.abs(weakest).max() * np.min(size, where=size > 0.0, initial=np.inf) if size.any() else size
+    left = -LEFT * _solved(matrix[:, :, np.newaxis], rates[:, np.newaxis])[:, 0]
+    places = np.stack([at + size, at - size, at + along, at - along, at + left], axis=1)
+    beside = linearised(system, *_blocks(system, places), t)[0]
+    beside = np.where(np.isfinite(beside), beside, matrix[:, :, np.newaxis])
+    own, others = eigen.eigenvalues(matrix), eigen.eigenvalues(beside)
+    moved = np.abs(own[:, np.newaxis, np.newaxis] - others[np.newaxis]).min(axis=1).max(axis=1)
+    least = np.maximum(2.0 * moved, ZERO_RATE * np.abs(own).max())
+    if len(matrix) > exact.MAX_ROWS:
+        rounding = eigen.eigen(matrix).tolerance(0.0).max()
+        return own, np.maximum(least, np.minimum(rounding, eigen.REFINE_ABOVE * np.abs(own).max()))
+    exactly = parts.rates(matrix).values  # where they meet, in as many digits as it takes
+    return exactly, least[np.abs(exactly[:, np.newaxis] - own).argmin(axis=1)]
+
+
+def _kind(values: Complex, least: Array) -> str:
     """The kind of the motion nearby."""
-    size = np.abs(values).max()
-    tolerance = ZERO_RATE * size
-    if len(matrix) > 2:
-        tolerance = np.maximum(tolerance, np.minimum(eigen.eigen(matrix).tolerance(0.0).max(), eigen.REFINE_ABOVE * size))
-    grows, dies = values.real > tolerance, values.real < -tolerance
+    if (np.abs(values) <= least).any():
+        return UNDECIDED
+    grows, dies = values.real > least, values.real < -least
     if grows.any():
         return "source" if grows.all() else "saddle"
-    if dies.all() and size > 0.0:
-        return "sink"
-    turns = ~dies & (np.abs(values.imag) > tolerance)
-    return "centre" if turns.all() else "not decided"
+    return "sink" if dies.all() else UNDECIDED if dies.any() else "centre"

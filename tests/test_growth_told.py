@@ -1,0 +1,99 @@
+"""Growth by steps beyond their stability limit is told; growth of the motion itself is not."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+
+
+@sw.system
+def spring(t, v, y, *, k=1e4, damping=0.1, push=1.0):
+    return -k * y - damping * v + push * np.sin(t)
+
+
+@sw.system
+def inverted(t, v, y, *, rate=1.0):
+    return rate**2 * y
+
+
+@sw.system(order=1)
+def lag(t, y, *, rate=50.0):
+    return 1.0 - rate * y
+
+
+PAST = [
+    (sw.Oscillator(3.0), "false_euler", {"v": 0.0, "y": 1.0, "dt": 0.7, "steps": 200}, "its stability limit is 0.666667"),
+    (spring(), "rk4", {"v": 0.0, "y": 0.0, "dt": 0.03, "steps": 300}, "its stability limit is 0.0282"),
+    (lag(), "standard_euler", {"y": 1.0, "dt": 0.05, "steps": 60}, "its stability limit is 0.04"),
+    (sw.Oscillator(1.0), "standard_euler", {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 5000}, "is stable with no step"),
+    (sw.Chain(20), "leapfrog", {"v": 0.0, "y": np.eye(20)[3], "dt": 1.05, "steps": 300}, "use a shorter step"),
+    (sw.Oscillator(np.array([1.0, 4.0])), "rk4", {"v": 0.0, "y": 1.0, "dt": 0.9, "steps": 200}, "1 of 2 members .* member 1"),
+]
+
+
+@pytest.mark.parametrize(("system", "method", "given", "said"), PAST)
+def test_growth_past_the_limit_is_told_once(system: sw.System, method: str, given: dict[str, Any], said: str) -> None:
+    with pytest.warns(sw.AccuracyWarning, match=said) as told:
+        run = sw.integrate(system, method, **given)
+    assert len(told) == 1
+    assert np.isfinite(run.y).all()
+    assert np.abs(run.y[-1]).max() > 1e5
+
+
+def frames(world: sw.World, number: int, steps: int) -> None:
+    for _ in range(number):
+        world.step(steps)
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_a_world_tells_it_once(n: int) -> None:
+    v, y = np.zeros(3), np.ones(3)
+    world = sw.World(sw.Oscillator(np.array([1.0, 2.0, 3.0])), "false_euler", v=v, y=y, dt=0.7)
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* member 2: .* the motion itself does not grow") as told:
+        frames(world, 280 // n, n)
+    assert len(told) == 1
+    # A growth of 1.877 a step is a million in 22 steps, and looked for after 8, 24, 56 and 120 calls.
+    assert np.abs(y[2]) > 1e6
+
+
+def test_the_steps_of_a_world_that_looks_are_those_of_one_that_does_not() -> None:
+    arrays = []
+    for at_once in (1, 100):
+        v, y = np.zeros(2), np.ones(2)
+        world = sw.World(sw.Oscillator(np.array([1.0, 2.0])), "rk4", v=v, y=y, dt=0.1)
+        frames(world, 100 // at_once, at_once)
+        arrays.append((v, y))
+    np.testing.assert_array_equal(arrays[0], arrays[1])
+
+
+TAME = [
+    (inverted(), {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 300}),  # e³⁰
+    (inverted(rate=40.0), {"v": 1.0, "y": 0.0, "dt": 0.1, "steps": 20}),  # grows by itself, beyond any accuracy
+    (sw.LinearSystem([[1.0]], velocities=0), {"y": [1.0], "dt": 0.1, "steps": 400}),
+    (sw.LinearSystem([[0.2, 5.0], [-5.0, 0.2]], velocities=0), {"y": [1.0, 0.0], "dt": 0.1, "steps": 1500}),
+    (sw.Particles(1, gravity=[0.0, -9.81]), {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 50_000}),  # from rest, 10⁸ down
+    (sw.Oscillator(1e8, form="physical"), {"v": 0.0, "y": 1.0, "dt": 1e-9, "steps": 500}),  # v is 1e8 times y
+    (spring(), {"v": 0.0, "y": 0.0, "dt": 0.01, "steps": 2000}),
+    (spring(damping=0.0, push=0.0), {"v": 0.0, "y": 1e-9, "dt": 0.025, "steps": 2000}),
+    (sw.Oscillator(1.0, a=sw.Sinusoid(1e7, 1.0), form="physical"), {"v": 0.0, "y": 1e-3, "dt": 0.1, "steps": 3000}),  # resonance
+]
+
+
+@pytest.mark.parametrize(("system", "given"), TAME)
+def test_what_grows_by_itself_or_not_at_all_is_not_told(system: sw.System, given: dict[str, Any]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for method in ("rk4", "dop853", "merson"):
+            sw.integrate(system, method, **given)
+            blocks = {name: np.array(np.broadcast_to(given[name], shape), dtype=float) for name, shape in shapes(system, given)}
+            world = sw.World(system, method, dt=given["dt"], **blocks)
+            frames(world, 300, max(1, given["steps"] // 300))
+
+
+def shapes(system: sw.System, given: dict[str, Any]) -> list[tuple[str, Any]]:
+    sized = system.sized(given.get("v"), given["y"])
+    return [(name, shape) for name, shape in (("v", sized.v_shape), ("y", sized.y_shape)) if name in given]
