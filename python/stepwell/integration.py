@@ -15,7 +15,7 @@ from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
-from .adaptive_runs import adaptive_run
+from .adaptive_runs import AdaptiveOptions, adaptive_run
 from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
@@ -56,6 +56,9 @@ def integrate(
     t0: float = 0.0,
     start: str | None = None,
     max_steps: int | None = None,
+    max_step: Any = None,
+    jumps: Any = None,
+    positive: Any = None,
     progress: bool = False,
     threads: int | None = None,
     backend: Backend = "rust",
@@ -169,13 +172,17 @@ def integrate(
         _only_fixed(fixed)
         went = None if carry is None else (carry, carried_by)
         asked = None if events is None else _asked(events, "direct")
+        options = AdaptiveOptions(tolerance, at, max_steps, max_step, jumps, positive)
         run, begun = adaptive_run(
-            system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress, asked
+            system, how, v, y, dt, options, record, t0, went, control, fused, threads, backend, progress, asked
         )
         warn_of_nonsense(run, begun)
         return run
     if max_steps is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    for name, option in (("max_step", max_step), ("jumps", jumps), ("positive", positive)):
+        if option is not None:
+            raise ArgumentError(f"{name}: goes with tolerance= and at= only; steps of fixed length are dt long, whatever comes")
     dt = dt_before if dt is None else dt
     if dt is None or steps is None:
         missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)

@@ -80,13 +80,15 @@ class AdaptiveState(NamedTuple):
         pace: the state of the step-size controller, shape (numbers, *batch), with the last output time in it.
         last: the last output time.
         method: name of the method to which the pace belongs.
+        options: further arguments of ``integrate`` that go on: ``max_step``, ``jumps``, ``positive``.
     """
 
     v: Array
     y: Array
     pace: Array
-    last: float
+    last: Any
     method: str
+    options: dict[str, Any] = {}  # noqa: RUF012  # it is not written to
 
 
 class Run(Value):
@@ -283,7 +285,7 @@ class Run(Value):
         if self.stand is not None:
             kept = {} if self.system.keeper is None else {"control": self.system.keeper}
             going_on = {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, **told, **kept}
-            return going_on | {"carry": self.stand.pace, "carried_by": self.stand.method}
+            return going_on | self.stand.options | {"carry": self.stand.pace, "carried_by": self.stand.method}
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         state |= {"dt_before": self.dt, **told}
         if self.start is not None:

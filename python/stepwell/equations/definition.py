@@ -6,7 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, overload
+from typing import Any, Literal, get_args, overload
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .._checks import Shape
 from ..errors import ArgumentError, DTypeError, UnknownNameError
 from ..systems.inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
+
+#: What the error of an adaptive step is relative to.
+Scale = Literal["component", "row", "block"]
 
 
 class Definition:
@@ -26,15 +29,22 @@ class Definition:
         blocks: 2 if the function gives (v̇, ẏ).
         shape: the declared shapes of the blocks v and y; None where the state tells.
         quick_sines: whether sine and cosine are those of the built-in systems.
+        scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
         parameters: names and defaults.
         invariants: the declared invariants, by name.
     """
 
     def __init__(
-        self, function: Callable[..., Any], order: int, blocks: int, shape: tuple[Any, Any], quick_sines: bool = False
+        self,
+        function: Callable[..., Any],
+        order: int,
+        blocks: int,
+        shape: tuple[Any, Any],
+        quick_sines: bool = False,
+        scale: str = "component",
     ) -> None:
         self.function, self.order, self.blocks, self.shape = function, order, blocks, shape
-        self.quick_sines = quick_sines
+        self.quick_sines, self.scale = quick_sines, scale
         self.__name__ = self.name = function.__name__
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
@@ -150,9 +160,18 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
 def system(function: Callable[..., Any], /) -> Definition: ...
 @overload
 def system(
-    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False
+    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False, scale: Scale = "component"
 ) -> Callable[[Callable[..., Any]], Definition]: ...
-def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False) -> Any:
+def system(
+    function: Any = None,
+    /,
+    *,
+    order: int = 2,
+    blocks: int = 1,
+    shape: Any = None,
+    quick_sines: bool = False,
+    scale: Scale = "component",
+) -> Any:
     """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
 
     The function is run once for a system, with symbols in place of numbers, and its operations are recorded; it is not called
@@ -170,6 +189,9 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
 
         quick_sines: sine and cosine at half the operations, as the built-in systems have them: right to a unit in the last place
             of 1 for angles up to 10⁶ rad, where the others are right to a unit in their own last place.
+        scale: to what the error of an adaptive step is relative: to the largest that each ``"component"`` has been, so that the
+            units of one do not matter to another; to the length of each ``"row"`` along the last axis, for a state of shape
+            (bodies, 3) whose directions are equivalent; or to the length of each whole ``"block"``, v and y.
 
     Returns:
         A ``Definition``: called with parameters by name, it gives a ``System``.
@@ -193,13 +215,14 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
         raise ArgumentError("blocks: expected 1 with order=1, whose state is one block; for (v̇, ẏ) leave order out")
     shapes = _shapes(shape, order, blocks)
     quick_sines = _checks.flag("quick_sines", quick_sines)
+    scale = _checks.known("scale", scale, get_args(Scale))
 
     def define(function: Any) -> Definition:
         if isinstance(function, Definition):
             raise DTypeError(f"function: {function.name} is a system already")
         if not isinstance(function, FunctionType):
             raise DTypeError(f"function: expected a Python function such as f(t, v, y), got {type(function).__name__}")
-        return Definition(function, order, blocks, shapes, quick_sines)
+        return Definition(function, order, blocks, shapes, quick_sines, scale)
 
     return define if function is None else define(function)
 

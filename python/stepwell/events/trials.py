@@ -112,13 +112,13 @@ class AdaptiveTrials(Trials):
         self._is_traced = self._is_traced and not self._always_traced
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        system = Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+        system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
         with np.errstate(all="ignore"):
             v, y = within(plan, system, t, h, v, y)
         return np.asarray(v), np.asarray(y)
 
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-        return within(plan, tracer.attempted(), t, h, v, y)
+        return within(plan, tracer.attempted(backward=plan.backward), t, h, v, y)
 
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:

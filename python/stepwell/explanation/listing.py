@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _core
+from .. import _core, engine
 from .._checks import Shape
 from ..engine import Plan
 from ..reference import adaptive, increments
+from ..reference.acceptance import Acceptance
 from ..reference.signal import Constant, Held, Sine
 from ..reference.tape import Operation, in_order, needed
 from ..reference.traced import Tracer
@@ -107,11 +108,11 @@ class Named(Tracer):
         s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
         return s
 
-    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+    def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state and the pace after an attempt, whose increments are as long as its step."""
         _, _, more = self.state()
-        self._length = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields)).outlook(self.tape.budget()).step
-        return super().attempt(method, order)
+        self._length = self.pace(acceptance, more).outlook(self.tape.budget()).step
+        return super().attempt(method, order, acceptance, backward=backward)
 
     def _note(self, name: str, block: Any) -> None:
         block = np.asarray(block, dtype=object)
@@ -180,7 +181,11 @@ def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     """What the numbers of a state are called, with a mark behind the names."""
     blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape)]
     names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
-    beside = adaptive.Pace._fields if attempts else () if plan.system.control is None else ("work",)
+    beside: list[str] = [] if plan.system.control is None else ["work"]
+    if attempts:
+        each = ("longest", "relative", "absolute") if plan.acceptance.own else ("longest",)
+        groups = range(engine.groups_of(plan))
+        beside = [*adaptive.Pace._fields[: engine.PACE_NUMBERS], *(indexed(name, (group,)) for name in each for group in groups)]
     return names + [name + mark for name in beside]
 
 

@@ -5,7 +5,7 @@ Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import count
 from math import prod
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 
 from .._value import changed
 from . import adaptive, contact, series_pace
+from .acceptance import Acceptance
 from .around import surrounded
 from .run import linear_step
 from .signal import Constant, Held, Sine
@@ -113,33 +114,46 @@ class Tracer:
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
 
-    def attempted(self) -> adaptive.Attempted:
-        """How an attempt at an adaptive step uses the system."""
-        batch = self.system.batch
-        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        return adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+    def of_unit_step(self, *, backward: bool = False) -> Any:
+        """The system scaled to a step of 1, or of −1 where its time runs backward; without control."""
+        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        if backward:
+            return adaptive.Backward(self.system.reference(-1.0, **given))
+        return self.system.reference(1.0, **given)
 
-    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+    def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
+        """How an attempt at an adaptive step uses the system."""
+        return adaptive.Attempted(self.of_unit_step(backward=backward), self._control())
+
+    def pace(self, acceptance: Acceptance, more: Iterator[Any]) -> adaptive.Pace:
+        """The pace as a part of the state."""
+        groups = sum(acceptance.counts(prod(self.system.v_shape), prod(self.system.y_shape)))
+        numbers = len(adaptive.Pace._fields) - 2 + groups * (3 if acceptance.own else 1)
+        return adaptive.Pace.of([next(more) for _ in range(numbers)], groups)
+
+    def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
-        system = self.attempted()
+        system = self.attempted(backward=backward)
         v, y, more = self.state()
-        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        pace = self.pace(acceptance, more)
         axes = len(self.system.v_shape), len(self.system.y_shape)
         steps: Any = method.steps
         if method.has_series:
-            following, v, y = series_pace.attempt(order or steps.ORDER, system, axes, pace, self.tape.budget(), v, y)
+            order = order or steps.ORDER
+            following, v, y = series_pace.attempt(order, system, axes, acceptance, pace, self.tape.budget(), v, y)
         else:
-            following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
-        return self.flat(v, y, *following)
+            order = method.error_order
+            following, v, y = adaptive.attempt(steps, system, order, axes, acceptance, pace, self.tape.budget(), v, y)
+        return self.flat(v, y, *following.numbers)
 
-    def begin(self, method: Any) -> list[Any]:
+    def begin(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state, and the pace at the start of a run with a tolerance."""
-        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        system = self.of_unit_step(backward=backward)
         v, y, more = self.state()
-        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        pace = self.pace(acceptance, more)
         axes = len(self.system.v_shape), len(self.system.y_shape)
-        system = self.system.reference(1.0, **given)
-        return self.flat(v, y, *adaptive.begin(system, pace, v, y, axes, series=method.has_series))
+        begun = adaptive.begin(system, pace, v, y, axes, acceptance.groups, series=method.has_series)
+        return self.flat(v, y, *begun.numbers)
 
     def record(self, names: Sequence[str]) -> list[Any]:
         """Quantities of a state."""

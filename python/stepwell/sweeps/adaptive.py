@@ -10,7 +10,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
-from ..engine import PACE_NUMBERS, pace_of
+from ..engine import PACE_NUMBERS
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..method_records import Method
 from ..result import Run, Status
@@ -141,7 +141,8 @@ def lost(run: Run) -> int:
     """How many members have an absolute tolerance so large that the motion is lost in it."""
     if run.stand is None:
         return 0
-    return int(np.count_nonzero(lost_in_tolerance(pace_of(run.stand.pace, run.status.shape))))
+    groups = len(run.stand.pace) - PACE_NUMBERS
+    return int(np.count_nonzero(lost_in_tolerance(run.stand.pace, groups)))
 
 
 def why(status: int) -> str:

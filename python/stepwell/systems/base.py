@@ -142,6 +142,11 @@ class System(Fixed, Value, ABC):
         the same names.
         """
 
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """The group of each number of v, then of y, whose errors count together: see ``reference/acceptance.py``."""
+        return ()
+
     def alone(self, h: float, batch: Shape) -> Any:
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
         return self.reference(h, **self.given(batch))

@@ -99,6 +99,11 @@ class LinearSystem(System):
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
         return [f"{len(self.A)} states", f"{self.v_shape[0]} of them velocities", f"{m} inputs", f"{r} outputs"]
 
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """Each state is one of its own, for their units differ."""
+        return tuple(range(len(self.A)))
+
     def given_inputs(self) -> dict[str, Input]:
         """Its inputs by name, without those that were not given."""
         return {name: given for name, given in zip(self.input_names, self.x, strict=True) if given is not None}

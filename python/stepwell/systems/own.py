@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import nullcontext
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -214,6 +215,18 @@ class OwnSystem(System):
     def _known(self) -> OwnSystem:
         """The same system with known shapes of its blocks."""
         return self if self.equations is not None else self.sized()
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """By the definition's ``scale``: each component, each row along the last axis, or each block."""
+        if self.definition.scale == "block":
+            return ()
+        groups: list[int] = []
+        for shape in (self.v_shape, self.y_shape):
+            of_one = prod(shape[-1:]) if self.definition.scale == "row" else 1
+            first = groups[-1] + 1 if groups else 0
+            groups += [first + place // max(of_one, 1) for place in range(prod(shape))]
+        return tuple(groups)
 
     # ---- for the core and the reference
 

@@ -5,7 +5,7 @@ mod tape;
 mod world;
 
 use numpy::{
-    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
+    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
     PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
@@ -186,7 +186,8 @@ fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
 /// When the state is asked for, and how long to try: see `Pacing` in `engine/adaptive.py`.
 #[derive(FromPyObject)]
 struct PacingOf<'py> {
-    at: PyReadonlyArray1<'py, f64>,
+    at: PyReadonlyArray2<'py, f64>,
+    jumps: PyReadonlyArray2<'py, f64>,
     budget: i64,
     begins: bool,
 }
@@ -214,7 +215,8 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
-        at: pacing.at.as_slice()?,
+        at: by_row(&pacing.at)?,
+        jumps: by_row(&pacing.jumps)?,
         paces: by_row(&arrays.paces)?,
         begins: pacing.begins,
         budget: pacing.budget,
