@@ -9,7 +9,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import AdaptiveArrays, Arrays, Pacing, Plan
+from .engine import AdaptiveArrays, Arrays, CorePacing, Plan
 
 __all__ = [
     "Equations",
@@ -216,7 +216,7 @@ def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
     Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
     """
 
-def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> bool:
+def adapt(model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArrays) -> bool:
     """Make a run with a tolerance. Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything.
 
     False if nothing was done, since the start is to be found and an attempt is too long for one tape.

@@ -103,7 +103,9 @@ def adaptive_run(
     elif dt is not None:
         first = _checks.numbers("dt", dt, unit="units of time")
         if (sign * first <= 0.0).any():
-            raise ArgumentError(f"dt: expected a step {'below' if backward else 'above'} zero, as at= goes, got {_checks.short(dt)}")
+            raise ArgumentError(
+                f"dt: expected a step {'below' if backward else 'above'} zero, as at= goes, got {_checks.short(dt)}"
+            )
         first = sign * first
         batches["dt"] = first.shape
     if options.max_step is not None:
@@ -223,7 +225,7 @@ def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptio
         goes_with_series(system, control)
         if options.positive is not None:
             raise UnsupportedError(
-                f"positive: {how.name} chooses each step before it is made and rejects none; use a method that rejects steps, as dop853"
+                f"positive: {how.name} chooses each step before it is made and rejects none; use one that does, as dop853"
             )
     not_of_a_step(system.keeper if control is None else control)
     if options.at is None:
@@ -248,7 +250,8 @@ def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
     if (times[0] >= since).all() and (len(times) == 1 or (np.diff(times, axis=0) > 0).all()):
         return
     word = "descend" if sign < 0.0 else "ascend"
-    at = _checks.short(sign * np.asarray(since))
+    start = sign * np.asarray(since)
+    at = f"{start.item():g}" if start.size == 1 else f"{start.min():g} to {start.max():g}"
     begin = f"the last time of the run that goes on, {at}, on" if goes_on else f"t0 = {at} on"
     shown = (sign * times).reshape(len(times), -1)[:5, 0].tolist()
     raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown}{'…' * (len(times) > 5)}")
@@ -285,7 +288,9 @@ def _rows_of(block: Array, axes: int) -> list[Array]:
 
 def _place(system: System, part: Any) -> int:
     """The place of a component that is given as an index of y, or as ("v", …) or ("y", …)."""
-    block, index = ("y", part) if not isinstance(part, tuple) or not part or isinstance(part[0], (int, np.integer)) else (part[0], part[1:])
+    block, index = (
+        ("y", part) if not isinstance(part, tuple) or not part or isinstance(part[0], (int, np.integer)) else (part[0], part[1:])
+    )
     block = _checks.known("positive", block, ["v", "y"])
     shape = system.v_shape if block == "v" else system.y_shape
     index = index if isinstance(index, tuple) else (index,)
@@ -299,8 +304,10 @@ def _place(system: System, part: Any) -> int:
             f"positive: expected True, or components of {block}, whose shape is {shape}: an index of y, or as ('y', 0), got "
             f"{_checks.short(part)}"
         )
-    return int(np.ravel_multi_index(index, shape)) + (prod(system.v_shape) if block == "y" else 0) if shape else (
-        prod(system.v_shape) if block == "y" else 0
+    return (
+        int(np.ravel_multi_index(index, shape)) + (prod(system.v_shape) if block == "y" else 0)
+        if shape
+        else (prod(system.v_shape) if block == "y" else 0)
     )
 
 
@@ -363,8 +370,8 @@ def _paces_of(method: Method, carry: Any, carried_by: Any, groups: int) -> Array
     expected = [engine.PACE_NUMBERS + groups, engine.PACE_NUMBERS + 3 * groups]
     if numbers.shape[:1] not in [(each,) for each in expected]:
         raise ShapeError(
-            f"carry: with a tolerance expected that of run.resume, {expected[0]} or {expected[1]} numbers for each member along the "
-            f"first axis, got shape {numbers.shape}"
+            f"carry: with a tolerance expected that of run.resume, {expected[0]} or {expected[1]} numbers for each member along "
+            f"the first axis, got shape {numbers.shape}"
         )
     return numbers
 
@@ -373,8 +380,8 @@ def _tolerances(tolerance: Any, system: System, acceptance: Acceptance, batch: S
     """The relative one, and the absolute one of a pair: numbers over the batch, or of each component along the first axis."""
     if isinstance(tolerance, list):
         raise DTypeError(
-            "tolerance: expected a number, an array, or a tuple (relative, absolute), got a list, which might be meant as either; "
-            "make it a NumPy array or a tuple"
+            "tolerance: expected a number, an array, or a tuple (relative, absolute), got a list, which might be meant as "
+            "either; make it a NumPy array or a tuple"
         )
     parts = tolerance if isinstance(tolerance, tuple) else (tolerance,)
     if isinstance(tolerance, tuple) and len(parts) != 2:
@@ -385,11 +392,8 @@ def _tolerances(tolerance: Any, system: System, acceptance: Acceptance, batch: S
     of_components = [_is_of_components(part, system, batch) for part in each]
     if not any(of_components):
         return engine.Tolerances(relative, absolute)
-    return engine.Tolerances(
-        *(_of_groups(part, own, system, acceptance) for part, own in zip(each, of_components, strict=True)),
-        *([None] if absolute is None else []),
-        of_groups=True,
-    )
+    of_groups = [_of_groups(part, own, system, acceptance) for part, own in zip(each, of_components, strict=True)]
+    return engine.Tolerances(of_groups[0], of_groups[1] if len(of_groups) > 1 else None, of_groups=True)
 
 
 def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
@@ -398,8 +402,8 @@ def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
     fits = bool(axes) and part.ndim >= axes and part.shape[:axes] == system.y_shape
     if fits and part.ndim <= len(batch) and part.shape == batch[len(batch) - part.ndim :]:
         raise ShapeError(
-            f"tolerance: an array of shape {part.shape} may be meant for each component of y or for each member; give it the shape "
-            f"(*block, *batch), {system.y_shape + len(batch) * (1,)} for components, or {axes * (1,) + part.shape} for members"
+            f"tolerance: an array of shape {part.shape} may be meant for each component of y or for each member; give it the "
+            f"shape (*block, *batch): {system.y_shape + len(batch) * (1,)} for components, {axes * (1,) + part.shape} for members"
         )
     return fits
 
@@ -412,7 +416,9 @@ def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acc
     if not of_components:
         return np.broadcast_to(part, (count, *part.shape))
     if n_v not in (0, n_y):
-        raise ShapeError(f"tolerance: v and y have different shapes, {system.v_shape} and {system.y_shape}; give one number for all")
+        raise ShapeError(
+            f"tolerance: v and y have different shapes, {system.v_shape} and {system.y_shape}; give one number for all"
+        )
     rows = part.reshape(n_y, *part.shape[len(system.y_shape) :])
     of_each = np.concatenate([rows, rows]) if n_v else rows
     least = np.full((count, *rows.shape[1:]), np.inf)

@@ -83,18 +83,22 @@ def integrate(
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
         dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
-            to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
-            time from rest.
+            to try first; if None, a hundredth of the time in which the state changes at the start, or from rest a millionth of
+            the time to the first saved state.
         steps: number of steps, one or more.
         every: save the state every so many steps, and at the first and the last; None saves the last alone.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
-            each stays below this. The error of a block is relative to the largest length (norm) of the block so far, so that the
-            units of v and y do not matter. A tuple (relative, absolute) allows relative·length + absolute instead, the absolute
-            part in the units of the state. Each is a number or an array that broadcasts over the batch; a list is refused, since
-            it could mean either. A run that continues by ``carry`` has its tolerance already. For methods with an
-            ``error_order``: merson, fehlberg, fehlberg_5, dop853.
-        at: with a tolerance, the times at which to save the state, ascending, from t0 on. Steps do not depend on them: a state
-            within a step is computed by one extra step from its start.
+            each stays below this. One number is relative: of own equations to the largest that each component has been, so that
+            units do not matter; of built-in systems, whose directions are equivalent, to the largest length of each block. For a
+            component that decays to nothing, or a stiff one, give a tuple (relative, absolute): it allows relative·size +
+            absolute with the present size, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a
+            number, an array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a
+            list is refused. A run that continues by ``carry`` has its tolerance already. For methods with an ``error_order``: merson,
+            fehlberg, fehlberg_5, dop853, taylor.
+        at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
+            time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
+            from its start. Steps do not depend on these times, but for the first from rest; and where the extra step errs by
+            more than is tolerated, the step missed something and is rejected.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
@@ -111,9 +115,17 @@ def integrate(
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
-        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
+        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated. With a tolerance, the time of
+            the start, a number or an array over the batch.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        max_step: with a tolerance, the longest step, in units of time, a number or an array over the batch. What lasts for less
+            than a step may be stepped over without a sign: give this, or ``jumps``, where rates change suddenly in time.
+        jumps: with a tolerance, times at which rates jump, shape (jumps,), or (jumps, *batch) for jumps of each member. No step
+            crosses one; behind it the step is chosen anew.
+        positive: with a tolerance, the components that must not become negative: True for all of y, or one or a list of indices
+            of y, or of tuples such as ("v", 0). A step that makes one negative is rejected; a member stops where no step is small
+            enough.
         progress: show a progress bar, in a terminal or in a notebook.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.

@@ -25,7 +25,7 @@ PACE_NUMBERS = 20
 #: Places among them; the counts are of accepted, rejected and extra steps.
 TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 4, 5, 6, 7, 18
 MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
-#: The first step where the state tells nothing: this part of the time of the run.
+#: The first step where the state tells nothing: this part of the time to the first saved state.
 BLIND = 1.0 / (1 << 20)
 
 
@@ -52,7 +52,7 @@ class Pacing(NamedTuple):
     jumps: Array | None = None
 
 
-class _CorePacing(NamedTuple):
+class CorePacing(NamedTuple):
     """The same as the core takes it: rows of one number for all or for each member, those of jumps twice, before and after."""
 
     at: Array
@@ -68,11 +68,11 @@ def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
     return None if pacing.jumps is None or not len(pacing.jumps) else adaptive.Jumps.around(pacing.jumps, plan.t0)
 
 
-def pacing_of_core(plan: Plan, pacing: Pacing) -> _CorePacing:
+def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
     """As the core takes it."""
     jumps = jumps_of(plan, pacing)
     both = np.empty((0, 1)) if jumps is None else np.concatenate([_rows(jumps.before, plan), _rows(jumps.after, plan)])
-    return _CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins)
+    return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins)
 
 
 def _rows(times: Array, plan: Plan) -> Array:
@@ -134,10 +134,13 @@ def pace_numbers(plan: Plan) -> int:
     return PACE_NUMBERS + groups_of(plan) * (3 if plan.acceptance.own else 1)
 
 
-def paces(plan: Plan, first: Array | None, tolerances: Tolerances, most_step: Array | None = None, pacing: Pacing | None = None) -> Array:
+def paces(
+    plan: Plan, first: Array | None, tolerances: Tolerances, most_step: Array | None = None, pacing: Pacing | None = None
+) -> Array:
     """Where members stand before they begin, shape (numbers, *batch), or (numbers,) if it is the same for all.
 
-    Of ``pacing`` it takes the span, of which a part is the first step where the state tells nothing, and jumps at the start.
+    Of ``pacing`` it takes the first time, of which a part is the first step where the state tells nothing, and a jump at the
+    start.
     """
     from ..reference import adaptive  # only such runs need it
 
@@ -151,12 +154,12 @@ def paces(plan: Plan, first: Array | None, tolerances: Tolerances, most_step: Ar
         if (jumps := jumps_of(plan, pacing)) is not None:
             t0 = jumps.begun(t0)
         if step is None:
-            span = np.asarray(pacing.at[-1] - plan.t0)
-            step = -np.where(span > 0.0, BLIND * span, BLIND)
+            later = np.where(pacing.at > plan.t0, pacing.at - plan.t0, np.inf).min(axis=0)
+            step = -np.where(later < np.inf, BLIND * later, BLIND)
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
-    h, *tolerance, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
-    lasts = float(tolerances.absolute is None)
-    numbers = [*adaptive.waiting(begin, h, (*tolerance, lasts), plan.system.samples, longest, groups).numbers, *own]
+    h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
+    tolerance = both[0], both[1], float(tolerances.absolute is None)
+    numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
     if all(np.ndim(number) == 0 for number in numbers):
         return np.array(numbers, dtype=np.float64)
     out = np.empty((len(numbers), *plan.batch))
@@ -252,10 +255,10 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     before = paces.reshape(numbers, paces.size // numbers)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1))
-    spec, core_pacing = model(plan), pacing_of_core(plan, pacing)
-    if not _core.adapt(spec, plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
+    spec, core_pacing, core_plan = model(plan), pacing_of_core(plan, pacing), plan._replace(t0=0.0)
+    if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
-        _core.adapt(spec, plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
+        _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
     series = plan.method.has_series
     each = _core.series_evaluations(spec, attempts=True) if series else plan.method.attempt_evaluations
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)

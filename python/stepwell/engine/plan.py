@@ -51,7 +51,7 @@ class Plan(NamedTuple):
     watched: Watched | None = None
     order: int = 0
     single: bool = False
-    acceptance: Acceptance = Acceptance()  # noqa: RUF009  # it is immutable
+    acceptance: Acceptance = Acceptance()  # it is immutable
     backward: bool = False
 
     @property

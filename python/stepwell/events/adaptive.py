@@ -103,7 +103,9 @@ class _Driver(Collected):
             stopped = self._look(some, index, out, before, not begins)
             after = out.paces[engine.COUNTS][:2].sum(axis=0)
             # Members that make no attempt cannot, or may not: they are out of attempts, or a step no longer moves the time.
-            on = ~stopped & (out.t[-1] < self.end[index]) & (after - before.sum(axis=0) == attempts) & (after < self.pacing.budget)
+            on = (
+                ~stopped & (out.t[-1] < self.end[index]) & (after - before.sum(axis=0) == attempts) & (after < self.pacing.budget)
+            )
             self.reached[index] = np.where(on, out.t[-1], self.end[index])
             index, paces, v, y = index[on], out.paces[:, on], out.v[-1][..., on], out.y[-1][..., on]
             begins, together = False, 2 * together

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,11 +80,11 @@ def attempted(
         status=np.empty(members, dtype=np.int64),
         trail=trail,
     )
-    model = engine.model(plan)
+    model, plan_of_core = engine.model(plan), plan._replace(t0=0.0)
     pacing = engine.pacing_of_core(plan, engine.Pacing(np.broadcast_to(until, (rows, *np.shape(until))), budget, begins, jumps))
-    if not _core.adapt(model, plan, pacing, arrays):  # an attempt is not one tape: the reference finds the start
+    if not _core.adapt(model, plan_of_core, pacing, arrays):  # an attempt is not one tape: the reference finds the start
         begun = engine.numbers_of(engine.begun(plan, paces, v, y)).reshape(numbers, members)
-        _core.adapt(model, plan, pacing._replace(begins=False), arrays._replace(paces=begun))
+        _core.adapt(model, plan_of_core, pacing._replace(begins=False), arrays._replace(paces=begun))
     return Attempts(trail[0], trail[1], states[0], states[1], last_paces)
 
 

@@ -91,9 +91,10 @@ def solve_ivp(
     ``fun`` is run at the start, with symbols, and not at every step; what cannot be traced (``if`` on a state, ``np.random``) is
     an error that names the line. Results have the same bits on every machine.
 
-    What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. Of a step the largest error of a component
-    counts, over what is tolerated of it, and not the root of their mean square. ``sol`` and events use no interpolation, but short steps of the
-    method. The state is real. For many trajectories, use ``stepwell.system`` and ``integrate``.
+    What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. Of a step the largest error of a
+    component counts, over what is tolerated of it, and not the root of their mean square. ``sol`` and events use no
+    interpolation, but short steps of the method. The state is real. For many trajectories, use ``stepwell.system`` and
+    ``integrate``.
 
     Args:
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.

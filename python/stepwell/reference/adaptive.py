@@ -14,7 +14,7 @@ from . import tableau
 from .acceptance import Acceptance
 from .bits import and_bits, at_most, less, where
 from .tableau import Increments, Weights
-from .types import Array, Blocks, Scaled, Whole
+from .types import Array, Scaled, Whole
 
 #: A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
 #: (PI control, Gustafsson 1988), held between MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth. Where
@@ -28,18 +28,18 @@ TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
 ROUNDING = 1.0 / (1 << 40)
-#: A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one component
-#: after the other, each at first with a power of the time that is beyond the order of the method: relative to itself its first step
-#: would always be all wrong, however short.
+#: A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
+#: component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself
+#: its first step would always be all wrong, however short.
 ONSET = 1.0 / (1 << 40)
 #: A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
 #: have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 #: that follows.
 PUSHED = 1.0 / 64.0
-#: An estimate that is smaller than this, relative to the size, says nothing: all stages saw the same, as at rest. The next step is
-#: then no longer than QUIET times the time since the start, or than this one; so what begins later is not stepped over, unless it
-#: lasts for less than that.
-UNSEEN, QUIET = 1.0 / (1 << 56), 1.0 / 32.0
+#: An estimate that is smaller than this, relative to the change in the step, is only rounding: all stages saw the same rates, as
+#: at rest. The next step is then no longer than QUIET times the time since the start, or than this one; so what begins later is
+#: not stepped over, unless it lasts for less than that.
+UNSEEN, QUIET = 1.0 / (1 << 46), 1.0 / 32.0
 #: The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 OUTSIDE = 16.0
 
@@ -129,7 +129,8 @@ class Pace(NamedTuple):
     def of(cls, numbers: Sequence[Any], groups: int) -> Self:
         """From its numbers, one after the other."""
         single = len(cls._fields) - 2
-        return cls(*numbers[:single], stacked(numbers[single : single + groups]), stacked(numbers[single + groups :]))
+        longest, own = stacked(numbers[single : single + groups]), stacked(numbers[single + groups :])
+        return cls(*numbers[:single])._replace(longest=longest, own=own)
 
     @property
     def numbers(self) -> list[Any]:
@@ -203,7 +204,7 @@ class Jumps(NamedTuple):
 
     def wall(self, t: Any) -> Any:
         """The next time at which a step from t must end, infinite if there is none."""
-        return np.take_along_axis(*self._columns(t, self.before, np.inf, self.passed(t)))[0]
+        return self._of_each(t, self.before, self.passed(t))
 
     def crossed(self, pace: Pace, *, series: bool) -> Pace:
         """Where members stand that have come to a wall: behind it, with a step that is chosen anew."""
@@ -211,8 +212,7 @@ class Jumps(NamedTuple):
         if not np.any(there):
             return pace
         passed = self.passed(pace.t)
-        t = np.take_along_axis(*self._columns(pace.t, self.after, np.inf, np.maximum(passed - 1, 0)))[0]
-        t = np.where(there, t, pace.t)
+        t = np.where(there, self._of_each(pace.t, self.after, np.maximum(passed - 1, 0)), pace.t)
         least = MOVES * np.abs(t)
         first = FIRST * pace.h
         return pace._replace(
@@ -224,12 +224,12 @@ class Jumps(NamedTuple):
         )
 
     @staticmethod
-    def _columns(t: Any, times: Array, last: float, place: Any) -> tuple[Array, Array, int]:
-        """Times of each member with one more behind them, and which of them is taken."""
+    def _of_each(t: Any, times: Array, place: Any) -> Any:
+        """The time at a place of each member; infinite behind the last."""
         shape = np.shape(t)
-        rows = times.reshape(len(times), *(times.shape[1:] or len(shape) * (1,)))
-        ended = np.concatenate([np.broadcast_to(rows, (len(times), *shape)), np.full((1, *shape), last)])
-        return ended, np.asarray(place, dtype=np.intp)[np.newaxis], 0
+        rows = np.broadcast_to(times.reshape(len(times), *(times.shape[1:] or len(shape) * (1,))), (len(times), *shape))
+        ended = np.concatenate([rows, np.full((1, *shape), np.inf)])
+        return np.take_along_axis(ended, np.asarray(place, dtype=np.intp)[np.newaxis], 0)[0]
 
 
 class Stretched:
@@ -431,14 +431,17 @@ def attempt(
     least, bound = tolerated(pace, step, acceptance.counts(np.size(v), np.size(y)), old, new)
     error = sizes(*tableau.combined(pair.ERROR, increments), block_axes, groups)
     r = over(error, bound)
+    # The product of two estimates falls with a high power of the step, where rates are smooth. Where they jump one of them may be
+    # next to nothing by chance: so once a step was rejected, the estimate is the finer one alone until a step is accepted.
     if coarse := getattr(pair, "COARSE", None):
         other = over(sizes(*tableau.combined(coarse, increments), block_axes, groups), bound) / r
-        r = where(less(0.0, r), r / np.sqrt(1.0 + 0.01 * (other * other)), r)
+        r = where(less(0.0, r) & less(1.0, pace.most), r / np.sqrt(1.0 + 0.01 * (other * other)), r)
     # Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
     r = where(less(total(new) + total(error), np.inf), r, np.inf)
     for row in acceptance.positive:
         r = where(less(component(v1, y1, block_axes, row), 0.0), longer(r, OUTSIDE), r)
-    following, goes_on = decided(pace, order > LOW, r, least, outlook)
+    unseen = reduce(operator.and_, at_most(error, UNSEEN * absolute(new - old)))
+    following, goes_on = decided(pace, order > LOW, r, unseen, least, outlook)
     v1, y1, work = system.project(v1, y1)
     done = work if system.push is None else s.work / step
     if done is not None:
@@ -446,8 +449,11 @@ def attempt(
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
-def decided(pace: Pace, high: bool, r: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:
-    """The pace after an attempt with this error, and whether the state advances; ``new`` are the sizes that it would have."""
+def decided(pace: Pace, high: bool, r: Any, unseen: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:
+    """The pace after an attempt with this error, and whether the state advances; ``new`` are the sizes that it would have.
+
+    ``unseen`` is whether the estimate is only rounding.
+    """
     step, is_extra, ends, runs = outlook
     good = at_most(r, 1.0)  # NaN is not
     floored = where(less(TINY, r), r, TINY)
@@ -468,7 +474,6 @@ def decided(pace: Pace, high: bool, r: Any, new: Any, outlook: Outlook) -> tuple
     root = where(less(calm, root), root, calm)
     t = where(takes, reached, pace.t)
     grown = where(takes & ends, pace.h, step * factor)
-    unseen = at_most(r * pace.relative, where(less(0.0, pace.lasts), UNSEEN, 0.0))
     quiet = longer(step, QUIET * (reached - pace.begin))
     grown = pace.shortened(where(takes & unseen & less(quiet, grown), quiet, grown), t)
     following = pace._replace(
@@ -516,6 +521,11 @@ def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any
     size = longer(where(less(0.0, pace.lasts), stacked(lasting), old), new)
     relative, absolute = pace.tolerances()
     return stacked(least), absolute + relative * size
+
+
+def absolute(x: Any) -> Any:
+    """|x|."""
+    return and_bits(x, (1 << 63) - 1)
 
 
 def longer(a: Any, b: Any) -> Any:
@@ -578,5 +588,5 @@ def size_of(block: Array, axes: int) -> Any:
 def length_of(numbers: Sequence[Any]) -> Any:
     """The length of some numbers, each of all members; of one number its absolute value."""
     if len(numbers) == 1:
-        return and_bits(numbers[0], (1 << 63) - 1)
+        return absolute(numbers[0])
     return np.sqrt(reduce(operator.add, (number * number for number in numbers), 0.0))

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .adaptive import ONSET, Acceptance, Attempted, Pace, largest, longer, over, sizes, stacked, total
+from .acceptance import Acceptance
+from .adaptive import ONSET, Attempted, Pace, largest, longer, over, sizes, stacked, total
 from .bits import add_bits, held, less, shift_up, where
 from .log import split
 from .series import coefficients
@@ -146,7 +147,7 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
 
 
 def decided(pace: Pace, step: Any, ends: Any, new: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
-    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes that it would have."""
+    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have."""
     good = less(total(new), np.inf)  # NaN is not
     reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)

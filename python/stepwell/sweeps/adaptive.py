@@ -58,7 +58,13 @@ class _Evaluations(Reduction):
 
 
 def arguments(
-    grid: Grid, method: Method, tolerance: Any, at: Any, max_steps: Any, fixed: Mapping[str, Any], outcomes: Iterable[Outcome]
+    grid: Grid,
+    method: Method,
+    tolerance: Any,
+    at: Any,
+    options: Mapping[str, Any],
+    fixed: Mapping[str, Any],
+    outcomes: Iterable[Outcome],
 ) -> tuple[dict[str, Any], Array]:
     """Further arguments of ``integrate``, and the times.
 
@@ -67,7 +73,7 @@ def arguments(
         method: by which they are computed.
         tolerance: as the user gave it; None if it is an axis.
         at: as the user gave it.
-        max_steps: likewise.
+        options: what goes with a tolerance only, by name; None if it was not given.
         fixed: what goes with fixed steps only, by name; None if it was not given.
         outcomes: what is kept.
 
@@ -90,12 +96,22 @@ def arguments(
             raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
         order_of_series(method, axis.values)
     if at is None or (tolerance is None and "tolerance" not in varied):
-        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
+        if at is None:
+            raise ArgumentError("at: needed with tolerance=: the times at which states are saved, at=[t1, …]")
+        raise ArgumentError("tolerance: needed with at=, as an argument or in axes: the error that a step may have")
     times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
     _fits_outcomes(outcomes, times)
     given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
-    if max_steps is not None:
-        given["max_steps"] = _checks.count("max_steps", max_steps, 1)
+    if options["max_steps"] is not None:
+        given["max_steps"] = _checks.count("max_steps", options["max_steps"], 1)
+    if options["max_step"] is not None:
+        given["max_step"] = _checks.number("max_step", options["max_step"], positive=True, unit="units of time")
+    if options["jumps"] is not None:
+        given["jumps"] = jumps = np.atleast_1d(_checks.numbers("jumps", options["jumps"], unit="units of time"))
+        if jumps.ndim > 1:
+            raise ShapeError(f"jumps: expected times along one axis, the same for all members, got shape {jumps.shape}")
+    if options["positive"] is not None:
+        given["positive"] = options["positive"]
     return given, times
 
 
@@ -126,10 +142,12 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
             )
 
 
-def refuse_fixed(outcomes: Iterable[Outcome], max_steps: Any) -> None:
+def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
     """Raise if something was given that goes with a tolerance only."""
-    if max_steps is not None:
+    if options["max_steps"] is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    if wrong := [name for name, value in options.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: goes with tolerance= and at= only; steps of fixed length are dt long")
     if any(isinstance(each, Evaluations) for each in outcomes):
         raise UnsupportedError(
             "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "

@@ -72,6 +72,9 @@ def sweep(
     tolerance: Any = None,
     at: Any = None,
     max_steps: int | None = None,
+    max_step: float | None = None,
+    jumps: Any = None,
+    positive: Any = None,
     control: AnyControl | None = None,
     force: Any = None,
     fused: bool = False,
@@ -118,6 +121,9 @@ def sweep(
         at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
             reductions see the states at these times and no others. Not with ``transient``, ``every`` or ``observe``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        max_step: with a tolerance, the longest step, in units of time.
+        jumps: with a tolerance, times that no step crosses, shape (jumps,): as for ``integrate``, the same for all members.
+        positive: with a tolerance, the components that must not become negative, as for ``integrate``.
         control: as for ``integrate``, the same for all members.
         force: likewise.
         fused: likewise.
@@ -173,10 +179,11 @@ def sweep(
     times = None
     if paced:
         others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
-        more, times = adaptive.arguments(grid, how, tolerance, at, max_steps, others, kept_of_each)
+        options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
+        more, times = adaptive.arguments(grid, how, tolerance, at, options, others, kept_of_each)
         given |= more
     else:
-        adaptive.refuse_fixed(kept_of_each, max_steps)
+        adaptive.refuse_fixed(kept_of_each, {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive})
         if steps is None:
             raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(

@@ -38,9 +38,9 @@ const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 /// That part. A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of such a length: so it must
 /// be long beside the roundings of time, and short beside the motion that follows.
 const PUSHED: f64 = 1.0 / 64.0;
-/// An estimate that is smaller than this, relative to the size, says nothing: all stages saw the same, as at rest. The next step is then
-/// no longer than QUIET times the time since the start, or than this one.
-const UNSEEN: f64 = 1.0 / (1u64 << 56) as f64;
+/// An estimate that is smaller than this, relative to the change in the step, is only rounding: all stages saw the same rates, as at rest.
+/// The next step is then no longer than QUIET times the time since the start, or than this one.
+const UNSEEN: f64 = 1.0 / (1u64 << 46) as f64;
 const QUIET: f64 = 1.0 / 32.0;
 /// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 const OUTSIDE: f64 = 16.0;
@@ -91,7 +91,7 @@ impl Acceptance {
 /// The length of some numbers; of one number its absolute value.
 fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N {
     match numbers.len() {
-        1 => numbers.next().map_or_else(|| N::of(0.0), |number| number.and_bits(u64::MAX >> 1)),
+        1 => numbers.next().map_or_else(|| N::of(0.0), |number| absolute(*number)),
         _ => numbers.fold(N::of(0.0), |total, number| total + *number * *number).sqrt(),
     }
 }
@@ -463,7 +463,8 @@ pub fn judge<N: Number>(
     let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
     if let Some(coarse) = made.errors.get(1) {
         let other = over(coarse, &bound) / r;
-        r = N::choose(zero.below(r), r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
+        // Where rates jump, one of two estimates may be next to nothing by chance: after a rejected step the finer one counts alone.
+        r = N::choose(zero.below(r) & N::of(1.0).below(pace.most), r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
     }
     // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
     let all = made.errors.first().map_or(total(&made.new), |error| total(&made.new) + total(error));
@@ -471,7 +472,10 @@ pub fn judge<N: Number>(
     for number in &made.positive {
         r = N::choose(number.below(zero), longer(r, N::of(OUTSIDE)), r);
     }
-    pace.decided(order > LOW, r, (&scales.longest, &least), outlook)
+    let changes = made.new.iter().zip(&made.old).map(|(new, old)| N::of(UNSEEN) * absolute(*new - *old));
+    let rounding = made.errors.first().into_iter().flatten().zip(changes).map(|(error, change)| error.at_most(change));
+    let unseen = rounding.reduce(|all, one| all & one).unwrap_or_else(|| zero.at_most(zero));
+    pace.decided(order > LOW, (r, unseen), (&scales.longest, &least), outlook)
 }
 
 /// The largest error of a group over what is tolerated. A group that is zero, as it has always been, tolerates no error and has none.
@@ -479,6 +483,11 @@ pub(crate) fn over<N: Number>(error: &[N], bound: &[N]) -> N {
     let zero = N::of(0.0);
     let shares = error.iter().zip(bound).map(|(error, bound)| N::choose(error.at_most(zero), zero, *error / *bound));
     shares.reduce(longer).unwrap_or(zero)
+}
+
+/// |x|
+fn absolute<N: Number>(x: N) -> N {
+    x.and_bits(u64::MAX >> 1)
 }
 
 /// The larger of two sizes.
@@ -536,8 +545,8 @@ impl<N: Number> Pace<N> {
     }
 
     /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate is of a
-    /// high order; `longest` and `new` are the largest sizes before, and those that the groups would have.
-    fn decided(&self, high: bool, r: N, (longest, new): (&[N], &[N]), outlook: Outlook<N>) -> (Pace<N>, Vec<N>, N::Truth) {
+    /// high order; `unseen`: it is only rounding; `longest` and `new` are the largest sizes before, and those that the groups would have.
+    fn decided(&self, high: bool, (r, unseen): (N, N::Truth), (longest, new): (&[N], &[N]), outlook: Outlook<N>) -> (Pace<N>, Vec<N>, N::Truth) {
         let number = N::of;
         let Outlook { step, is_extra, ends, runs } = outlook;
         let good = r.at_most(number(1.0)); // NaN is not
@@ -560,7 +569,6 @@ impl<N: Number> Pace<N> {
         let count = |truth: N::Truth| N::choose(truth, number(1.0), number(0.0));
         let t = N::choose(takes, reached, self.t);
         let grown = N::choose(takes & ends, self.h, step * factor);
-        let unseen = (r * self.relative).at_most(N::choose(number(0.0).below(self.lasts), number(UNSEEN), number(0.0)));
         let quiet = longer(step, number(QUIET) * (reached - self.begin));
         let grown = self.shortened(N::choose(takes & unseen & quiet.below(grown), quiet, grown), t);
         let next = Pace {
