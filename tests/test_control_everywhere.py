@@ -13,6 +13,7 @@ import stepwell as sw
 from cases import assert_same
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import adaptive
+from stepwell.reference.acceptance import Acceptance
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # a series is not pushed within a step
 CONTROLS: dict[str, Any] = {
@@ -143,7 +144,7 @@ def test_a_constraint_of_its_own_is_kept_by_the_same_projection() -> None:
     tried = 0
     while pace.t < 9.0:
         before = y
-        pace, v, y = adaptive.attempt(merson, system, 5, (1, 1), pace, 1000, v, y)
+        pace, v, y = adaptive.attempt(merson, system, 5, (1, 1), Acceptance(), pace, 1000, v, y)
         tried += 1
         assert np.hypot(*y) == pytest.approx(1.0, abs=1e-15)
         assert v @ y == pytest.approx(0.0, abs=1e-15)

@@ -384,15 +384,18 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
             "before": row(0.9, 0.6, 1.0),
             "most": row(5.0, 1.0, 5.0),
         }
-        | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0), "longest_v": row(0.1, 1.0, 0.0)}
+        | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0)}
+        | {"most_step": row(9.0, 0.2, 9.0), "wall": row(9.0, 9.0, T + 0.01)}
     )
+    groups = engine.groups_of(engine.Plan(system, ABLE[0], (MEMBERS,), H))
+    pace = pace._replace(longest=np.array([row(0.1, 1.0, 0.0), row(0.3, 0.0, 0.2)][-groups:]), own=np.empty((0, MEMBERS)))
     for method in drawn(ABLE, some and some // 4, name, fused):
         plan = engine.Plan(system, method, (MEMBERS,), H, fused=fused)
         if _core.in_parts(engine.model(plan._replace(fused=False)), MEMBERS, attempts=True):
             continue  # it is not one tape
         explained = sw.explain(system, method, attempt=True, fused=fused)
         known, tables = leaves(plan)
-        rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace]
+        rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace.numbers]
         known |= dict(zip(listing.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
         after = state(explained, plan, evaluate(explained, known, tables))
         if fused:
@@ -401,8 +404,8 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
             s = adaptive.Attempted(system.scaled(1.0, system.batch))
             axes = len(system.v_shape), len(system.y_shape)
             with np.errstate(all="ignore"):
-                following, v1, y1 = engine.attempts(method, s, axes)(pace, 9.0, v, y)
-        assert_computes(after, v1, y1, *following)
+                following, v1, y1 = engine.attempts(plan, s)(pace, 9.0, v, y)
+        assert_computes(after, v1, y1, *following.numbers)
         assert_counted(explained)
 
 

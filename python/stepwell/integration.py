@@ -93,8 +93,8 @@ def integrate(
             component that decays to nothing, or a stiff one, give a tuple (relative, absolute): it allows relative·size +
             absolute with the present size, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a
             number, an array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a
-            list is refused. A run that continues by ``carry`` has its tolerance already. For methods with an ``error_order``: merson,
-            fehlberg, fehlberg_5, dop853, taylor.
+            list is refused. A run that continues by ``carry`` has its tolerance already. For methods with an ``error_order``:
+            merson, fehlberg, fehlberg_5, dop853, taylor.
         at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
             time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
             from its start. Steps do not depend on these times, but for the first from rest; and where the extra step errs by

@@ -42,6 +42,8 @@ const PUSHED: f64 = 1.0 / 64.0;
 /// The next step is then no longer than QUIET times the time since the start, or than this one.
 const UNSEEN: f64 = 1.0 / (1u64 << 46) as f64;
 const QUIET: f64 = 1.0 / 32.0;
+/// The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size: a constant of smooth motions.
+const SMOOTH: f64 = 32.0;
 /// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 const OUTSIDE: f64 = 16.0;
 
@@ -463,8 +465,9 @@ pub fn judge<N: Number>(
     let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
     if let Some(coarse) = made.errors.get(1) {
         let other = over(coarse, &bound) / r;
-        // Where rates jump, one of two estimates may be next to nothing by chance: after a rejected step the finer one counts alone.
-        r = N::choose(zero.below(r) & N::of(1.0).below(pace.most), r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
+        // Where rates jump, the finer estimate may be next to nothing by chance: it is corrected only where both are as of smooth rates.
+        let smooth = (other * other * (other * (r * pace.relative))).below(N::of(SMOOTH * SMOOTH));
+        r = N::choose(zero.below(r) & smooth, r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
     }
     // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
     let all = made.errors.first().map_or(total(&made.new), |error| total(&made.new) + total(error));
