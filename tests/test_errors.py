@@ -29,6 +29,10 @@ def linear(B: Any = None, C: Any = None, D: Any = None, **options: Any) -> sw.Li
     return sw.LinearSystem([[0.0, -1.0], [1.0, 0.0]], B, C, D, **options)
 
 
+#: More members than memory has room for, in an array that takes none.
+MANY = np.broadcast_to(1.0, (10**11,))
+
+
 def readonly() -> Any:
     array = np.zeros(3)
     array.flags.writeable = False
@@ -313,6 +317,26 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: run(sw.Oscillator(np.ones((10**6, 1)), np.ones(10**6))),
         E.TooLargeError,
         "the saved states of 1000000000000 members need 1.04e+05 GiB, but ",
+    ),
+    (
+        lambda: run(y=MANY),
+        E.TooLargeError,
+        "y: expected an array that fits in memory, got shape (100000000000,): 745 GiB as floats",
+    ),
+    (lambda: run(y=range(10**11)), E.TooLargeError, "y: expected an array that fits in memory, got shape (100000000000,)"),
+    (lambda: run(v=[MANY, MANY]), E.TooLargeError, "v: expected an array that fits in memory, got shape (2, 100000000000)"),
+    (lambda: run(force=MANY), E.TooLargeError, "force: expected an array that fits in memory"),
+    (lambda: run(record=range(10**11)), E.TooLargeError, "record: expected a list of at most 1000000 quantities, got more in"),
+    (lambda: sw.Oscillator(MANY), E.TooLargeError, "omega: expected an array that fits in memory"),
+    (lambda: sw.quaternion.product(np.ones((4, 1)), np.broadcast_to(0.5, (4, 10**11))), E.TooLargeError, "q: expected an array"),
+    (lambda: run(sw.Chain(10**6), form="matrix"), E.TooLargeError, "form: the matrices of 2000000 states of 1 members need"),
+    (lambda: sw.LinearSystem(np.broadcast_to(0.0, (10**6, 10**6))), E.TooLargeError, "A: expected an array that fits in memory"),
+    (
+        lambda: sw.sweep(
+            sw.Oscillator, {"omega": 1.0 + np.arange(1e6), "y": ("y0", np.arange(1e6))}, "rk4", v=0.0, dt=0.1, steps=9
+        ),
+        E.TooLargeError,
+        "axes: status and results of 1000000000000 members need 1.58e+04 GiB",
     ),
     (
         lambda: run(y=np.ones(1000), steps=10**12, every=1),

@@ -349,7 +349,7 @@ def _only_fixed(given: dict[str, Any]) -> None:
 
 def _kept(array: Array) -> Array:
     """A copy that is as small as what it was spread from."""
-    own = array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)].copy()
+    own = _checks.once_of(array).copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
 
 

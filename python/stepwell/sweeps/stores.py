@@ -26,12 +26,16 @@ SWEEP, CHUNK_SHAPE, BITS = "sweep", "chunk_shape", "bits"
 #: And, for xarray, which arrays are coordinates, and the order of the others.
 COORDINATES, RESULTS = "coordinates", "results"
 
+#: How each member ended takes a byte, when it did eight more; and there is at least one result.
+LEAST_NUMBERS = 17 / 8
+
 
 class Memory:
     """Arrays of this process."""
 
     def __init__(self, layout: Layout, chunk_shape: Shape) -> None:
         self.layout, self.chunk_shape = layout, chunk_shape
+        _checks.fits("axes: status and results", LEAST_NUMBERS, layout.grid.shape, "give store=, a folder on disk")
         self.arrays: dict[str, Array] = {}
         self.about: dict[str, Planned] = {}
 
@@ -167,6 +171,8 @@ class NetCDF(Zarr):
                     f"something else ({type(error).__name__}: {error})"
                 ) from None
             same_sweep(path, told, json.loads(layout.attrs[SWEEP]))
+        else:
+            _room(path, layout.grid.members * int(8 * LEAST_NUMBERS))
         unfinished = path.with_name(f"{path.name}.unfinished")
         if self.whole and unfinished.exists():  # its removal was interrupted
             shutil.rmtree(unfinished)
