@@ -218,6 +218,15 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     return n
 
 
+#: In which direction a quantity passes a level: as numbers, which SciPy takes too, and as words.
+DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
+
+
+def direction(argument: str, value: Any) -> int:
+    """Return a direction as 1, −1 or 0; it may be given as a word."""
+    return DIRECTIONS[known(argument, value, DIRECTIONS)] if isinstance(value, str) else count(argument, value, -1, 1)
+
+
 def several(argument: str, value: Any, what: str) -> list[Any]:
     """Return a list of what is given several of; a text is not the list of its letters."""
     if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
