@@ -39,6 +39,10 @@ def readonly() -> Any:
     return array
 
 
+def _height(t: Any, v: Any, y: Any) -> Any:
+    return y
+
+
 E = errors
 BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     # names
@@ -46,6 +50,39 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: run(method="fals_euler"),
         E.UnknownNameError,
         "method: there is no 'fals_euler'; did you mean 'false_euler'? Known: ",
+    ),
+    (lambda: run(lambda t, y: -y), E.DTypeError, "wrap it with sw.system(order=1)(<lambda>), or @sw.system(order=1)"),
+    (lambda: run(lambda t, v, y: -y), E.DTypeError, "wrap it with sw.system(<lambda>), or @sw.system"),
+    (
+        lambda: sw.system(lambda t, y: -y),
+        E.ArgumentError,
+        "expected a function (t, v, y, *, …), got (t, y); for ẏ = <lambda>(t, y) write @sw.system(order=1)",
+    ),
+    (
+        lambda: run(events=lambda t, y: y),
+        E.ArgumentError,
+        "expected a function (t, v, y, *, …), got (t, y); Oscillator has velocities v",
+    ),
+    (lambda: setattr(FREE, "omega", 2.0), E.FixedError, "What changes every frame is World(…, force=…), or a state of rate zero"),
+    (
+        lambda: run(method="merson", dt=None, steps=None, tolerance=1e-6),
+        E.ArgumentError,
+        "at: expected too with tolerance=: the times at which states are saved, such as at=[t1, t2]",
+    ),
+    (
+        lambda: run(method="merson", dt=None, steps=None, at=[1.0]),
+        E.ArgumentError,
+        "tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6",
+    ),
+    (
+        lambda: run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True)).resume,
+        E.UnsupportedError,
+        "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])",
+    ),
+    (
+        lambda: run(steps=50, events=sw.Event(_height, terminal=True)).resume,
+        E.UnsupportedError,
+        "begin a new run from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)",
     ),
     (lambda: run(method=3), E.UnknownNameError, "method: there is no 3. Known: standard_euler, "),
     (lambda: sw.method("hune"), E.UnknownNameError, "did you mean 'standard_heun'?"),
@@ -457,7 +494,7 @@ def test_aliased_arrays() -> None:
 
 def test_a_cpu_level_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STEPWELL_ISA", "avx1024")
-    with pytest.raises(errors.ArgumentError, match='STEPWELL_ISA="avx1024" is not a CPU level of this machine; it has baseline'):
+    with pytest.raises(errors.ArgumentError, match='STEPWELL_ISA="avx1024" is not a CPU level of this machine; it has interpret'):
         run()
 
 
