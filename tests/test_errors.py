@@ -376,6 +376,21 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         "axes: status and results of 1000000000000 members need 1.58e+04 GiB",
     ),
     (
+        lambda: sw.sweeps.random("s", 10**11, seed=1, omega=(0.0, 1.0)),
+        E.TooLargeError,
+        "count: the samples of 100000000000 members",
+    ),
+    (
+        lambda: sw.sweeps.sobol("s", 2**37, seed=1, omega=(0.0, 1.0)),
+        E.TooLargeError,
+        "count: the samples of 137438953472 members",
+    ),
+    (
+        lambda: sw.export(sw.Chain(10**7), "rk4", "c"),
+        E.UnsupportedError,
+        "at most 20000 are written out; export a smaller system",
+    ),
+    (
         lambda: run(y=np.ones(1000), steps=10**12, every=1),
         E.TooLargeError,
         " are available (memory of this machine); keep less with every= or split the batch",
