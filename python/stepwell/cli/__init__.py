@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (StepwellError, OSError) as error:
         print(_wrapped(f"stepwell: {error}"), file=sys.stderr)
         return FAILED
-    except MemoryError as error:  # of what nobody has counted
+    except MemoryError as error:  # of an allocation that no check has counted
         print(_wrapped(f"stepwell: there is not enough memory for this: {error}".rstrip(": ")), file=sys.stderr)
         return FAILED
     except KeyboardInterrupt:

@@ -68,7 +68,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         if render_mode is not None:
             raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {_checks.short(render_mode)}")
         self.num_envs = _checks.count("num_envs", num_envs, 1)
-        # Bounds of the observations, states, forces, draws, rewards, and what comes of them in a step.
+        # Bounds of the observations, states, forces, draws, rewards, and the results of a step.
         seen = int(np.prod(self.one_observation.shape or (1,)))
         _checks.fits("num_envs: states and observations", 8 * seen + 16, (self.num_envs,), "take fewer")
         self.substeps = _checks.count("substeps", substeps, 1)
