@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks, _core
+from .. import _core
 from .._checks import Array
 from ..reference import run as reference
 from ..reference.types import Blocks, Whole
@@ -79,7 +79,6 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """The run by the transition matrix, step by step."""
-    _fits(plan)
     given = plan.system.given_inputs()
     p, q = transition(plan), pulses(plan, given)
     q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
@@ -114,15 +113,6 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
         flat_v, kept = out.slot, (out.v, out.y)
     v, y = (a.reshape(len(a), *block) for a, block in zip(kept, blocks, strict=True))
     return finished(plan, flat_v.reshape(blocks[0]), (v, y), first_bad)
-
-
-#: Such a run holds so many matrices of a member's size: the unit vectors, what one step makes of them, P, and P as it is stepped.
-_MATRICES = 9
-
-
-def _fits(plan: Plan) -> None:
-    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    _checks.fits(f"form: the matrices of {n} states", _MATRICES * n * n, plan.batch, 'use form="direct"')
 
 
 #: As the core's ``HUGE``.
@@ -168,8 +158,6 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     """By powers of the transition matrix; the backend finds P and Q, the rest is the reference's."""
     from ..reference import power  # only this form needs it
     from ..reference.signal import Constant, Sine
-
-    _fits(plan)
 
     def wide(array: Array) -> Array:
         return np.broadcast_to(array, plan.batch).reshape(-1)
