@@ -51,19 +51,6 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         E.UnknownNameError,
         "method: there is no 'fals_euler'; did you mean 'false_euler'? Known: ",
     ),
-    (lambda: run(lambda t, y: -y), E.DTypeError, "wrap it with sw.system(order=1)(<lambda>), or @sw.system(order=1)"),
-    (lambda: run(lambda t, v, y: -y), E.DTypeError, "wrap it with sw.system(<lambda>), or @sw.system"),
-    (
-        lambda: sw.system(lambda t, y: -y),
-        E.ArgumentError,
-        "expected a function (t, v, y, *, …), got (t, y); for ẏ = <lambda>(t, y) write @sw.system(order=1)",
-    ),
-    (
-        lambda: run(events=lambda t, y: y),
-        E.ArgumentError,
-        "expected a function (t, v, y, *, …), got (t, y); Oscillator has velocities v",
-    ),
-    (lambda: setattr(FREE, "omega", 2.0), E.FixedError, "What changes every frame is World(…, force=…), or a state of rate zero"),
     (
         lambda: run(method="merson", dt=None, steps=None, tolerance=1e-6),
         E.ArgumentError,

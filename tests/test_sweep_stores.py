@@ -185,7 +185,7 @@ def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
 
     sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
     sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
-    with pytest.raises(ArgumentError, match=r"is not continued \(first steps: the equations are others, for they have"):
+    with pytest.raises(ArgumentError, match=r"is not continued \(the equations are others: their first steps have other bits"):
         sw.sweep(spring(1.0 + 2**-50), {"k": [1.0, 2.0]}, "rk4", **given, store=path)
 
 

@@ -465,8 +465,7 @@ def in_place(
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != dtype or not array.dtype.isnative:
-        or_so = f', or give dtype="{array.dtype}"' if array.dtype.name in ("float64", "float32") and array.dtype.isnative else ""
-        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}{or_so}")
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

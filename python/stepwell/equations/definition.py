@@ -130,8 +130,7 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     given = list(inspect.signature(function).parameters.values())
     positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
-        first = f"; for ẏ = {name}(t, y) write @sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first}")
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
     parameters = {}
     for each in given:
         if each in positional[:state]:

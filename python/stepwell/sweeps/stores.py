@@ -275,7 +275,7 @@ def same_sweep(path: Path, there: dict[str, Any], asked: dict[str, Any]) -> None
     names = [name for name in {**there, **asked} if there.get(name) != asked.get(name)]
     if names:
         told = "; ".join(
-            "first steps: the equations are others, for they have other bits after some steps"
+            "the equations are others: their first steps have other bits"
             if name == "first steps"
             else f"{name}: {_checks.short(there.get(name), 60)} there, {_checks.short(asked.get(name), 60)} asked for"
             for name in names

@@ -93,8 +93,7 @@ class System(Fixed, Value, ABC):
     def _instead(self) -> str:
         return (
             f"make another {self.kind_name}, with what is to change. A World that goes on from here with it: "
-            f"World(system, method, dt=world.dt, **world.resume). What changes every frame is World(…, force=…), or a state of "
-            f"rate zero"
+            f"World(system, method, dt=world.dt, **world.resume)"
         )
 
     @property
@@ -331,11 +330,8 @@ def a_system(value: Any) -> System:
         if type(value).__name__ == "Definition":
             return a_system(value())
         if isinstance(value, FunctionType):
-            name, state = value.__name__, value.__code__.co_varnames[: value.__code__.co_argcount]
-            wrap = f"sw.system(order=1)({name})" if len(state) == 2 or state[1:2] == ("y",) else f"sw.system({name})"
-            raise DTypeError(
-                f"system: expected a system, got the function {name}; wrap it with {wrap}, or @{wrap[: -len(name) - 2]}"
-            )
+            name = value.__name__
+            raise DTypeError(f"system: expected a system, got the function {name}; wrap it with sw.system({name}), or @sw.system")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 
