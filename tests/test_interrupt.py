@@ -137,3 +137,54 @@ def test_ctrl_c_within_a_step(what: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.1
+
+
+#: Sweeps, whose chunks are computed by threads that no signal reaches; each chunk would take minutes.
+SWEEPS = {
+    "with a tolerance": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'dop853', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
+    "with a tolerance, bodies": "bodies, {'G': np.linspace(1, 2, 40)}, 'dop853', v=0.0, y=y, tolerance=1e-12, at=[1e6]",
+    "of a Taylor series": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'taylor', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
+    "of a function": "sw.Pendulum, {'omega': np.linspace(1, 2, 999)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, outcomes=f",
+    "in threads of the caller's": "sw.Pendulum, {'omega': np.linspace(1, 2, 99)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, "
+    "engine=pool",
+    "of histories": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**6, every=100",
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("what", SWEEPS)
+def test_ctrl_c_in_a_sweep(what: str) -> None:
+    """Its threads end within half a second, and afterwards nothing stops a run of the thread that was asked."""
+    code = f"""
+        import functools, os, signal, threading, time
+        from concurrent.futures import ThreadPoolExecutor
+        import numpy as np, stepwell as sw
+        y = np.random.default_rng(1).random((40, 2))
+        bodies = functools.partial(sw.NBody, np.ones(40), softening=0.1)
+        def f(run):
+            return run.y[-1]
+        pool = ThreadPoolExecutor(2)
+        # A warm-up, so that nothing is imported for the first time while the clock runs.
+        sw.sweep(sw.Oscillator, {{"omega": [1.0]}}, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        sent, waits = [], []
+        def interrupt():
+            time.sleep(0.5)
+            sent.append(time.perf_counter())
+            os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(3):
+            threading.Thread(target=interrupt).start()
+            try:
+                sw.sweep({SWEEPS[what]})
+            except KeyboardInterrupt:
+                waits.append(time.perf_counter() - sent[-1])
+            else:
+                raise SystemExit("not interrupted")
+        assert not [each for each in threading.enumerate() if each.name.startswith("sweep")]
+        sw.sweep(sw.Oscillator, {{"omega": [1.0]}}, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        print(min(waits))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=100, env=dict(os.environ)
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.5

@@ -201,3 +201,11 @@ def test_what_is_kept_is_counted_as_it_is() -> None:
             run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=every)
             assert len(run.t) == plan.kept
             np.testing.assert_array_equal(run.t, 0.1 * plan.saves)
+
+
+def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five of 1000² numbers, 38 MiB, where there are 30; as many as a run was seen to hold of a matrix of 1500² numbers."""
+    A = np.eye(1000, k=500) - np.eye(1000, k=-500)
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
+    with pytest.raises(sw.errors.TooLargeError, match=r"A: the matrix and its copies of 1 members need 38\.1 MiB, but 30 MiB"):
+        sw.LinearSystem(A)

@@ -324,8 +324,11 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a force": ({"force": 1.0}, "force: goes with fixed steps only"),
     "forces": ({"axes": {"force": [1.0, 2.0]}}, "axes: force: goes with fixed steps only"),
     "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
-    "no times": ({"at": None}, "at: expected too, since the other was given"),
-    "times alone": ({"tolerance": None}, "tolerance: expected too, since the other was given"),
+    "no times": ({"at": None}, "at: expected too with tolerance=: the times at which states are saved, such as at="),
+    "times alone": (
+        {"tolerance": None},
+        "tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6",
+    ),
     "an axis without times": ({"tolerance": None, "at": None, "axes": {"tolerance": [1e-6, 1e-9]}}, "at: expected too"),
     "a list": ({"tolerance": [1e-6, 1e-9]}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
     "three": ({"tolerance": (1e-6, 1e-9, 1.0)}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),

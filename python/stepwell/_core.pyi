@@ -4,6 +4,7 @@ Arrays are C-contiguous. Rows are arrays of two axes: what is counted, and the m
 Plans, pacings and their arrays are read by the names of their attributes, which stand in ``engine/``.
 """
 
+from collections.abc import Callable
 from typing import Any, NoReturn, final
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = [
     "World",
     "__version__",
     "adapt",
+    "ask",
     "catalogue",
     "check",
     "compiled",
@@ -26,6 +28,7 @@ __all__ = [
     "in_parts",
     "isa",
     "isa_levels",
+    "listen",
     "program",
     "run",
     "series_evaluations",
@@ -210,6 +213,12 @@ def sound(value: object, finite: bool, positive: bool) -> bool:
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
+def ask(function: Callable[[], object] | None) -> None:
+    """Let this thread ask a function at intervals while it steps, or none; what the function raises ends the run."""
+
+def listen() -> None:
+    """Raise if this thread is to stop: what the function says that it asks, and ``KeyboardInterrupt`` after Ctrl-C."""
+
 def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
     """Whether some member has diverged, now or before.
 

@@ -17,6 +17,7 @@ from .errors import AccuracyWarning, ControlWarning
 from .method_records import method
 from .result import Run
 from .systems import NBody
+from .systems.base import aligned
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5
@@ -61,6 +62,8 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None
         energy = None if ends is None else _of_energy(run.method.name, ends)
+        if energy is None and system.keeps_energy and start is not None:
+            energy = _of_massless(run, system, start)
         met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[1])
         if text := "; ".join(text for text in (None if energy is None else energy[0], met) if text is not None):
             warnings.warn(text, AccuracyWarning, stacklevel=3)
@@ -165,10 +168,8 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
 
 def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
     """What is to be said, and of which member."""
-    first, last, moved = ends
-    with np.errstate(all="ignore"):
-        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
-    wrong &= np.isfinite(last)  # members that diverged were named before
+    first, last, _ = ends
+    wrong = _changed(ends)
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
@@ -179,6 +180,54 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
         f"so {method} did not follow its orbit"
     )
     return text, index
+
+
+def _changed(ends: Ends) -> Any:
+    """Where an energy at the end is of another size than at the start."""
+    first, last, moved = ends
+    with np.errstate(all="ignore"):
+        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+    return wrong & np.isfinite(last)  # members that diverged were named before
+
+
+def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, tuple[int, ...]] | None:
+    """What is to be said of bodies without mass around a single one with mass, and of which member.
+
+    The energy of all bodies is blind to them. Relative to a single attractor each keeps its energy per unit of mass; several
+    attractors may take from it or add to it as much as they like.
+    """
+    if bodies.masses.all():
+        return None  # the usual case, which takes a microsecond
+    alone = np.count_nonzero(bodies.masses, axis=0) == 1
+    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    if not alone.any() or made < FEW_EVALUATIONS or run.y[-1].size > MOST_NUMBERS:
+        return None
+    (v, y), batch = (run.v[-1], run.y[-1]), run.status.shape
+    masses = np.broadcast_to(aligned(bodies.masses, 1, batch), (len(y), *batch))
+    attractor = masses.argmax(axis=0)[np.newaxis, np.newaxis]
+    strength = bodies.G * masses.max(axis=0)
+
+    def energies(v: Array, y: Array) -> tuple[Array, Array]:
+        d, w = (each - np.take_along_axis(each, attractor, axis=0) for each in (y, v))
+        r2 = (d * d).sum(axis=1) + bodies.softening * bodies.softening
+        kinetic = 0.5 * (w * w).sum(axis=1)
+        return kinetic + strength * (-1.0 / np.sqrt(r2) if bodies.force == "newton" else 0.5 * np.log(r2)), kinetic
+
+    with np.errstate(all="ignore"):
+        (first, began), (last, ended) = energies(np.broadcast_to(start[0], y.shape), start[1]), energies(v, y)
+    wrong = _changed(Ends(first, last, np.maximum(began, ended))) & (masses == 0.0) & alone
+    if not wrong.any():
+        return None
+    body, *index = np.argwhere(wrong)[0].tolist()
+    some = int(np.count_nonzero(wrong))
+    who, energies_at = f"body {body}{of_member(tuple(index))}", f"{last[body, *index]:.3g} instead of {first[body, *index]:.3g}"
+    energy, followed = "another energy per mass at the end", f"so {run.method.name} did not follow"
+    text = (
+        f"{who}, which has no mass, has {energy}: {energies_at}, {followed} its orbit"
+        if some == 1
+        else f"{some} bodies without mass have {energy}: {who} has {energies_at}, {followed} their orbits"
+    )
+    return text, tuple(index)
 
 
 def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:

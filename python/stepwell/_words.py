@@ -25,6 +25,9 @@ BodyForce = Literal["logarithmic", "newton", "printed"]
 #: What a surface does to a point behind it.
 ContactWay = Literal["safe", "restitution", "flip", "spring"]
 
+#: In which direction a quantity passes a level.
+Direction = Literal["rising", "falling", "both"]
+
 #: How a control divides by what it keeps.
 ControlForm = Literal["limited", "printed"]
 

@@ -228,10 +228,6 @@ def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptio
                 f"positive: {how.name} chooses each step before it is made and rejects none; use one that does, as dop853"
             )
     not_of_a_step(system.keeper if control is None else control)
-    if options.at is None:
-        raise ArgumentError("at: needed with tolerance=: the times at which states are saved, at=[t1, …]")
-    if options.tolerance is None and went is None:
-        raise ArgumentError("tolerance: needed with at=, the error that a step may have, as tolerance=1e-6")
     if options.tolerance is not None and went is not None:
         raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
     return control

@@ -14,7 +14,7 @@ from . import _checks, _core, _encounters, _memory, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
-from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
+from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, goes_with_times, quantities, spread
 from .adaptive_runs import AdaptiveOptions, adaptive_run
 from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
@@ -182,6 +182,7 @@ def integrate(
         if not isinstance(start_step, int) or start_step != 0:
             fixed["start_step"] = start_step
         _only_fixed(fixed)
+        goes_with_times(tolerance is not None or carry is not None, at)
         went = None if carry is None else (carry, carried_by)
         asked = None if events is None else _asked(events, "direct")
         options = AdaptiveOptions(tolerance, at, max_steps, max_step, jumps, positive)
@@ -368,7 +369,7 @@ def _only_fixed(given: dict[str, Any]) -> None:
 
 def _kept(array: Array) -> Array:
     """A copy that is as small as what it was spread from."""
-    own = array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)].copy()
+    own = _checks.once_of(array).copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
 
 

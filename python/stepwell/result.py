@@ -276,8 +276,12 @@ class Run(Value):
         if (stopped := int(np.count_nonzero(self.status == Status.EVENT))) > 0:
             raise UnsupportedError(
                 f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
-                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run"
-                f"{' for each' if stopped > 1 else ''}: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "
+                + (
+                    "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])"
+                    if self.status.shape
+                    else "from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)"
+                )
             )
         told: dict[str, Any] = {"fused": True} if self.fused else {}
         if self.dtype != "float64":

@@ -129,12 +129,11 @@ def export(
         system = system.stepped_by(how)
         if single:
             _single.check_control(system)
-    example = _example(system, blocks, batch, index)
     plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused, single=single)
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
-    text = writer.file(written, writer.remark(head(written, *example)))
+    text = writer.file(written, writer.remark(head(written, *_example(system, blocks, batch, index))))
     of = "float32" if single else "float64"
     return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
 

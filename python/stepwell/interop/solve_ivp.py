@@ -234,15 +234,11 @@ def _span(t_span: Any) -> tuple[float, float]:
 
 
 def _start(y0: Any) -> Array:
-    try:
-        state = _checks.numbers("y0", y0)
-    except DTypeError:
-        readable = isinstance(y0, np.ndarray) or not hasattr(y0, "__dlpack__")
-        if readable and np.asarray(y0).dtype.kind == "c":
-            raise DTypeError(
-                "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
-            ) from None
-        raise
+    if _checks.as_array("y0", y0).dtype.kind == "c":
+        raise DTypeError(
+            "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
+        )
+    state = _checks.numbers("y0", y0)
     if state.ndim != 1 or not state.size:
         raise ShapeError(f"y0: expected a state of shape (n,), got shape {state.shape}")
     return np.array(state)

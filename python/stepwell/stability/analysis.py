@@ -304,6 +304,8 @@ def analyse(
     if isinstance(at, Run):
         return _along(system, how, step, at)
     v, y = state("at", system, at, "or a run")
+    batches = {"dt and system": members, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    _checks.fits("at: the matrices", 8 * n * n, _checks.batch_shape(batches), "ask for fewer")
     P = maps.jacobian(system, how, step, t, v, y)
     none = np.zeros((n, 0, *P.shape[2:]))
     Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])

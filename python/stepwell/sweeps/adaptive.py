@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
+from .._runs import goes_with_times
 from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
 from ..engine import PACE_NUMBERS
 from ..errors import ArgumentError, ShapeError, UnsupportedError
@@ -95,10 +96,7 @@ def arguments(
         if axis.own:
             raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
         order_of_series(method, axis.values)
-    if at is None or (tolerance is None and "tolerance" not in varied):
-        if at is None:
-            raise ArgumentError("at: needed with tolerance=: the times at which states are saved, at=[t1, …]")
-        raise ArgumentError("tolerance: needed with at=, as an argument or in axes: the error that a step may have")
+    goes_with_times(tolerance is not None or "tolerance" in varied, at)
     times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
     _fits_outcomes(outcomes, times)
     given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}

@@ -54,7 +54,7 @@ class Engine:
 
     def compute(self, task: Task, grid: Grid, chunks: Iterable[Chunk]) -> Iterator[tuple[Chunk, Done]]:
         """What is found of each chunk, as they end. If it is closed early, chunks that have begun are stopped or awaited."""
-        if not self.here:
+        if not isinstance(self._executor, ThreadPoolExecutor | None):
             package = packed(task)
             yield from self._all(chunks, lambda chunk: self._executor.submit(sweep_chunk, package, grid.values(chunk), chunk))
             return
@@ -63,12 +63,13 @@ class Engine:
         def of(chunk: Chunk) -> tuple[Chunk, Done]:
             return chunk, run(task, grid.values(chunk), chunk.members, stop.is_set)
 
-        pool = ThreadPoolExecutor(self.workers, thread_name_prefix="sweep")
+        pool: Any = ThreadPoolExecutor(self.workers, thread_name_prefix="sweep") if self.here else self._executor
         try:
             yield from self._all(chunks, lambda chunk: pool.submit(of, chunk))
         finally:
             stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
+            if self.here:
+                pool.shutdown(wait=True, cancel_futures=True)
 
     def _all(self, chunks: Iterable[Chunk], submit: Submit) -> Iterator[tuple[Chunk, Done]]:
         waiting = iter(chunks)

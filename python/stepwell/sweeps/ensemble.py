@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
@@ -290,12 +290,15 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
 def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
     """Compute every chunk that is not finished, and keep what is found."""
     done, tally = 0, _Tally(grid, task)
-    waiting = []
-    for chunk in grid.chunks(kept.chunk_shape):
-        if kept.finished(chunk):
-            done += chunk.members
-        else:
-            waiting.append(chunk)
+
+    def unfinished() -> Iterator[Chunk]:  # one after the other, for there may be more than memory has room for
+        nonlocal done
+        for chunk in grid.chunks(kept.chunk_shape):
+            if kept.finished(chunk):
+                done += chunk.members
+            else:
+                yield chunk
+
     if progress:
         from .._progress import bar
 
@@ -303,7 +306,7 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
     else:
         shown = nullcontext(None)
     with shown as told:
-        found = engine.compute(task, grid, waiting)
+        found = engine.compute(task, grid, unfinished())
         try:
             for chunk, each in found:
                 kept.write(chunk, each.found)

@@ -352,7 +352,7 @@ class Function(Outcome):
             if isinstance(given, tuple):
                 dims, given = given
                 dims = (dims,) if isinstance(dims, str) else tuple(dims)
-            values = np.asarray(given)
+            values = _checks.as_array(f"outcomes: {name}", given)
             if values.dtype.kind not in "biuf":
                 raise ArgumentError(f"outcomes: {name}: expected numbers, got an array of dtype {values.dtype}")
             if values.ndim == 0 or values.shape[-1] != run.status.size:

@@ -6,11 +6,13 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from math import gcd, prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import _core
 from .._checks import Array
 from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integration import integrate
@@ -141,7 +143,7 @@ def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
-    with _quiet(), np.errstate(all="ignore"):  # members that diverge are told of by their status
+    with _quiet(), _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
         system, given = made(task, values)
         start = given
         for each in _pieces(task, system, given, members, task.transient, None, stopped):
@@ -256,6 +258,16 @@ def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
     """Arguments with which a run goes on; what it does not carry, such as threads, is given again."""
     kept = {name: value for name, value in given.items() if name in ("threads", "backend", "max_steps")}
     return {**kept, **run.resume}
+
+
+@contextmanager
+def _listening(stopped: Callable[[], bool] | None) -> Iterator[None]:
+    """Everything that this thread steps ends when the sweep is stopped; Ctrl-C reaches the main thread alone."""
+    _core.ask(partial(_stop, stopped))
+    try:
+        yield
+    finally:
+        _core.ask(None)
 
 
 def _stop(stopped: Callable[[], bool] | None) -> None:

@@ -15,6 +15,9 @@ from ..reference.systems.linear import Linear as Reference
 from .base import System, aligned
 from .inputs import Input, Sampled, as_input
 
+#: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
+COPIES_OF_A = 5
+
 
 class LinearSystem(System):
     """ṡ = A·s + B·x(t), with auxiliary outputs z = C·s + D·x(t): the state space equations of the document's §3.
@@ -56,6 +59,7 @@ class LinearSystem(System):
     def __init__(self, A: Any, B: Any = None, C: Any = None, D: Any = None, *, x: Any = None, velocities: Any = None) -> None:
         self.A = _square(A)
         n = len(self.A)
+        _checks.fits("A: the matrix and its copies", COPIES_OF_A * n * n, (), "take fewer states")
         single = self.A.ndim == 2  # else a single axis might be meant for the batch
         self.B = None if B is None else _matrix("B", B, ("n", n), ("m", None), (n, 1) if single else None)
         m = 0 if self.B is None else self.B.shape[1]
@@ -243,7 +247,8 @@ def _velocities(velocities: Any, n: int) -> tuple[int, ...]:
         return tuple(range(n // 2))
     if not isinstance(velocities, Iterable) or isinstance(velocities, str) or getattr(velocities, "ndim", 1) == 0:
         return tuple(range(_checks.count("velocities", velocities, 0, n)))
-    chosen = tuple(_checks.count(f"velocities[{i}]", each, 0, n - 1) for i, each in enumerate(velocities))
+    several = _checks.several("velocities", velocities, "states")
+    chosen = tuple(_checks.count(f"velocities[{i}]", each, 0, n - 1) for i, each in enumerate(several))
     for each in chosen:
         if chosen.count(each) > 1:
             raise ArgumentError(f"velocities: expected distinct states, got {each} twice")

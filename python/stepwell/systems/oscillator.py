@@ -22,6 +22,9 @@ FORMS: tuple[OscillatorForm, ...] = ("canonical", "physical")
 class Oscillator(System):
     """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3), and less friction·sgn ẏ where that is given (§8).
 
+    **v is ẏ/ω₀ unless ``form="physical"``**: that is the document's canonical form, whose phase diagram is a circle. There a
+    start with the velocity u is ``v=u / omega``.
+
     Args:
         omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block
             on a plane, without a spring.

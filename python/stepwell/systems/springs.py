@@ -207,10 +207,7 @@ class Springs(System):
 
 def _whole(argument: str, value: Any, what: str) -> Any:
     """An array of whole numbers of zero or more."""
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, RecursionError) as error:
-        raise ShapeError(f"{argument}: expected {what}, got {_checks.short(value)} ({error})") from None
+    array = _checks.as_array(argument, value)
     if array.size and array.dtype.kind not in "iu":
         raise DTypeError(f"{argument}: expected {what}, got {_checks.short(value)}")
     if array.size and (array.min() < 0 or array.max() >= MOST_PARTICLES):

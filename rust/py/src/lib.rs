@@ -4,6 +4,8 @@ mod model;
 mod tape;
 mod world;
 
+use std::cell::RefCell;
+
 use numpy::{
     Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
     PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
@@ -235,6 +237,24 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
+thread_local! {
+    /// What this thread asks at intervals while it steps: signals reach the main thread alone.
+    static ASKED: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
+}
+
+/// Lets this thread ask a function at intervals while it steps, or none; what the function raises ends the run.
+#[pyfunction]
+fn ask(function: Option<Py<PyAny>>) {
+    ASKED.with(|asked| *asked.borrow_mut() = function);
+}
+
+/// Raises if this thread is to stop: what the function says that it asks, and `KeyboardInterrupt` after Ctrl-C.
+#[pyfunction]
+pub fn listen(py: Python<'_>) -> PyResult<()> {
+    let asked = ASKED.with(|asked| asked.borrow().as_ref().map(|function| function.clone_ref(py)));
+    asked.map_or(Ok(()), |function| function.call0(py).map(drop)).and_then(|()| py.check_signals())
+}
+
 /// Runs without the GIL, reports progress and answers Ctrl-C.
 fn interruptible<T: Send>(
     py: Python<'_>,
@@ -245,7 +265,7 @@ fn interruptible<T: Send>(
     let mut monitor = |share: f64| {
         Python::attach(|py| {
             let told = progress.as_ref().map_or(Ok(()), |p| p.call1(py, (share,)).map(drop));
-            match told.and_then(|()| py.check_signals()) {
+            match told.and_then(|()| listen(py)) {
                 Ok(()) => true,
                 Err(error) => {
                     raised = Some(error);
@@ -439,6 +459,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
+    m.add_function(wrap_pyfunction!(ask, m)?)?;
+    m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_function(wrap_pyfunction!(times, m)?)?;

@@ -18,7 +18,7 @@ use stepwell_core::{
 };
 
 use crate::{
-    interruptible,
+    interruptible, listen,
     model::{ModelSpec, argument_error, core_error, error_of, in_use},
 };
 
@@ -155,7 +155,7 @@ impl<T: Of> Loop<T> {
                 py.detach(|| world.step(steps_between_checks, v, y));
                 n -= steps_between_checks;
                 at.store(world.step_number(), Relaxed);
-                py.check_signals()?;
+                listen(py)?;
             }
             world.step(n, v, y);
             at.store(world.step_number(), Relaxed);

@@ -112,8 +112,8 @@ impl Rates for ControlledRates {
         }
         let (along_v, along_y) = (&mut self.along.0[..], &mut self.along.1[..]);
         let Some(square) = self.rates.gradient(v, &self.dv, (along_v, along_y)) else { return };
-        let step = projection::nacozy(off, self.h, square);
-        self.work[0] -= off;
+        let (step, taken) = projection::nacozy(off, self.h, square);
+        self.work[0] -= taken;
         for (block, along) in [(v, &self.along.0), (y, &self.along.1)] {
             block.iter_mut().zip(along).for_each(|(number, along)| *number -= step * along);
         }
