@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.dynamics import Lyapunov
+from stepwell.dynamics import Lyapunov, exponents
+from stepwell.errors import UnsupportedError
 from stepwell.systems import System
 
 EPS = np.finfo(float).eps
@@ -47,6 +48,51 @@ def test_the_states_are_those_of_integrate(method: str) -> None:
     np.testing.assert_array_equal(found.y, run.y[-1])
     np.testing.assert_array_equal(found.v, run.v[-1] if run.carry is None else run.carry)
     assert found.exponents.shape == (1, 3, 2)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4", "taylor"])
+def test_vectors_on_one_tape_and_each_beside_a_copy_of_the_state_are_the_same(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the bit: short steps go one way, long ones the other."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])[:, :, np.newaxis] * np.linspace(1.0, 1.1, 5)
+    given: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.05, "steps": 43, "transient": 12, "exponents": 4}
+    bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.3)
+    together = sw.lyapunov(bodies, method, **given)
+    monkeypatch.setattr(exponents, "MAX_TOGETHER", 0)
+    apart = sw.lyapunov(bodies, method, **given)
+    for name in ("exponents", "history", "v", "y"):
+        np.testing.assert_array_equal(getattr(apart, name), getattr(together, name))
+
+
+def test_disturbances_obey_the_variational_equations() -> None:
+    """The derivative of a step of rk4 is a step by rk4 of the variational equations, here written by hand."""
+
+    @sw.system(order=1)
+    def varied(t: Any, w: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
+        x, y, z, a, b, c = w
+        rates = [sigma * (y - x), x * (rho - z) - y, x * y - beta * z]
+        return [*rates, sigma * (b - a), a * (rho - z) - x * c - b, a * y + x * b - beta * c]
+
+    y, steps, every, dt = near_the_attractor(8), 200, 10, 0.01
+    found = sw.lyapunov(Lorenz(), "rk4", y=y, dt=dt, steps=steps, every=every)
+    start = np.cos(1.7 * np.arange(1.0, 4.0))
+    w = np.concatenate([y, np.broadcast_to((start / np.linalg.norm(start))[:, np.newaxis], y.shape)])
+    growth = np.zeros(8)
+    for _ in range(steps // every):
+        w = sw.integrate(varied(), "rk4", y=w, dt=dt, steps=every).y[-1]
+        length = np.sqrt((w[3:] ** 2).sum(axis=0))
+        growth, w[3:] = growth + np.log(length), w[3:] / length
+    # Both sum the same numbers in other orders: some 150 roundings a step, amplified by e^(2·T) at most along so short a piece of
+    # the motion, T = 2. A change of the state changes the rates of disturbances by |y| ~ 30 times as much, relatively.
+    bound = 150 * steps * np.exp(4.0) * 30 * EPS
+    np.testing.assert_allclose(found.exponents[0], growth / (steps * dt), rtol=0, atol=bound)
+
+
+def test_a_step_that_is_too_long_is_refused_before_it_is_differentiated() -> None:
+    y = np.random.default_rng(1).random((500, 2))
+    with pytest.raises(UnsupportedError, match=r"100,000 operations at most.* about 11,000,000, of NBody"):
+        sw.lyapunov(sw.NBody(np.ones(500)), "rk4", v=0.0, y=y, dt=0.1, steps=1)
 
 
 def test_a_member_has_the_same_exponents_alone() -> None:

@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, _core, engine
 from .._brief import share
 from .._checks import Array
 from .._value import Value
 from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
-from ..errors import ArgumentError, DivergenceWarning
+from ..errors import ArgumentError, DivergenceWarning, UnsupportedError
 from ..method_records import Method
 from ..method_records import method as find_method
+from ..reference.bits import and_bits, less, where
+from ..reference.functions.operations import NOT_SIGN, sqrt
 from ..reference.log import log
 from ..reference.trig import cos
+from ..reference.types import Blocks
 from ..stability import maps
 from ..stability.analysis import velocities
 from ..systems import System
@@ -26,6 +29,12 @@ from ..systems.base import a_system
 
 #: Steps between two orthonormalisations by default: few enough that vectors do not become parallel up to rounding.
 EVERY = 10
+
+#: The most operations of a step, about, before it is differentiated: as many as of a step by a series.
+MAX_OPERATIONS = 100_000
+
+#: The most operations of a tape on which all vectors of a member are together.
+MAX_TOGETHER = 20_000
 
 
 class Lyapunov(Value):
@@ -57,7 +66,7 @@ class Lyapunov(Value):
     @property
     def sum(self) -> Array:
         """The sum of the exponents, shape (*batch): of all of them, the mean rate at which volumes in state space grow."""
-        return _total(self.exponents)
+        return np.asarray(_total(self.exponents))
 
     @property
     def dimension(self) -> Array:
@@ -101,9 +110,10 @@ def lyapunov(
     """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances of it grow.
 
     Disturbances are stepped by the exact derivative of each step of the method, so the exponents are those of the sequence of
-    the method, and those of the motion up to the method's error. At intervals they are orthonormalised, and their growth is noted
-    (Benettin et al. 1980). The states are those of ``integrate``, to the bit. NumPy makes a step for all members at once: it
-    costs about a microsecond for each operation of the step and of its derivative, for any number of members up to a thousand.
+    the method, and those of the motion up to the method's error: by a Runge-Kutta method they are those of the variational
+    equations. At intervals they are orthonormalised, and their growth is noted (Benettin et al. 1980). The states are those of
+    ``integrate``, to the bit. The step and its derivative are one step for the core, which takes as long as one of equations with
+    as many operations.
 
     Args:
         system: what to step; parameters may be arrays.
@@ -123,7 +133,7 @@ def lyapunov(
 
     Raises:
         ArgumentError: what was given and what was expected.
-        UnsupportedError: if the method cannot do the system, or a step has no derivative.
+        UnsupportedError: if the method cannot do the system, a step has no derivative, or one that is too long.
 
     Warns:
         DivergenceWarning: if members left the finite range; their exponents are NaN.
@@ -149,68 +159,109 @@ def lyapunov(
         raise ArgumentError(f"dt, steps: expected a time that stays finite, got {steps} steps of {dt:g}")
     system.check_time(max(abs(t0), abs(t0 + (transient + steps) * dt)))
     members = together(system, v, y)
+    _not_too_long(system, how, members, dt)
     noted = -(-steps // every)
-    _checks.fits("the exponents over time", (noted + 8 * n) * k, members, "take fewer steps, or a larger every=")
+    _checks.fits("the exponents over time", noted * k + 6 * n * (k + 1), members, "take fewer steps, or a larger every=")
     v, y = _wide(v, system.v_shape, members), _wide(y, system.y_shape, members)
     motion = _Motion(system, how, dt, t0, k, v, y, members)
     motion.go(transient, every)
-    sums = np.zeros((k, *members))
+    motion.grown[...] = 0.0
     history = np.empty((noted, k, *members))
     ends = np.minimum(every * np.arange(1, noted + 1), steps)
     for i, end in enumerate(ends.tolist()):
-        sums = sums + motion.growth(min(every, steps - every * i))
-        history[i] = sums / (end * dt)
+        motion.go(min(every, steps - every * i), every)
+        history[i] = motion.grown / (end * dt)
     final = history[-1]
     order = np.argsort(-final, axis=0, kind="stable")
     found = np.take_along_axis(final, order, axis=0)
     _warn(found)
-    n_v = maps.size(system)[0]
-    at_end = [np.array(np.broadcast_to(row, members)) for row in motion.state]
-    v, y = (
-        np.array(part).reshape((*shape, *members))
-        for part, shape in ((at_end[:n_v], system.v_shape), (at_end[n_v:], system.y_shape))
-    )
+    v, y = motion.state()
     return Lyapunov(system, how, dt, t0 + (transient + ends) * dt, found, history, v, y)
 
 
 class _Motion:
-    """States and their disturbances, while they are stepped."""
+    """States and their disturbances, while the core steps them.
+
+    A step and its derivative are one tape. All vectors of a member are on it, so that the state is stepped once for all of them,
+    and another tape makes them orthonormal. Where that is too long, each vector is stepped beside a copy of the state, and NumPy
+    makes them orthonormal.
+
+    Attributes:
+        grown: the sum of the logarithms of the growth of each vector, shape (k, *members).
+    """
 
     def __init__(
         self, system: System, method: Method, dt: float, t0: float, k: int, v: Array, y: Array, members: tuple[int, ...]
     ) -> None:
+        self.system, self.members = system, members
         traced = Traced(system, "step", method)
-        self.step, self.n = traced.tangent(), traced.length
-        self.dt, self.t0, self.done = dt, t0, 0
+        n = traced.length
+        self.together = k == 1 or k * len(traced.tape) + 8 * k * k * n <= MAX_TOGETHER
+        beside = k if self.together else 1
         with np.errstate(all="ignore"):
             slot = method.steps.start(system.scaled(dt, members), 0, t0, v, y) if method.carry else v
-        self.state: list[Any] = traced.rows(slot, y)
         # One axis before the members: vector after vector. A unit vector might lie in a direction that never grows: at a turning
         # point, a change of the velocity is one along the motion.
-        start = _orthonormal(_generic(self.n, k))[0]
-        self.vectors = np.array(np.broadcast_to(start.reshape(self.n, k, *(1,) * len(members)), (self.n, k, *members)))
-
-    def advance(self, steps: int) -> None:
-        """Make a number of steps of states and disturbances."""
-        nothing = np.zeros(())
-        changes: list[Any] = list(self.vectors)
-        for _ in range(steps):
-            out = self.step([*self.state, nothing, *changes], self.t0 + self.done * self.dt, self.dt)
-            self.state, changes = out[: self.n], out[self.n :]
-            self.done += 1
-        shape = self.vectors.shape
-        self.vectors = np.stack([np.broadcast_to(each, shape[1:]) for each in changes])
-
-    def growth(self, steps: int) -> Array:
-        """Make a number of steps; returns the logarithm of the growth of each vector, shape (k, *members)."""
-        self.advance(steps)
-        self.vectors, lengths = _orthonormal(self.vectors)
-        return _log(lengths)
+        start = _orthonormal(_generic(n, k))[0].reshape(n, k, *(1,) * len(members))
+        lanes = members if self.together else (k, *members)
+        numbers = np.empty((n + n * k + k, *members) if self.together else (2 * n, *lanes))
+        self.slots = numbers[:n]
+        for i, row in enumerate(traced.rows(slot, y)):
+            self.slots[i] = row
+        self.vectors = numbers[n : n + n * beside].reshape(n, k, *members)
+        self.vectors[...] = start
+        self.grown = numbers[n + n * k :] if self.together else np.empty((k, *members))
+        self.grown[...] = 0.0
+        plan = engine.Plan(system, method, lanes, dt, t0)
+        self.step = _world(plan, traced.tape, traced.along(beside), numbers[: n + n * beside])
+        if self.together:
+            self.orthonormalise = _world(plan, *_orthonormalisation(n, k), numbers[n:])
 
     def go(self, steps: int, every: int) -> None:
-        """Make a number of steps whose growth is ignored."""
+        """Make a number of steps; after every so many, and at the end, make the vectors orthonormal, and note their growth."""
         for first in range(0, steps, every):
-            self.growth(min(every, steps - first))
+            self.step.step(min(every, steps - first))
+            if self.together:
+                self.orthonormalise.step(1)
+            else:
+                self.vectors[...], lengths = _orthonormal(self.vectors)
+                self.grown += _log(lengths)
+
+    def state(self) -> Blocks:
+        """The velocities, or what the method carries in their place, and the coordinates."""
+        slots = self.slots if self.together else self.slots[:, 0]
+        n_v = maps.size(self.system)[0]
+        return (
+            slots[:n_v].reshape((*self.system.v_shape, *self.members)).copy(),
+            slots[n_v:].reshape((*self.system.y_shape, *self.members)).copy(),
+        )
+
+
+def _world(plan: engine.Plan, tape: _core.Tape, following: list[_core.Symbol], numbers: Array) -> _core.World:
+    """What makes this step of these numbers, in place: the values on the tape follow the state."""
+    given = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*given, ("step()", tape.equations([], following))])
+    return _core.World(model, plan, np.empty(0), numbers.reshape(-1))
+
+
+def _orthonormalisation(n: int, k: int) -> tuple[_core.Tape, list[_core.Symbol]]:
+    """The tape of k vectors of n numbers that become orthonormal, and of the logarithms of their growth that are added up."""
+    tape = _core.Tape()
+    state = np.array([tape.state(i) for i in range(n * k + k)], dtype=object)
+    vectors, lengths = _orthonormal(state[: n * k].reshape(n, k))
+    return tape, [*vectors.reshape(-1), *(before + _log(length) for before, length in zip(state[n * k :], lengths, strict=True))]
+
+
+def _not_too_long(system: System, method: Method, members: tuple[int, ...], dt: float) -> None:
+    """Raise if a step has so many operations that its derivative would take minutes and gigabytes to write."""
+    if system.kernel not in _core.systems():
+        return
+    operations = _core.operations(engine.model(engine.Plan(system, method, members, dt)))
+    if operations > MAX_OPERATIONS:
+        raise UnsupportedError(
+            f"lyapunov: expected a step of {MAX_OPERATIONS:,} operations at most, whose derivative is written operation by "
+            f"operation, got one of about {operations:,}, of {system!r} by {method.name}; take fewer bodies, masses or springs"
+        )
 
 
 def _how_many(exponents: Any, n: int) -> int:
@@ -227,40 +278,46 @@ def _generic(n: int, k: int) -> Array:
     return cos(1.7 * i + 2.3 * i * j)
 
 
-def _total(values: Array) -> Array:
+def _total(values: Any) -> Any:
     """The sum over the first axis, in its order."""
-    total: Array = values[0]
+    return np.add.accumulate(values, axis=0)[-1]
+
+
+def _largest(values: Any) -> Any:
+    """The largest magnitude over the first axis."""
+    largest = and_bits(values[0], NOT_SIGN)
     for each in values[1:]:
-        total = total + each
-    return total
+        size = and_bits(each, NOT_SIGN)
+        largest = where(less(largest, size), size, largest)
+    return largest
 
 
-def _orthonormal(vectors: Array) -> tuple[Array, Array]:
+def _orthonormal(vectors: Any) -> tuple[Any, Any]:
     """Vectors made orthonormal one after the other, and the length of each orthogonal to those before it.
 
     Gram-Schmidt, each twice, which is as accurate as Householder's method; every sum in a fixed order. Shapes (n, k, *members)
-    and (k, *members). Numbers are scaled before their lengths are computed, so that nothing overflows.
+    and (k, *members), of numbers or of symbols. Numbers are scaled before their lengths are computed, so that nothing overflows.
     """
-    done, lengths = np.empty_like(vectors), np.empty(vectors.shape[1:])
+    done, lengths = np.empty_like(vectors), np.empty(vectors.shape[1:], vectors.dtype)
     with np.errstate(all="ignore"):
         for j in range(vectors.shape[1]):
             x = vectors[:, j]
             for _ in range(2):
                 for i in range(j):
                     x = x - _total(done[:, i] * x) * done[:, i]
-            size = np.abs(x).max(axis=0)
+            size = _largest(x)
             x = x / size
-            length = np.sqrt(_total(x * x))
+            length = sqrt(_total(x * x))
             done[:, j] = x / length
             lengths[j] = size * length
     return done, lengths
 
 
-def _log(x: Array) -> Array:
-    """The logarithm of positive normal numbers, the same on every machine."""
-    ordinary = (x >= np.finfo(np.float64).tiny) & np.isfinite(x)
+def _log(x: Any) -> Any:
+    """The logarithm of positive normal numbers, or of a symbol; that of 0 is −∞, and that of others NaN."""
+    ordinary = (x >= np.finfo(np.float64).tiny) & (x <= np.finfo(np.float64).max)
     with np.errstate(all="ignore"):
-        return np.asarray(np.where(ordinary, log(np.where(ordinary, x, 1.0)), np.where(x == 0.0, -np.inf, np.nan)))
+        return where(ordinary, log(where(ordinary, x, 1.0)), where(x <= 0.0, -np.inf, np.nan))
 
 
 def _wide(block: Array, shape: tuple[int, ...], members: tuple[int, ...]) -> Array:

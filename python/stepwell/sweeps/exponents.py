@@ -15,8 +15,7 @@ from .outcomes import Found, Outcome, Variable
 class Exponents(Outcome):
     """The largest Lyapunov exponents, ``lyapunov``, by ``stepwell.lyapunov`` over the steps after the transient.
 
-    NumPy makes the steps and their derivatives here, some hundred times slower than ``integrate``. Not with ``control``,
-    ``force``, ``fused``, ``start`` or float32.
+    Not with ``control``, ``force``, ``fused``, ``start`` or float32.
 
     Args:
         exponents: how many, or "all".
