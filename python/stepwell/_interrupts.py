@@ -1,0 +1,43 @@
+"""Long computations by NumPy, during which Ctrl-C is heard."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextvars import copy_context
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+#: A computation of fewer operations takes some hundredths of a second, which is not worth another thread.
+FEW_OPERATIONS = 1e7
+
+#: How often it is asked whether the computation has ended, in seconds.
+POLL = 0.02
+
+
+def heard(operations: float, function: Callable[..., Result], *arguments: Any) -> Result:
+    """The result of a function of NumPy that makes about so many operations without looking for signals.
+
+    A long one is computed by another thread, while this one waits. After Ctrl-C that thread ends when the function does: nothing
+    can stop it, and nobody waits for it.
+    """
+    if operations < FEW_OPERATIONS or threading.current_thread() is not threading.main_thread():
+        return function(*arguments)
+    results: list[Result] = []
+    errors: list[BaseException] = []
+
+    def compute() -> None:
+        try:
+            results.append(copied.run(function, *arguments))
+        except BaseException as error:
+            errors.append(error)
+
+    copied = copy_context()  # with NumPy's treatment of errors
+    worker = threading.Thread(target=compute, daemon=True)
+    worker.start()
+    while worker.is_alive():
+        worker.join(POLL)
+    if errors:
+        raise errors[0]
+    return results[0]
