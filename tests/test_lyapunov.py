@@ -195,6 +195,98 @@ def _pairs() -> Any:
     return np.array([[[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]]])
 
 
+PACED: dict[str, Any] = {"tolerance": 1e-9, "at": np.arange(1.0, 41.0), "transient": 20, "exponents": "all"}
+
+
+@pytest.mark.parametrize("method", ["merson", "dop853", "fehlberg_5", "taylor"])
+def test_with_a_tolerance_they_are_the_rates_of_a_linear_system(method: str) -> None:
+    matrix = np.array([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]])
+    found = sw.lyapunov(sw.LinearSystem(matrix, velocities=1), method, v=np.zeros(1), y=np.ones(2), **PACED)
+    rates = np.sort(np.linalg.eigvals(matrix).real)[::-1]
+    # A step errs by the tolerance of what has been longest, at most e^0.5 in an interval, at whose end the smallest vector is
+    # e^(−2.5) of that. Some hundred steps an interval by the method of lowest order.
+    np.testing.assert_allclose(found.exponents, rates, rtol=0, atol=100 * 1e-9 * np.exp(0.5 + 2.5))
+    assert found.t.tolist() == np.arange(21.0, 41.0).tolist()
+    assert found.history.shape == (20, 3)
+    assert found.dt is None
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> None:
+    """ẏ = 50·cos(50·t)·size − y: its disturbances, e^(−t), would do with long steps, and are given lengths like that of y."""
+
+    @sw.system(order=1)
+    def swept(t: Any, y: Any, *, size: Any = 1.0) -> Any:
+        return 50.0 * size * np.cos(50.0 * t) - y
+
+    t = np.arange(1.0, 6.0)
+    found = sw.lyapunov(swept(size=size), "merson", y=size, tolerance=1e-9, at=t)
+    swing = (2500.0 * np.sin(50.0 * 5.0) + 50.0 * np.cos(50.0 * 5.0)) / 2501.0
+    right = size * ((1.0 - 50.0 / 2501.0) * np.exp(-5.0) + swing)
+    # Errors of some thousand steps in each of five units of time, of which what e^(−t) leaves is one unit's.
+    np.testing.assert_allclose(found.y, right, rtol=0, atol=2000 * 1e-9 * size)
+    np.testing.assert_allclose(found.exponents, [-1.0], rtol=0, atol=2000 * 1e-9)
+
+
+@pytest.mark.parametrize("k", [2, "all"])
+def test_with_a_tolerance_bodies_have_those_of_short_steps(k: Any) -> None:
+    """Twelve disturbances make an attempt too long for one tape, two do not. Steps of 0.002 by rk4 are right to h⁴ ~ 10⁻¹¹."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
+    bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
+    at = np.arange(1.0, 11.0)
+    found = sw.lyapunov(bodies, "dop853", v=0.0, y=y, tolerance=1e-11, at=at, exponents=k)
+    fixed = sw.lyapunov(bodies, "rk4", v=0.0, y=y, dt=0.002, steps=5000, every=500, exponents=k)
+    # Some ten steps in a unit of time, whose errors grow with the motion, by e^(0.5·10).
+    np.testing.assert_allclose(found.history, fixed.history, rtol=0, atol=10 * 1e-11 * np.exp(5.0) + 100 * 0.002**4)
+
+
+def test_with_a_tolerance_a_member_has_the_same_alone_and_a_driven_pendulum_shrinks_volumes() -> None:
+    omega, y = np.array([1.0, 1.5, 2.0]), np.array([[1.0], [2.0]])
+    drive = sw.Sinusoid(0.5, 0.7, 0.1)
+    company = sw.lyapunov(sw.Pendulum(omega, 0.1, a=drive), "merson", v=0.1, y=y, **PACED)
+    np.testing.assert_allclose(company.sum, np.broadcast_to(-2 * 0.1 * omega, (2, 3)), rtol=0, atol=100 * 1e-9 * np.exp(1.0))
+    for i, k in np.ndindex(2, 3):
+        alone = sw.lyapunov(sw.Pendulum(omega[k], 0.1, a=drive), "merson", v=0.1, y=y[i, 0], **PACED)
+        np.testing.assert_array_equal(alone.history, company.history[:, :, i, k])
+        np.testing.assert_array_equal([alone.v, alone.y], [company.v[i, k], company.y[i, k]])
+
+
+def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
+    """ẏ = r·y² is infinite at t = 1/(r·y), and its disturbances grow as 2·r·y until then; for r < 0 they shrink."""
+
+    @sw.system(order=1)
+    def explosive(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
+        return rate * y**2
+
+    rate = np.array([-1.0, 0.5, -2.0])
+    with pytest.warns(sw.DivergenceWarning, match="1 of 3"):
+        found = sw.lyapunov(explosive(rate=rate), "dop853", y=1.0, tolerance=1e-9, at=np.arange(1.0, 6.0))
+    assert np.isnan(found.exponents[0, 1])
+    assert np.isfinite(found.history[0, 0, 1])  # up to t = 1 it was there
+    # The derivative of 1/(1 − r·t) by the start is the square of that.
+    right = -2.0 * np.log1p(-rate[[0, 2]] * 5.0) / 5.0
+    np.testing.assert_allclose(found.exponents[0, [0, 2]], right, rtol=0, atol=100 * 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"steps": 10}, "steps: goes with fixed steps only"),
+        ({"every": 10}, "every: goes with fixed steps only"),
+        ({"at": None}, "at: expected too"),
+        ({"tolerance": None}, "tolerance: expected too"),
+        ({"at": [1.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
+        ({"at": [0.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
+        ({"transient": 2}, "transient: expected"),
+        ({"method": "rk4"}, "tolerance: rk4 does not estimate its error"),
+    ],
+)
+def test_wrong_calls_with_a_tolerance(wrong: dict[str, Any], message: str) -> None:
+    given: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0]}
+    with pytest.raises(sw.StepwellError, match=message):
+        sw.lyapunov(sw.Pendulum(), **(given | wrong))
+
+
 def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """With −sin for the derivative of the sine, the sum of a damped pendulum is no longer −2Dω₀."""
     from stepwell.derivatives import rules

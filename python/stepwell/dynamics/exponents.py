@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from math import prod
 from typing import Any
 
@@ -14,7 +15,9 @@ from .._checks import Array
 from .._value import Value
 from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
-from ..errors import ArgumentError, DivergenceWarning, UnsupportedError
+from ..errors import ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
+from ..events.members import Members
+from ..integration import integrate
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..reference.bits import and_bits, less, where
@@ -26,6 +29,7 @@ from ..stability import maps
 from ..stability.analysis import velocities
 from ..systems import System
 from ..systems.base import a_system
+from .variational import Variational
 
 #: Steps between two orthonormalisations by default: few enough that vectors do not become parallel up to rounding.
 EVERY = 10
@@ -43,7 +47,7 @@ class Lyapunov(Value):
     Attributes:
         system: what was stepped.
         method: how.
-        dt: the step.
+        dt: the step; None with a tolerance.
         t: times up to which ``history`` averages, shape (orthonormalisations,).
         exponents: mean growth per unit of time, the largest first, shape (k, *batch).
         history: the same averages up to each of these times, in the order of the orthonormalised vectors, shape
@@ -53,7 +57,7 @@ class Lyapunov(Value):
     """
 
     def __init__(
-        self, system: System, method: Method, dt: float, t: Array, exponents: Array, history: Array, v: Array, y: Array
+        self, system: System, method: Method, dt: float | None, t: Array, exponents: Array, history: Array, v: Array, y: Array
     ) -> None:
         self.system = system
         self.method = method
@@ -99,13 +103,15 @@ def lyapunov(
     method: str | Method,
     *,
     y: Any,
-    dt: float,
-    steps: int,
+    dt: float | None = None,
+    steps: int | None = None,
     v: Any = None,
     exponents: int | str = 1,
     transient: int = 0,
-    every: int = EVERY,
+    every: int | None = None,
     t0: float = 0.0,
+    tolerance: Any = None,
+    at: Any = None,
 ) -> Lyapunov:
     """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances of it grow.
 
@@ -115,18 +121,25 @@ def lyapunov(
     ``integrate``, to the bit. The step and its derivative are one step for the core, which takes as long as one of equations with
     as many operations.
 
+    With ``tolerance`` and ``at`` in place of ``dt`` and ``steps`` the variational equations are integrated beside the motion, in
+    adaptive steps, each member's own. The states are those of ``integrate`` to this tolerance, and not to the bit.
+
     Args:
         system: what to step; parameters may be arrays.
         method: its name, or what ``stepwell.method`` returns.
         y: coordinates at the start, shape (*block, *batch), or one number for all.
-        dt: the step, in units of time, above zero.
+        dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
         steps: over how many steps growth is averaged, one or more.
         v: velocities at the start, as y; a system that has none needs none.
         exponents: how many, the largest ones; or "all".
-        transient: number of steps before those, in which the motion approaches its attractor and disturbances their directions.
-        every: steps from one orthonormalisation to the next. In between, vectors must not become parallel up to rounding:
-            (largest − smallest)·every·dt must stay below some 30.
+        transient: number of steps before those, in which the motion approaches its attractor and disturbances their directions;
+            with a tolerance, the number of intervals between times of ``at``, of which the first begins at t0.
+        every: steps from one orthonormalisation to the next; 10 if None. In between, vectors must not become parallel up to
+            rounding: (largest − smallest)·every·dt must stay below some 30.
         t0: time of the first step.
+        tolerance: as in ``integrate``, a number or a pair (relative, absolute), for methods with an ``error_order`` and series.
+        at: with a tolerance, the times of the orthonormalisations, ascending, after t0, near enough that vectors do not become
+            parallel in between.
 
     Returns:
         ``Lyapunov``: ``exponents`` of shape (k, *batch), and their history.
@@ -136,23 +149,54 @@ def lyapunov(
         UnsupportedError: if the method cannot do the system, a step has no derivative, or one that is too long.
 
     Warns:
-        DivergenceWarning: if members left the finite range; their exponents are NaN.
+        DivergenceWarning: if members left the finite range, or stopped before the last time; their exponents are NaN.
 
     Example:
         >>> found = sw.lyapunov(sw.Pendulum(1.0, 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=1000, exponents="all")
         >>> round(float(found.sum), 4)  # −2·D·ω₀
         -0.2
     """
+    given: dict[str, Any] = {"exponents": exponents, "transient": transient, "t0": t0, "keep_history": True}
+    if tolerance is not None or at is not None:
+        if wrong := [name for name, value in (("steps", steps), ("every", every)) if value is not None]:
+            raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ToleranceWarning)  # of single intervals
+            found = adaptive_averages(system, method, v, y, tolerance, at, dt=dt, **given)
+    else:
+        if missing := [name for name, value in (("dt", dt), ("steps", steps)) if value is None]:
+            raise ArgumentError(f"{' and '.join(missing)}: expected with fixed steps; for adaptive steps give tolerance= and at=")
+        found = averages(system, method, v, y, dt, steps, every=every, **given)
+    _warn(found.exponents)
+    return found
+
+
+def averages(
+    system: System,
+    method: str | Method,
+    v: Any,
+    y: Any,
+    dt: Any,
+    steps: Any,
+    *,
+    exponents: int | str,
+    transient: int,
+    every: int | None,
+    t0: float,
+    keep_history: bool,
+    look: Callable[[], object] = lambda: None,
+) -> Lyapunov:
+    """``lyapunov`` by fixed steps, without a warning.
+
+    The history has the last averages alone unless it is kept. ``look`` is called at each orthonormalisation.
+    """
     how = find_method(method)
-    system = a_system(system).sized(v, y)
-    fits_together(system, how)
-    v = _checks.block("v", velocities(system, v), system.v_shape, system.axes)
-    y = _checks.block("y", y, system.y_shape, system.axes)
+    system, v, y = _start(system, how, v, y)
     dt = _checks.number("dt", dt, positive=True, unit="units of time")
     t0 = _checks.number("t0", t0, unit="units of time")
     steps = _checks.count("steps", steps, 1)
     transient = _checks.count("transient", transient, 0)
-    every = min(_checks.count("every", every, 1), steps)
+    every = min(EVERY if every is None else _checks.count("every", every, 1), steps)
     n = sum(maps.size(system))
     k = _how_many(exponents, n)
     if not t0 + (transient + steps) * dt < np.inf:
@@ -160,23 +204,106 @@ def lyapunov(
     system.check_time(max(abs(t0), abs(t0 + (transient + steps) * dt)))
     members = together(system, v, y)
     _not_too_long(system, how, members, dt)
-    noted = -(-steps // every)
+    noted = -(-steps // every) if keep_history else 1
     _checks.fits("the exponents over time", noted * k + 6 * n * (k + 1), members, "take fewer steps, or a larger every=")
-    v, y = _wide(v, system.v_shape, members), _wide(y, system.y_shape, members)
+    v, y = maps.spread(v, system.v_shape, members), maps.spread(y, system.y_shape, members)
     motion = _Motion(system, how, dt, t0, k, v, y, members)
-    motion.go(transient, every)
+    for first in range(0, transient, every):
+        motion.go(min(every, transient - first))
+        look()
     motion.grown[...] = 0.0
     history = np.empty((noted, k, *members))
-    ends = np.minimum(every * np.arange(1, noted + 1), steps)
-    for i, end in enumerate(ends.tolist()):
-        motion.go(min(every, steps - every * i), every)
-        history[i] = motion.grown / (end * dt)
-    final = history[-1]
-    order = np.argsort(-final, axis=0, kind="stable")
-    found = np.take_along_axis(final, order, axis=0)
-    _warn(found)
+    for first in range(0, steps, every):
+        end = min(first + every, steps)
+        motion.go(end - first)
+        history[first // every if keep_history else 0] = motion.grown / (end * dt)
+        look()
     v, y = motion.state()
-    return Lyapunov(system, how, dt, t0 + (transient + ends) * dt, found, history, v, y)
+    ends = np.minimum(every * np.arange(1, noted + 1), steps) if keep_history else np.array([steps])
+    return Lyapunov(system, how, dt, t0 + (transient + ends) * dt, _in_order(history[-1]), history, v, y)
+
+
+def adaptive_averages(
+    system: System,
+    method: str | Method,
+    v: Any,
+    y: Any,
+    tolerance: Any,
+    at: Any,
+    *,
+    exponents: int | str,
+    transient: int,
+    t0: float,
+    keep_history: bool,
+    dt: Any = None,
+    max_steps: int | None = None,
+    look: Callable[[], object] = lambda: None,
+) -> Lyapunov:
+    """The same with a tolerance. Members that stop before the last time have no exponents."""
+    how = find_method(method)
+    system, v, y = _start(system, how, v, y)
+    if tolerance is None or at is None:
+        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
+    t0 = _checks.number("t0", t0, unit="units of time")
+    times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
+    if times.ndim > 1 or not times.size or (np.diff(times, prepend=t0) <= 0.0).any():
+        raise ArgumentError(f"at: expected times after t0 = {t0:g}, ascending, got {_checks.short(at)}")
+    transient = _checks.count("transient", transient, 0, len(times) - 1)
+    n_v, n_y = maps.size(system)
+    n = n_v + n_y
+    k = _how_many(exponents, n)
+    members = together(system, v, y)
+    noted = len(times) - transient if keep_history else 1
+    _checks.fits("the exponents over time", noted * k + 12 * n * (k + 1), members, "take fewer times")
+    count = prod(members)
+    wanted = [
+        np.broadcast_to(part, members).reshape(count) if isinstance(part, np.ndarray) and part.ndim else part
+        for part in (tolerance if isinstance(tolerance, tuple) else (tolerance,))
+    ]
+    both = ((v, system.v_shape), (y, system.y_shape))
+    states = np.concatenate([maps.spread(block, shape, members).reshape(prod(shape), count) for block, shape in both])
+    vectors = np.array(np.broadcast_to(_orthonormal(_generic(n, k))[0][:, :, np.newaxis], (n, k, count)))
+    whole = Members(engine.Plan(Variational(system, k), how, members, 1.0))
+    going, left = np.arange(count), whole.plan(np.arange(count)).system
+    longest, grown, history = np.zeros(count), np.zeros((k, count)), np.full((noted, k, count), np.nan)
+    began = t0 if transient == 0 else float(times[transient - 1])
+    for i, (begin, end) in enumerate(zip([t0, *times.tolist()], times.tolist(), strict=False)):
+        # Lengths of disturbances mean nothing, but an error is relative to that of a whole block, with them.
+        longest[going] = np.maximum(longest[going], np.sqrt((states[n_v:, going] ** 2).sum(axis=0)))
+        unit = np.where(longest[going] > 0.0, longest[going], 1.0)
+        beside = np.concatenate([states[n_v:, going], (unit * vectors[..., going]).reshape(n * k, -1)])
+        parts = [part[going] if isinstance(part, np.ndarray) and part.ndim else part for part in wanted]
+        asked: dict[str, Any] = {"tolerance": tuple(parts) if len(parts) > 1 else parts[0], "dt": dt, "max_steps": max_steps}
+        run, dt = integrate(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **asked), None
+        states[:, going] = np.concatenate([run.v[-1], run.y[-1, :n_y]])
+        vectors[..., going], lengths = _orthonormal(run.y[-1, n_y:].reshape(n, k, -1) / unit)
+        grown[:, going] += _log(lengths)
+        if (stopped := run.status != 0).any():
+            going = going[~stopped]
+            if not going.size:
+                break
+            left = whole.plan(going).system
+        if i == transient - 1:
+            grown[...] = 0.0
+        elif i >= transient:
+            history[i - transient if keep_history else 0][:, going] = grown[:, going] / (end - began)
+        look()
+    v, y = states[:n_v].reshape((*system.v_shape, *members)), states[n_v:].reshape((*system.y_shape, *members))
+    history = history.reshape((noted, k, *members))
+    return Lyapunov(system, how, None, times[-noted:], _in_order(history[-1]), history, v, y)
+
+
+def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Array, Array]:
+    """The system for a state, and its blocks."""
+    system = a_system(system).sized(v, y)
+    fits_together(system, method)
+    v = _checks.block("v", velocities(system, v), system.v_shape, system.axes)
+    return system, v, _checks.block("y", y, system.y_shape, system.axes)
+
+
+def _in_order(exponents: Array) -> Array:
+    """The largest first, shape (k, *members)."""
+    return np.take_along_axis(exponents, np.argsort(-exponents, axis=0, kind="stable"), axis=0)
 
 
 class _Motion:
@@ -217,15 +344,14 @@ class _Motion:
         if self.together:
             self.orthonormalise = _world(plan, *_orthonormalisation(n, k), numbers[n:])
 
-    def go(self, steps: int, every: int) -> None:
-        """Make a number of steps; after every so many, and at the end, make the vectors orthonormal, and note their growth."""
-        for first in range(0, steps, every):
-            self.step.step(min(every, steps - first))
-            if self.together:
-                self.orthonormalise.step(1)
-            else:
-                self.vectors[...], lengths = _orthonormal(self.vectors)
-                self.grown += _log(lengths)
+    def go(self, steps: int) -> None:
+        """Make a number of steps; then make the vectors orthonormal, and note their growth."""
+        self.step.step(steps)
+        if self.together:
+            self.orthonormalise.step(1)
+        else:
+            self.vectors[...], lengths = _orthonormal(self.vectors)
+            self.grown += _log(lengths)
 
     def state(self) -> Blocks:
         """The velocities, or what the method carries in their place, and the coordinates."""
@@ -318,12 +444,6 @@ def _log(x: Any) -> Any:
     ordinary = (x >= np.finfo(np.float64).tiny) & (x <= np.finfo(np.float64).max)
     with np.errstate(all="ignore"):
         return where(ordinary, log(where(ordinary, x, 1.0)), where(x <= 0.0, -np.inf, np.nan))
-
-
-def _wide(block: Array, shape: tuple[int, ...], members: tuple[int, ...]) -> Array:
-    """A block over all members."""
-    own = block.shape[len(shape) :]
-    return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
 
 
 def _warn(exponents: Array) -> None:
