@@ -65,6 +65,20 @@ def test_vectors_on_one_tape_and_each_beside_a_copy_of_the_state_are_the_same(
         np.testing.assert_array_equal(getattr(apart, name), getattr(together, name))
 
 
+@pytest.mark.parametrize("most", [20_000, 0])
+@pytest.mark.parametrize("method", ["rk4", "verlet"])
+def test_threads_share_members_and_change_nothing(method: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exponents, "MAX_TOGETHER", most)
+    omega, y = np.linspace(1.0, 2.0, 4), np.linspace(0.5, 2.0, 3)[:, np.newaxis]
+    pendulums = sw.Pendulum(omega, a=sw.Sinusoid(np.linspace(0.1, 0.5, 4), 0.7))
+    given: dict[str, Any] = {"v": 0.1, "y": y, "dt": 0.05, "steps": 95, "transient": 25, "exponents": "all"}
+    one = sw.lyapunov(pendulums, method, **given, threads=1)
+    for threads in (2, 5, 100, None):
+        several = sw.lyapunov(pendulums, method, **given, threads=threads)
+        for name in ("exponents", "history", "v", "y"):
+            np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
+
+
 def test_disturbances_obey_the_variational_equations() -> None:
     """The derivative of a step of rk4 is a step by rk4 of the variational equations, here written by hand."""
 
@@ -249,6 +263,11 @@ def test_with_a_tolerance_a_member_has_the_same_alone_and_a_driven_pendulum_shri
         alone = sw.lyapunov(sw.Pendulum(omega[k], 0.1, a=drive), "merson", v=0.1, y=y[i, 0], **PACED)
         np.testing.assert_array_equal(alone.history, company.history[:, :, i, k])
         np.testing.assert_array_equal([alone.v, alone.y], [company.v[i, k], company.y[i, k]])
+    tolerance = (np.array([1e-6, 1e-8, 1e-10]), 1e-12)
+    each = sw.lyapunov(sw.Pendulum(omega, 0.1), "merson", v=0.1, y=1.0, **(PACED | {"tolerance": tolerance, "dt": 0.01 * omega}))
+    own = {"tolerance": (1e-8, 1e-12), "dt": 0.015}
+    alone = sw.lyapunov(sw.Pendulum(1.5, 0.1), "merson", v=0.1, y=1.0, **(PACED | own))
+    np.testing.assert_array_equal(alone.history, each.history[:, :, 1])
 
 
 def test_with_a_tolerance_a_member_that_stops_has_none() -> None:

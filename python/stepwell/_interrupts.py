@@ -1,7 +1,8 @@
-"""Long computations by NumPy, during which Ctrl-C is heard."""
+"""Threads: how many there may be, and long computations by NumPy, during which Ctrl-C is heard."""
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from contextvars import copy_context
@@ -14,6 +15,13 @@ FEW_OPERATIONS = 1e7
 
 #: How often it is asked whether the computation has ended, in seconds.
 POLL = 0.02
+
+
+def available() -> int:
+    """The number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def heard(operations: float, function: Callable[..., Result], *arguments: Any) -> Result:

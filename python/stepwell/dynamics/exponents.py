@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from functools import partial
+from itertools import pairwise
 from math import prod
 from typing import Any
 
@@ -12,6 +16,7 @@ import numpy as np
 from .. import _checks, _core, engine
 from .._brief import share
 from .._checks import Array
+from .._interrupts import POLL, available
 from .._value import Value
 from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
@@ -24,7 +29,6 @@ from ..reference.bits import and_bits, less, where
 from ..reference.functions.operations import NOT_SIGN, sqrt
 from ..reference.log import log
 from ..reference.trig import cos
-from ..reference.types import Blocks
 from ..stability import maps
 from ..stability.analysis import velocities
 from ..systems import System
@@ -36,6 +40,10 @@ EVERY = 10
 
 #: The most operations of a step, about, before it is differentiated: as many as of a step by a series.
 MAX_OPERATIONS = 100_000
+
+#: Operations of a thread between two orthonormalisations, from which on it is worthwhile; and those that are made without looking
+#: for an interruption.
+OPERATIONS_OF_A_THREAD, OPERATIONS_AT_ONCE = 2_000_000, 1 << 26
 
 #: The most operations of a tape on which all vectors of a member are together.
 MAX_TOGETHER = 20_000
@@ -112,6 +120,7 @@ def lyapunov(
     t0: float = 0.0,
     tolerance: Any = None,
     at: Any = None,
+    threads: int | None = None,
 ) -> Lyapunov:
     """Lyapunov exponents of a motion, or of a batch: the mean rates at which small disturbances of it grow.
 
@@ -140,6 +149,7 @@ def lyapunov(
         tolerance: as in ``integrate``, a number or a pair (relative, absolute), for methods with an ``error_order`` and series.
         at: with a tolerance, the times of the orthonormalisations, ascending, after t0, near enough that vectors do not become
             parallel in between.
+        threads: how many threads share the members; None for as many as are worthwhile.
 
     Returns:
         ``Lyapunov``: ``exponents`` of shape (k, *batch), and their history.
@@ -157,6 +167,7 @@ def lyapunov(
         -0.2
     """
     given: dict[str, Any] = {"exponents": exponents, "transient": transient, "t0": t0, "keep_history": True}
+    given["threads"] = None if threads is None else _checks.count("threads", threads, 1, 4096)
     if tolerance is not None or at is not None:
         if wrong := [name for name, value in (("steps", steps), ("every", every)) if value is not None]:
             raise ArgumentError(f"{', '.join(wrong)}: goes with fixed steps only, and tolerance= or at= was given")
@@ -184,6 +195,7 @@ def averages(
     every: int | None,
     t0: float,
     keep_history: bool,
+    threads: int | None,
     look: Callable[[], object] = lambda: None,
 ) -> Lyapunov:
     """``lyapunov`` by fixed steps, without a warning.
@@ -207,19 +219,28 @@ def averages(
     noted = -(-steps // every) if keep_history else 1
     _checks.fits("the exponents over time", noted * k + 6 * n * (k + 1), members, "take fewer steps, or a larger every=")
     v, y = maps.spread(v, system.v_shape, members), maps.spread(y, system.y_shape, members)
-    motion = _Motion(system, how, dt, t0, k, v, y, members)
-    for first in range(0, transient, every):
-        motion.go(min(every, transient - first))
-        look()
-    motion.grown[...] = 0.0
-    history = np.empty((noted, k, *members))
-    for first in range(0, steps, every):
-        end = min(first + every, steps)
-        motion.go(end - first)
-        history[first // every if keep_history else 0] = motion.grown / (end * dt)
-        look()
-    v, y = motion.state()
+    tapes, count = _Tapes(system, how, k), prod(members)
+    motions = _motions(tapes, engine.Plan(system, how, members, dt, t0), v, y, tapes.shares(count, every, threads))
+    history = np.empty((noted, k, count))
+
+    def average(motion: _Motion, some: slice, look: Callable[[], object]) -> None:
+        for first in range(0, transient, every):
+            motion.go(min(every, transient - first), look)
+        motion.grown[...] = 0.0
+        for first in range(0, steps, every):
+            end = min(first + every, steps)
+            motion.go(end - first, look)
+            history[first // every if keep_history else 0][:, some] = motion.grown / (end * dt)
+
+    if len(motions) == 1:
+        average(*motions[0], look)
+    else:
+        _in_threads([partial(average, *each) for each in motions])
+    states = np.concatenate([motion.state() for motion, _ in motions], axis=1)
+    n_v = maps.size(system)[0]
+    v, y = states[:n_v].reshape((*system.v_shape, *members)), states[n_v:].reshape((*system.y_shape, *members))
     ends = np.minimum(every * np.arange(1, noted + 1), steps) if keep_history else np.array([steps])
+    history = history.reshape((noted, k, *members))
     return Lyapunov(system, how, dt, t0 + (transient + ends) * dt, _in_order(history[-1]), history, v, y)
 
 
@@ -235,6 +256,7 @@ def adaptive_averages(
     transient: int,
     t0: float,
     keep_history: bool,
+    threads: int | None,
     dt: Any = None,
     max_steps: int | None = None,
     look: Callable[[], object] = lambda: None,
@@ -252,14 +274,13 @@ def adaptive_averages(
     n_v, n_y = maps.size(system)
     n = n_v + n_y
     k = _how_many(exponents, n)
-    members = together(system, v, y)
+    of_steps = (dt, *(tolerance if isinstance(tolerance, tuple) else (tolerance,)))
+    arrays = {f"tolerance[{i - 1}]" if i else "dt": each for i, each in enumerate(of_steps) if isinstance(each, np.ndarray)}
+    members = together(system, v, y, **arrays)
     noted = len(times) - transient if keep_history else 1
     _checks.fits("the exponents over time", noted * k + 12 * n * (k + 1), members, "take fewer times")
     count = prod(members)
-    wanted = [
-        np.broadcast_to(part, members).reshape(count) if isinstance(part, np.ndarray) and part.ndim else part
-        for part in (tolerance if isinstance(tolerance, tuple) else (tolerance,))
-    ]
+    asked = [_of_members(each, members) for each in of_steps]
     both = ((v, system.v_shape), (y, system.y_shape))
     states = np.concatenate([maps.spread(block, shape, members).reshape(prod(shape), count) for block, shape in both])
     vectors = np.array(np.broadcast_to(_orthonormal(_generic(n, k))[0][:, :, np.newaxis], (n, k, count)))
@@ -272,9 +293,10 @@ def adaptive_averages(
         longest[going] = np.maximum(longest[going], np.sqrt((states[n_v:, going] ** 2).sum(axis=0)))
         unit = np.where(longest[going] > 0.0, longest[going], 1.0)
         beside = np.concatenate([states[n_v:, going], (unit * vectors[..., going]).reshape(n * k, -1)])
-        parts = [part[going] if isinstance(part, np.ndarray) and part.ndim else part for part in wanted]
-        asked: dict[str, Any] = {"tolerance": tuple(parts) if len(parts) > 1 else parts[0], "dt": dt, "max_steps": max_steps}
-        run, dt = integrate(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **asked), None
+        first, *parts = (each(going) for each in asked)
+        given: dict[str, Any] = {"tolerance": tuple(parts) if isinstance(tolerance, tuple) else parts[0]}
+        given |= {"dt": first if i == 0 else None, "max_steps": max_steps, "threads": threads}
+        run = integrate(left, how, v=states[:n_v, going], y=beside, t0=begin, at=[end], **given)
         states[:, going] = np.concatenate([run.v[-1], run.y[-1, :n_y]])
         vectors[..., going], lengths = _orthonormal(run.y[-1, n_y:].reshape(n, k, -1) / unit)
         grown[:, going] += _log(lengths)
@@ -301,73 +323,142 @@ def _start(system: System, method: Method, v: Any, y: Any) -> tuple[System, Arra
     return system, v, _checks.block("y", y, system.y_shape, system.axes)
 
 
+def _of_members(value: Any, members: tuple[int, ...]) -> Callable[[Any], Any]:
+    """Of some members, by their numbers in a row: a part of an array over the batch, or what is for all of them."""
+    if not isinstance(value, np.ndarray):
+        return lambda _some: value
+    wide = np.broadcast_to(value, members).reshape(-1)
+    return lambda some: wide[some]
+
+
 def _in_order(exponents: Array) -> Array:
     """The largest first, shape (k, *members)."""
     return np.take_along_axis(exponents, np.argsort(-exponents, axis=0, kind="stable"), axis=0)
 
 
+class _Tapes:
+    """A step and its derivative along vectors, and what makes the vectors orthonormal.
+
+    All vectors of a member are on one tape, so that the state is stepped once for all of them, and another tape makes them
+    orthonormal. Where that is too long, each vector is stepped beside a copy of the state, and NumPy makes them orthonormal.
+
+    Attributes:
+        n: how many numbers a state has.
+        k: how many vectors there are.
+        together: whether they are on one tape.
+        operations: about how many a step has, of a member with all its vectors.
+    """
+
+    def __init__(self, system: System, method: Method, k: int) -> None:
+        traced = Traced(system, "step", method)
+        self.n, self.k = traced.length, k
+        self.together = k == 1 or k * len(traced.tape) + 8 * k * k * self.n <= MAX_TOGETHER
+        following = traced.along(k if self.together else 1)
+        self.step = traced.tape.equations([], following)
+        self.operations = len(traced.tape) * (1 if self.together else k)
+        if self.together:
+            tape, following = _orthonormalisation(self.n, k)
+            self.orthonormalise = tape.equations([], following)
+
+    def shares(self, members: int, every: int, threads: int | None) -> int:
+        """Among how many threads the members are shared; None for as many as are worthwhile."""
+        if threads is None:
+            threads = min(available(), int(members * every * self.operations // OPERATIONS_OF_A_THREAD))
+        return max(1, min(threads, members))
+
+
 class _Motion:
     """States and their disturbances, while the core steps them.
 
-    A step and its derivative are one tape. All vectors of a member are on it, so that the state is stepped once for all of them,
-    and another tape makes them orthonormal. Where that is too long, each vector is stepped beside a copy of the state, and NumPy
-    makes them orthonormal.
-
     Attributes:
-        grown: the sum of the logarithms of the growth of each vector, shape (k, *members).
+        grown: the sum of the logarithms of the growth of each vector, shape (k, members).
     """
 
-    def __init__(
-        self, system: System, method: Method, dt: float, t0: float, k: int, v: Array, y: Array, members: tuple[int, ...]
-    ) -> None:
-        self.system, self.members = system, members
-        traced = Traced(system, "step", method)
-        n = traced.length
-        self.together = k == 1 or k * len(traced.tape) + 8 * k * k * n <= MAX_TOGETHER
-        beside = k if self.together else 1
+    def __init__(self, tapes: _Tapes, plan: engine.Plan, v: Array, y: Array) -> None:
+        self.tapes = tapes
+        n, k, count = tapes.n, tapes.k, plan.members
+        system, method = plan.system, plan.method
         with np.errstate(all="ignore"):
-            slot = method.steps.start(system.scaled(dt, members), 0, t0, v, y) if method.carry else v
+            slot = method.steps.start(system.scaled(plan.dt, plan.batch), 0, plan.t0, v, y) if method.carry else v
+        start = np.concatenate(
+            [
+                np.broadcast_to(each, (*shape, *plan.batch)).reshape(-1, count)
+                for each, shape in ((slot, system.v_shape), (y, system.y_shape))
+            ]
+        )
         # One axis before the members: vector after vector. A unit vector might lie in a direction that never grows: at a turning
         # point, a change of the velocity is one along the motion.
-        start = _orthonormal(_generic(n, k))[0].reshape(n, k, *(1,) * len(members))
-        lanes = members if self.together else (k, *members)
-        numbers = np.empty((n + n * k + k, *members) if self.together else (2 * n, *lanes))
-        self.slots = numbers[:n]
-        for i, row in enumerate(traced.rows(slot, y)):
-            self.slots[i] = row
-        self.vectors = numbers[n : n + n * beside].reshape(n, k, *members)
-        self.vectors[...] = start
-        self.grown = numbers[n + n * k :] if self.together else np.empty((k, *members))
-        self.grown[...] = 0.0
-        plan = engine.Plan(system, method, lanes, dt, t0)
-        self.step = _world(plan, traced.tape, traced.along(beside), numbers[: n + n * beside])
-        if self.together:
-            self.orthonormalise = _world(plan, *_orthonormalisation(n, k), numbers[n:])
+        vectors = _orthonormal(_generic(n, k))[0][:, :, np.newaxis]
+        if tapes.together:
+            numbers = np.empty((n + n * k + k, count))
+            self.slots, self.vectors = numbers[:n], numbers[n : n + n * k].reshape(n, k, count)
+            self.slots[...], self.grown = start, numbers[n + n * k :]
+            self._step = _world(plan, tapes.step, numbers[: n + n * k])
+            self._orthonormalise = _world(plan, tapes.orthonormalise, numbers[n:])
+        else:
+            numbers = np.empty((2 * n, k, count))
+            numbers[:n] = start[:, np.newaxis]
+            self.slots, self.vectors, self.grown = numbers[:n, 0], numbers[n:], np.empty((k, count))
+            self._step = _world(plan._replace(batch=(k, *plan.batch)), tapes.step, numbers)
+        self.vectors[...], self.grown[...] = vectors, 0.0
+        self._at_once = max(1, OPERATIONS_AT_ONCE // (count * tapes.operations))
 
-    def go(self, steps: int) -> None:
-        """Make a number of steps; then make the vectors orthonormal, and note their growth."""
-        self.step.step(steps)
-        if self.together:
-            self.orthonormalise.step(1)
+    def go(self, steps: int, look: Callable[[], object]) -> None:
+        """Make a number of steps; then make the vectors orthonormal, and note their growth. Look now and then."""
+        for first in range(0, steps, self._at_once):
+            self._step.step(min(self._at_once, steps - first))
+            look()
+        if self.tapes.together:
+            self._orthonormalise.step(1)
         else:
             self.vectors[...], lengths = _orthonormal(self.vectors)
             self.grown += _log(lengths)
 
-    def state(self) -> Blocks:
-        """The velocities, or what the method carries in their place, and the coordinates."""
-        slots = self.slots if self.together else self.slots[:, 0]
-        n_v = maps.size(self.system)[0]
-        return (
-            slots[:n_v].reshape((*self.system.v_shape, *self.members)).copy(),
-            slots[n_v:].reshape((*self.system.y_shape, *self.members)).copy(),
-        )
+    def state(self) -> Array:
+        """The velocities, or what the method carries in their place, and the coordinates, shape (n, members)."""
+        return self.slots.copy()
 
 
-def _world(plan: engine.Plan, tape: _core.Tape, following: list[_core.Symbol], numbers: Array) -> _core.World:
-    """What makes this step of these numbers, in place: the values on the tape follow the state."""
+def _motions(tapes: _Tapes, plan: engine.Plan, v: Array, y: Array, shares: int) -> list[tuple[_Motion, slice]]:
+    """The motions of all members in so many shares, and which members these are, in a row."""
+    count = plan.members
+    if shares == 1:
+        return [(_Motion(tapes, plan, v, y), slice(0, count))]
+    whole, edges = Members(plan), [count * i // shares for i in range(shares + 1)]
+    v, y = (block.reshape((*block.shape[: block.ndim - len(plan.batch)], count)) for block in (v, y))
+    parts = [slice(*each) for each in pairwise(edges)]
+    return [(_Motion(tapes, whole.plan(np.arange(count)[some]), v[..., some], y[..., some]), some) for some in parts]
+
+
+def _world(plan: engine.Plan, step: _core.Equations, numbers: Array) -> _core.World:
+    """What makes this step of these numbers, in place."""
     given = plan.system.parameters(plan.batch, series=plan.method.has_series)
-    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*given, ("step()", tape.equations([], following))])
+    model = _core.ModelSpec(plan.system.kernel, plan.method.name, [*given, ("step()", step)])
     return _core.World(model, plan, np.empty(0), numbers.reshape(-1))
+
+
+class _Stopped(Exception):  # noqa: N818 (not an error)
+    """Another thread was interrupted, or failed."""
+
+
+def _in_threads(works: Sequence[Callable[[Callable[[], object]], None]]) -> None:
+    """Do each by a thread of its own; after Ctrl-C, or an error, the others end when they look."""
+    stop = threading.Event()
+
+    def look() -> None:
+        if stop.is_set():
+            raise _Stopped
+
+    pool = ThreadPoolExecutor(len(works), thread_name_prefix="lyapunov")
+    try:
+        left = {pool.submit(work, look) for work in works}
+        while left:
+            done, left = wait(left, timeout=POLL, return_when=FIRST_EXCEPTION)
+            for each in done:
+                each.result()
+    finally:
+        stop.set()
+        pool.shutdown(wait=True)
 
 
 def _orthonormalisation(n: int, k: int) -> tuple[_core.Tape, list[_core.Symbol]]:

@@ -58,7 +58,7 @@ class Exponents(Outcome):
 
         if refused := [name for name in ("control", "dtype", "force", "fused", "start") if given.get(name)]:
             raise ArgumentError(f"{', '.join(refused)}: goes without Lyapunov exponents, which are those of plain steps")
-        more: dict[str, Any] = {"exponents": self.exponents, "t0": given["t0"], "keep_history": False, "look": look}
+        more: dict[str, Any] = {"exponents": self.exponents, "t0": given["t0"], "keep_history": False, "look": look, "threads": 1}
         v, y, dt = given.get("v"), given["y"], given.get("dt")
         if at is None:
             found = averages(system, method, v, y, dt, steps, transient=transient, every=self.every, **more)
