@@ -27,7 +27,7 @@ def available() -> int:
 def heard(operations: float, function: Callable[..., Result], *arguments: Any) -> Result:
     """The result of a function of NumPy that makes about so many operations without looking for signals.
 
-    A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends, since
+    A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends:
     nothing can stop it.
     """
     if operations < FEW_OPERATIONS or threading.current_thread() is not threading.main_thread():
