@@ -145,7 +145,8 @@ def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
 def test_the_peak_is_what_was_counted(run: str) -> None:
     """As it was counted, within a tenth, and 24 MB for what does not depend on the number of states: kernels, threads, imports.
 
-    Of three bodies the energy is counted beside the states; of the matrix form the matrix is, before them. The peak without the run is that of a run of few states.
+    Of three bodies the energy is counted beside the states; of the matrix form the matrix is, before them.
+    The peak without the run is that of a run of few states.
     """
     said = aside(f"""
         counted = []

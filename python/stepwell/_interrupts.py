@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from contextvars import copy_context
 from typing import Any, TypeVar
 
@@ -15,6 +16,18 @@ FEW_OPERATIONS = 1e7
 
 #: How often it is asked whether the computation has ended, in seconds.
 POLL = 0.02
+
+
+#: Computations that were interrupted, and the one that is being waited for.
+_unfinished: list[threading.Thread] = []
+
+
+def _wait_for(worker: threading.Thread) -> None:
+    """Until it has ended; Ctrl-C is heard."""
+    while worker.is_alive():
+        worker.join(POLL)
+    with suppress(ValueError):  # another thread may have waited too
+        _unfinished.remove(worker)
 
 
 def available() -> int:
@@ -28,8 +41,11 @@ def heard(operations: float, function: Callable[..., Result], *arguments: Any) -
     """The result of a function of NumPy that makes about so many operations without looking for signals.
 
     A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends:
-    nothing can stop it.
+    nothing can stop it. The next computation, and the end of the process, wait for that: OpenBLAS may never end if several
+    threads call it, or if it is left in the middle.
     """
+    for before in tuple(_unfinished):
+        _wait_for(before)
     if operations < FEW_OPERATIONS or threading.current_thread() is not threading.main_thread():
         return function(*arguments)
     results: list[Result] = []
@@ -42,10 +58,10 @@ def heard(operations: float, function: Callable[..., Result], *arguments: Any) -
             errors.append(error)
 
     copied = copy_context()  # with NumPy's treatment of errors
-    worker = threading.Thread(target=compute, daemon=True)
+    worker = threading.Thread(target=compute)
     worker.start()
-    while worker.is_alive():
-        worker.join(POLL)
+    _unfinished.append(worker)
+    _wait_for(worker)
     if errors:
         raise errors[0]
     return results[0]
