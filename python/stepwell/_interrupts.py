@@ -41,8 +41,8 @@ def heard(operations: float, function: Callable[..., Result], *arguments: Any) -
     """The result of a function of NumPy that makes about so many operations without looking for signals.
 
     A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends:
-    nothing can stop it. The next computation, and the end of the process, wait for that: OpenBLAS may never end if several
-    threads call it, or if it is left in the middle.
+    nothing can stop it. The next computation, and the end of the process, wait for that: two at once would wait for each other's
+    cores, a hundred times as long.
     """
     for before in tuple(_unfinished):
         _wait_for(before)
