@@ -18,6 +18,7 @@ import xarray
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.sweeps import axes as of_axes
 from stepwell.sweeps import crossings, observed, outcomes
+from stepwell.sweeps.task import Stopped
 from sweeping import AXES, OUTCOMES, duffing, power, small, unlike
 
 Oscillator = sw.Oscillator
@@ -286,6 +287,19 @@ def test_periods(memory: float) -> None:
     assert (abs(found.y_period.values - period) < bound).all()
     wrong = found.y_period.values * n / (n + 1)  # as many intervals as passages
     assert (abs(wrong - period) > bound).all()
+
+
+def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
+    """As at Ctrl-C: of a chunk that would take days, in a thread that no signal reaches."""
+    start, calls = {"v": 0.0, "y": np.ones(1000), "dt": 0.1, "t0": 0.0}, []
+
+    def look() -> None:
+        calls.append(None)
+        if len(calls) == 5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        sw.sweeps.Exponents(every=20).of_start(sw.Pendulum(), "rk4", start, 40, 10**12, look)
 
 
 def test_lyapunov_exponents_are_those_of_lyapunov() -> None:

@@ -374,7 +374,12 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "lyapunov": (
         sw.lyapunov,
         {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 4, "exponents": "all"}
-        | {"transient": 2, "every": 2, "t0": 0.0},
+        | {"transient": 2, "every": 2, "t0": 0.0, "threads": 1},
+    ),
+    "lyapunov with a tolerance": (
+        sw.lyapunov,
+        {"system": sw.Pendulum(), "method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0], "exponents": 1}
+        | {"transient": 1, "t0": 0.0, "dt": 0.1},
     ),
     "load": (sw.load, {"path": SAVED, "system": None}),
     "load own": (sw.load, {"path": SAVED_OWN, "system": own.pendulum}),

@@ -66,6 +66,9 @@ class ModelSpec:
     ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
 
     ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length.
+
+    Operations that are given as ``step()`` make the step in place of the method: their rates are the next numbers of the state,
+    and their parameters are those of the system.
     """
 
     def __new__(
@@ -264,6 +267,9 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
+
+def operations(model: ModelSpec) -> int:
+    """About how many operations a step of fixed length has, before any is traced."""
 
 def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
     """To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
+from .. import _checks, _core
 from .._checks import Array
 from ..reference import run as reference
 from ..reference.types import Blocks, Whole
@@ -17,6 +17,16 @@ from ..systems import Sampled
 from ..systems.base import flat
 from .direct import Looped, advance, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import Outcome, Plan
+
+#: Numbers that are kept at a time for each element of the matrix: unit vectors, their states after a step, what the core makes of
+#: them; and of powers one that is squared, one that is made, and their product.
+NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
+
+
+def _fits(plan: Plan, numbers: int) -> None:
+    """Raise if there is no memory for transition matrices."""
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    _checks.fits(f"the transition matrices of {n} × {n} numbers", float(numbers) * n * n, plan.batch, "use form='direct'")
 
 
 def transition(plan: Plan) -> Array:
@@ -79,6 +89,7 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """The run by the transition matrix, step by step."""
+    _fits(plan, NUMBERS_OF_AN_ELEMENT)
     given = plan.system.given_inputs()
     p, q = transition(plan), pulses(plan, given)
     q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
@@ -162,6 +173,7 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     def wide(array: Array) -> Array:
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
+    _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
     given = plan.system.given_inputs()
     inputs = [
         Constant(wide(each.values[0]))

@@ -44,6 +44,17 @@ def in_a_row(values: Array, own: int | None, batch: Shape) -> Array:
     return np.broadcast_to(wide, (*values.shape[:own], *batch)).reshape((*values.shape[:own], -1))
 
 
+def for_batch(given: dict[str, Any], batch: Shape) -> dict[str, Any]:
+    """Parameters with one batch axis, for a batch of which that is the last."""
+    if len(batch) == 1:
+        return given
+
+    def wide(values: Array, own: int | None) -> Array:
+        return values.reshape((*values.shape[:-1], *(1,) * (len(batch) - 1), values.shape[-1]))
+
+    return {name: each(value, wide) for name, value in given.items()}
+
+
 class Members:
     """All members of a plan, of which some can be taken.
 
@@ -86,8 +97,8 @@ class Members:
         complete(
             taken,
             batch=batch,
-            given=lambda _batch: given,
-            given_contacts=lambda _batch: contacts,
+            given=lambda wanted: for_batch(given, wanted),
+            given_contacts=lambda wanted: for_batch(contacts, wanted),
             control=control,
             rubbing=None if self._rubbing is None else some(self._rubbing),
         )

@@ -98,7 +98,7 @@ class Analysis(Value):
         else:
             true = eigen.eigen(A)
             found = eigen.eigen(P, eigen.slot_units(finish, true.units))
-            exact = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), true)
+            exact = eigen.matched(found.values, eigen.product("ij...,jk...->ik...", finish, found.own), true)
             z, tolerances, single_vector = eigen.settled(found)
             if system.linear and n <= MAX_ROWS:
                 doubtful = (found.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
@@ -182,7 +182,7 @@ class Analysis(Value):
             raise ArgumentError(f"monodromy: expected a run of which every step was saved (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
         for k in range(1, self._run.steps):  # the last saved state makes no step in the run
-            product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
+            product = eigen.product("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
     def plot(self, path: str | Path | None = None) -> Figure:

@@ -129,10 +129,8 @@ def _one_for_all(tolerance: Any) -> Any:
 def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
     for each in outcomes:
         name = type(each).__name__
-        if isinstance(each, Exponents):
-            raise UnsupportedError(
-                "outcomes: Exponents: Lyapunov exponents are those of fixed steps; give dt= and steps= in place of tolerance="
-            )
+        if isinstance(each, Exponents) and each.transient >= times.size:
+            raise ArgumentError(f"transient: expected fewer intervals than at has times, {times.size}, got {each.transient}")
         if each.observes and times.size < 2:
             raise ArgumentError(
                 f"at: expected two or more times, since with a tolerance {name} sees the states at these times and no others, "

@@ -101,7 +101,7 @@ class Task(NamedTuple):
             numbers += 2 * saved * state
         for each in self.kinds(Exponents):
             k = state if each.exponents == "all" else int(each.exponents)
-            numbers += k * (self.steps // each.every + 10 * state)
+            numbers += (6 if self.at is None else 12) * state * (k + 1) + 4 * k
         return numbers
 
     def most_members(self, system: System) -> int:
@@ -159,8 +159,8 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
             last, reduced = _reduced(task, system, start, members, stopped)
             parts += reduced
         for each in task.kinds(Exponents):
-            _stop(stopped)
-            parts.append(each.of_start(system, task.method, given, task.transient, task.steps))
+            look = partial(_stop, stopped)
+            parts.append(each.of_start(system, task.method, given, task.transient, task.steps, look, task.at))
     status = Variable((), np.array(last.status), "how the member ended")
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)

@@ -24,7 +24,10 @@ use crate::{
     series_pace,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
-    systems::linear::products,
+    systems::{
+        equations::{Equations, next_state},
+        linear::products,
+    },
     tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
     watch,
 };
@@ -50,6 +53,8 @@ pub enum How {
         /// Whether the time of the run is that of the system, negated.
         backward: bool,
     },
+    /// A step that is given as operations.
+    Step(Arc<Equations>),
     /// The transition-matrix form (Appendix B): s ← P·s + Σ Q·u, with the inputs at these nodes, by the bits of each.
     Matrix {
         /// Times of the inputs, as fractions of a step, by their bits.
@@ -168,6 +173,7 @@ pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
             let (n, v) = (given.whole("n"), given.whole("n_v").min(given.whole("n")));
             Ok(Shape { v, y: n - v })
         }
+        How::Step(step) => step.fit(given),
         How::Method { name, .. } | How::Attempts { name, .. } => kind(given)?.fit(given, method(name)?),
     }
 }
@@ -195,6 +201,14 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
     match how {
         How::Matrix { nodes } => {
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
+            Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
+        }
+        How::Step(step) => {
+            let (tape, next) = record(tape, || {
+                let p = parameters(given, Symbol::new(Op::Step));
+                let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+                ids([&next_state(step, &p, Symbol::new(Op::Time), &v, &y)])
+            });
             Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
         }
         How::Method { name, choice } => {
@@ -420,7 +434,7 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let unknown = || Error::Options { system: given.system.clone(), options: format!("trace {what} {which}") };
     let name = match how {
         How::Method { name, .. } | How::Attempts { name, .. } => name.as_str(),
-        How::Matrix { .. } => "",
+        How::Step(_) | How::Matrix { .. } => "",
     };
     let choice = which.parse().unwrap_or(0);
     match what {
@@ -455,6 +469,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let products = n * (n + given.whole("inputs") * nodes.len());
             (2 * products, 2 * products)
         }
+        How::Step(step) => (step.operations(), step.operations()),
         How::Method { name, .. } | How::Attempts { name, .. } => {
             let rates = (kind(given)?.operations)(given);
             let method = method(name)?;
@@ -478,7 +493,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
 fn has_series(how: &How) -> Result<bool, Error> {
     Ok(match how {
         How::Method { name, .. } | How::Attempts { name, .. } => method(name)?.program().series_order() > 0,
-        How::Matrix { .. } => false,
+        How::Step(_) | How::Matrix { .. } => false,
     })
 }
 
@@ -524,7 +539,7 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            let most = if series { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            let most = if series || matches!(self.how, How::Step(_)) { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
             Ok((traced, operations.1.min(most)))
         })
     }

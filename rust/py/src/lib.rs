@@ -364,6 +364,14 @@ fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
 }
 
+/// About how many operations a step has: see `_core.pyi`.
+#[pyfunction]
+fn operations(py: Python<'_>, model: &ModelSpec) -> PyResult<usize> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let traced = model.model(model.started(0), &rows, &tables)?.traced().map_err(core_error)?;
+    Ok(traced.operations.1)
+}
+
 /// To how many function evaluations a step with a series is equal: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, *, attempts=false))]
@@ -467,6 +475,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
+    m.add_function(wrap_pyfunction!(operations, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
     m.add_function(wrap_pyfunction!(forget, m)?)?;

@@ -20,6 +20,8 @@ use stepwell_core::{
 
 /// The name of quantities whose changes of sign are noticed.
 const WATCHED: &str = "watched()";
+/// The name of a step that is given as operations.
+const STEP: &str = "step()";
 
 /// A message as an argument error of the package.
 pub fn argument_error(message: String) -> PyErr {
@@ -174,7 +176,7 @@ impl ModelSpec {
         backward: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
-        let (mut rows, mut tables) = (Vec::new(), Vec::new());
+        let (mut rows, mut tables, mut step) = (Vec::new(), Vec::new(), None);
         for (name, value) in given {
             match value {
                 Value::Word(word) => names.words.push((name, word)),
@@ -187,6 +189,7 @@ impl ModelSpec {
                     rows.push(array);
                 }
                 Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
+                Value::Equations(next) if name == STEP => step = Some(next),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).shape()[1] == 1;
@@ -195,9 +198,10 @@ impl ModelSpec {
                 }
             }
         }
-        let how = match matrix {
-            None => How::Method { name: method, choice: 0 },
-            Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+        let how = match (matrix, step) {
+            (None, Some(step)) => How::Step(step),
+            (None, None) => How::Method { name: method, choice: 0 },
+            (Some((nodes, _)), _) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
         let acceptance =
             acceptance.map_or_else(Acceptance::default, |(groups, own, positive)| Acceptance { groups, own, positive });

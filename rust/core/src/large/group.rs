@@ -39,7 +39,7 @@ impl Courses {
         let (name, choice) = match how {
             How::Method { name, choice } => (name.as_str(), Some(*choice)),
             How::Attempts { name, .. } => (name.as_str(), None),
-            How::Matrix { .. } => ("", None), // it has no method, which the next line says
+            How::Step(_) | How::Matrix { .. } => ("", None), // it has no method, which the next line says
         };
         let method = method(name)?;
         let course = |program: Program| {

@@ -39,7 +39,7 @@ impl Matrix {
     pub fn new(spec: &Spec, shape: Shape, how: &How, level: Level, clock: &Clock) -> Matrix {
         let nodes: Vec<f64> = match how {
             How::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
-            How::Method { .. } | How::Attempts { .. } => Vec::new(), // not the matrix form: never called
+            How::Method { .. } | How::Attempts { .. } | How::Step(_) => Vec::new(), // not the matrix form: never called
         };
         let (n, count) = (shape.v + shape.y, spec.given.whole("inputs"));
         Matrix {
