@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
 import sys
 import warnings
 from dataclasses import replace
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import C_FLAGS, RUST_FLAGS, Journey, executed, missing, run, same
+from abroad import C_FLAGS, PATIENCE, RUST_FLAGS, Journey, executed, missing, run, same
 from cases import SYSTEMS, number
 from stepwell import _core
 from stepwell.exports.functions import FUNCTIONS, argument
@@ -454,12 +455,64 @@ def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path:
         assert not all(map(same, found, each.expected))
 
 
+#: Options that compute other numbers, and what the file says of them.
+OTHER_NUMBERS = {
+    "-ffast-math": "compile without -ffast-math",
+    "-Ofast": "compile without -ffast-math, -Ofast",
+    "-funsafe-math-optimizations": "compile without -fassociative-math and -funsafe-math-optimizations",
+    "-fassociative-math -fno-signed-zeros -fno-trapping-math": "compile without -fassociative-math",
+    "-freciprocal-math": "compile without -freciprocal-math",
+    "-fno-signed-zeros": "compile without -fno-signed-zeros",
+    "-ffinite-math-only": "compile without -ffinite-math-only",
+    "-fsingle-precision-constant": "needs_no_fsingle_precision_constant",
+    "-mfpmath=387": "compile with -msse2 -mfpmath=sse",
+    "-mfpmath=sse,387": "compile with -msse2 -mfpmath=sse",
+}
+
+
+def compiled(folder: Path, *flags: str) -> str:
+    """What the compiler complains of in ``step.c``; "unknown" if it has no such option."""
+    command = ["cc", *flags, "-S", "step.c", "-o", "step.s"]
+    told = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE).stderr
+    return "unknown" if re.search(r"(unrecognized|unknown|unsupported) .*|bad value|not valid for", told) else told
+
+
 @pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
-def test_flags_that_make_other_numbers_are_refused(tmp_path: Path) -> None:
-    sw.export(sw.Oscillator(), "rk4", "c", name="step").save(tmp_path / "step.c")
-    executed(["cc", "-O2", "-ffp-contract=off", "-c", "step.c"], tmp_path)
-    with pytest.raises(AssertionError, match="compile without -ffast-math"):
-        executed(["cc", "-O2", "-ffast-math", "-c", "step.c"], tmp_path)
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_flags_that_make_other_numbers_are_refused_by_name(dtype: str, tmp_path: Path) -> None:
+    sw.export(sw.Oscillator(), "rk4", "c", name="step", dtype=dtype).save(tmp_path / "step.c")  # type: ignore[arg-type]
+    assert not compiled(tmp_path)
+    for flags, said in OTHER_NUMBERS.items():
+        assert (told := compiled(tmp_path, *flags.split())) == "unknown" or said in told, flags
+
+
+@pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_every_way_of_evaluation_that_keeps_the_precision_is_taken(dtype: str, tmp_path: Path) -> None:
+    """FLT_EVAL_METHOD of C23: N widens what is narrower than _FloatN, to it; GCC says 16 where a CPU has _Float16."""
+    source = sw.export(sw.Oscillator(), "rk4", "c", name="step", dtype=dtype).source  # type: ignore[arg-type]
+    (tmp_path / "step.c").write_text(source, encoding="utf-8")
+    assert compiled(tmp_path, "-march=sapphirerapids") in ("", "unknown")
+    for method, taken in ((-1, ()), (0, ("float64", "float32")), (1, ("float64",)), (2, ()), (16, ("float64", "float32"))):
+        own = source.replace(
+            "#include <string.h>", f"#include <string.h>\n#undef FLT_EVAL_METHOD\n#define FLT_EVAL_METHOD {method}"
+        )
+        (tmp_path / "step.c").write_text(own, encoding="utf-8")
+        assert ("compile with -msse2" not in compiled(tmp_path)) == (dtype in taken), method
+
+
+@pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
+def test_no_product_is_fused_whatever_the_flags_say(tmp_path: Path) -> None:
+    """Compilers fuse products and sums by default where a CPU can; what stands behind the file is fused as the flags say."""
+    source = sw.export(sw.Oscillator(1.0, 0.1, form="physical"), "rk4", "c", name="step").source
+    (tmp_path / "step.c").write_text(source + "double fused(double x) { return x * x + 1.0; }\n", encoding="utf-8")
+    for contract in ([], ["-ffp-contract=fast"]):
+        if compiled(tmp_path, "-O2", "-mfma", *contract) == "unknown":
+            pytest.skip("this CPU has no such instruction")
+        step, user = (tmp_path / "step.s").read_text(encoding="utf-8").split("\nfused:")
+        assert "vmulsd" in step
+        assert "vfm" not in step
+        assert "vfm" in user
 
 
 def test_python_without_a_fused_multiply_add_says_so() -> None:

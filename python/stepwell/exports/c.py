@@ -10,17 +10,49 @@ from .written import Written
 TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double"}
 SINGLE_TYPES = {"number": "float", "truth": "int", "bits": "uint32_t", "wide": "double"}
 
+#: Values of FLT_EVAL_METHOD (C23, TS 18661-3) under which doubles, and floats, are computed in their own precision: 16, 32 and 64
+#: widen what is narrower than _Float16, float and double, and 1 widens floats to double.
+OWN_PRECISION = {"double": (0, 1, 16, 32, 64), "float": (0, 16, 32)}
+
 BEGIN = """
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math: it computes other numbers"
+// Options that compute other numbers.
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
+#error "compile without -ffast-math, -Ofast and /fp:fast: they compute other numbers"
+#elif defined(__ASSOCIATIVE_MATH__)
+#error "compile without -fassociative-math and -funsafe-math-optimizations: they compute other numbers"
+#elif defined(__RECIPROCAL_MATH__)
+#error "compile without -freciprocal-math: it computes other numbers"
+#elif defined(__NO_SIGNED_ZEROS__)
+#error "compile without -fno-signed-zeros: it computes other numbers"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "compile without -ffinite-math-only: it computes other numbers"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "compile for arithmetic in the precision of its numbers, on x86 with -msse2 -mfpmath=sse"
+#if defined(FLT_EVAL_METHOD) && ALL_OTHERS
+#error "compile with -msse2 -mfpmath=sse: -mfpmath=387 and -mfpmath=both compute a NUMBER in other precision than its own"
+#endif
+typedef char PREFIX_needs_no_fsingle_precision_constant[sizeof 0.1 == sizeof(double) ? 1 : -1];
+
+// No product is fused with a sum, whatever -ffp-contract says.
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+"""
+
+END = """
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__GNUC__)
+#pragma GCC pop_options
 #endif
 """
 
@@ -168,9 +200,14 @@ class C(Language):
         if w.evaluations:
             parts.append(self._work(w))
         functions = self.functions("\n".join(parts))
-        return "\n".join(head) + "\n" + BEGIN + "\n" + "\n\n".join([*functions, *parts]) + "\n"
+        return "\n".join(head) + "\n" + self._begin() + "\n" + "\n\n".join([*functions, *parts]) + "\n" + END
 
     # ---- parts of it
+
+    def _begin(self) -> str:
+        number = self.types["number"]
+        others = " && ".join(f"FLT_EVAL_METHOD != {each}" for each in OWN_PRECISION[number])
+        return BEGIN.replace("ALL_OTHERS", others).replace("NUMBER", number).replace("PREFIX", self.prefix)
 
     def _structures(self, w: Written) -> str:
         p = self.prefix
