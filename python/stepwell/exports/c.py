@@ -115,7 +115,7 @@ class C(Language):
 
     title = "C"
     endings = (".c", ".h")
-    infinity, root, floor, fma = "INFINITY", "sqrt", "floor", "fma"
+    infinity, root, floor, magnitude, fma = "INFINITY", "sqrt", "floor", "fabs", "fma"
     bits_literal = "UINT64_C({})"
     truths = ("0", "1")
     me = "m->"
@@ -125,6 +125,7 @@ class C(Language):
     of_single: ClassVar[dict[str, Any]] = {
         "root": "sqrtf",
         "floor": "floorf",
+        "magnitude": "fabsf",
         "fma": "fmaf",
         "bits_literal": "UINT32_C({})",
         "time": "(float)(m->t0 + (double)s->step * (double)m->dt)",
@@ -143,6 +144,10 @@ class C(Language):
     def declare(self, line: Assignment, note: str) -> str:
         """A value that gets a name."""
         return f"const {self.types[line.kind]} {line.name} = {line.text};{note}"
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"{self.types[line.kind]} {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
 
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""

@@ -73,9 +73,10 @@ class JavaScript(Language):
     title = "JavaScript"
     array = "Float64Array"
     endings = (".js", ".mjs")
-    infinity, root, floor, fma = "Infinity", "Math.sqrt", "Math.floor", None
+    infinity, root, floor, magnitude, fma = "Infinity", "Math.sqrt", "Math.floor", "Math.abs", None
     bits_literal = "{}n"
     me = "this."
+    step_in = "  "
     time = "this.t0 + s.step * this.dt"
     helpers: ClassVar[dict[str, str]] = {
         "number": VIEWS,
@@ -126,6 +127,10 @@ class JavaScript(Language):
     def declare(self, line: Assignment, note: str) -> str:
         """A value that gets a name."""
         return f"const {line.name} = {line.text};{note}"
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"let {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
 
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""

@@ -82,7 +82,7 @@ class Python(Language):
     title = "Python"
     endings = (".py",)
     comment = "#"
-    infinity, root, floor, fma = "math.inf", "square_root", "floor", "fused"
+    infinity, root, floor, magnitude, fma = "math.inf", "square_root", "floor", "abs", "fused"
     bits_literal = "{}"
     truths = ("False", "True")
     words = ("not ", "and", "or")
@@ -135,6 +135,15 @@ class Python(Language):
     def declare(self, line: Assignment, note: str) -> str:
         """A value that gets a name."""
         return f"{line.name} = {line.text}{' ' if note else ''}{note}"
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [self.declare(line, note)] * bool(line.text)
+
+    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
+        """What is computed if something holds, and if not."""
+        behind = ["else:", *indented(other)] if other else []
+        return [f"if {condition}:", *indented(then), *behind]
 
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""

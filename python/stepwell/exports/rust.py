@@ -57,7 +57,7 @@ class Rust(Language):
 
     title = "Rust"
     endings = (".rs",)
-    infinity, root, floor, fma = "f64::INFINITY", "f64::sqrt", "f64::floor", "f64::mul_add"
+    infinity, root, floor, magnitude, fma = "f64::INFINITY", "f64::sqrt", "f64::floor", "f64::abs", "f64::mul_add"
     bits_literal = "{}u64"
     me = "self."
     time = "self.t0 + s.step as f64 * self.dt"
@@ -67,6 +67,7 @@ class Rust(Language):
         "infinity": "f32::INFINITY",
         "root": "f32::sqrt",
         "floor": "f32::floor",
+        "magnitude": "f32::abs",
         "fma": "f32::mul_add",
         "bits_literal": "{}u32",
         "time": "(self.t0 + s.step as f64 * self.dt as f64) as f32",
@@ -81,6 +82,14 @@ class Rust(Language):
     def choice(self, truth: object, a: object, b: object) -> str:
         """One of two values."""
         return f"if {truth.text} {{ {a.text} }} else {{ {b.text} }}"  # type: ignore[attr-defined]
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"let mut {line.name} = {line.text};{note}" if line.text else f"let {line.name};{note}"]
+
+    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
+        """What is computed if something holds, and if not."""
+        return [f"if {condition} {{", *super().conditional(condition, then, other)[1:]]
 
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""

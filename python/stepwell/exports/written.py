@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from math import prod
 from typing import NamedTuple
 
 from ..engine import pushes
 from ..explanation.formula import Formula
 from ..explanation.listing import Leaf, Line, Writer
-from .language import Assignment, Function, Language, Place
+from .branches import Branched
+from .language import Assignment, Function, Language, Place, Statement, texts
 from .names import Field, Names, fields
+from .statements import Statements
 from .tapes import STATE, STEP, TALLY, Operations, Part, Traced
 
 #: Names in use in a function: its arguments and the time.
@@ -18,10 +19,6 @@ LOCALS = ("m", "s", "t", "self", "coordinates", "velocities")
 
 #: Names that fields may not have, because something else of the object has them.
 MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "constructor", "prototype")
-
-
-#: Values that are named after a rate evaluation: the state at which it is made, and the increments.
-EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
 
 class Table(NamedTuple):
@@ -164,12 +161,18 @@ class Written:
         of_time = sorted(each for each in read if rank[each] == STEP and operations.all[each][1])
         writer = Writer(tape, part.names, language)
         before, entries = writer.section("step", operations.body(of_time, made, separate=False), leaf, 3, "s")
+        of_time_lines = [self._assignment(line) for line in before.lines]
         leaves = made | {line: ("entry", i) for i, line in enumerate(of_time)}
-        body = operations.body(part.roots, leaves, separate=True)
-        after, _ = writer.section("member step", body, leaf, 4, "a", part.results)
-        of_time_lines, lines = ([self._assignment(line) for line in section.lines] for section in (before, after))
+        branched = Branched(operations.all, part.roots, leaves, language.all_bits)
+        lines: list[Statement]
+        if branched.is_straight:
+            body = operations.body(part.roots, leaves, separate=True)
+            after, _ = writer.section("member step", body, leaf, 4, "a", part.results)
+            lines = [self._assignment(line) for line in after.lines]
+        else:
+            lines = Statements(branched, writer, leaf, leaves, part.roots, part.results).lines
         writes = [place(part.results, i) for i in range(len(part.results))]
-        text = " ".join(each.text for each in [*of_time_lines, *lines])
+        text = " ".join(texts([*of_time_lines, *lines]))
         return Function(
             [reads[i] for i in sorted(reads)],
             "time" in asked,
@@ -180,9 +183,4 @@ class Written:
         )
 
     def _assignment(self, line: Line) -> Assignment:
-        language = self.language
-        word = language.me + language.fields(line.name, f"made {line.name}") if language.before else language.names(line.name)
-        note = line.note.replace("−", "-")
-        found = EVALUATION.match(line.note or line.name)
-        evaluation = int(found[1]) if found else 0
-        return Assignment(word, language.kinds.get(word, "number"), language.text(line.formula), note, evaluation)
+        return self.language.assignment(line)
