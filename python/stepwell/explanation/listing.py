@@ -82,8 +82,8 @@ class Section(NamedTuple):
 class Named(Tracer):
     """Traces a step and notes what its values are called, by their numbers on the tape."""
 
-    def __init__(self, system: Any, tape: Any) -> None:
-        super().__init__(system, tape)
+    def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
+        super().__init__(system, tape, force)
         self.names: dict[int, str] = {}
         self.called: list[tuple[Any, str]] = []
         self._taken: set[str] = set()
@@ -251,7 +251,7 @@ def _leaf(tape: Any, name: str, given: int, single: bool) -> Any:
     match name:
         case "state":
             return tape.state(given)
-        case "parameter":
+        case "parameter" | "force":
             return tape.param(given)
         case "constant":
             return tape.number(number_of(given, single))

@@ -8,7 +8,7 @@ computed was not taken.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -75,11 +75,10 @@ class Branched:
         self.nodes: dict[int, Node] = {}
         self.order: list[int] = []
         self._paths: dict[int, Path] = {}
-        self._joint: set[int] = set()  # choices that stay one choice if they are by several conditions
+        self._joint: set[int] = set()  # choices with two dear sides, by one condition even if it is made of several
         self._cheap: set[Path] = set()  # sides that are computed always
         self._kinds: dict[int, str] = {}
         self._take()
-        self._measure()
         self._split()
         self._simplify()
         self._split()
@@ -100,26 +99,9 @@ class Branched:
     def kind(self, line: int) -> str:
         """Of a value: "truth", "bits" or "number"; "any" of a constant that may be each."""
         if line not in self._kinds:
-            self._kinds[line] = self._kind(self.nodes[line] if line in self.nodes else self.operations[line])
+            node = self.nodes[line] if line in self.nodes else self.operations[line]
+            self._kinds[line] = kind_of(node, self.kind, self.constant, self.all_bits)
         return self._kinds[line]
-
-    def _kind(self, node: Node) -> str:
-        if node.name == "constant":
-            return "any" if node.given in (0, self.all_bits) else "number"
-        if node.name in TRUTHS:
-            return "truth"
-        if node.name in ON_BITS:
-            return "bits"
-        if node.name in ON_TRUTHS:
-            kinds = {self.kind(each) for each in node.of}
-            is_magnitude = node.name == "and" and any(self.constant(each) == self.all_bits >> 1 for each in node.of)
-            return "truth" if kinds <= {"truth", "any"} else "number" if is_magnitude and kinds == {"number"} else "bits"
-        if node.name == "choose":
-            kinds = {self.kind(each) for each in node.of[1:]}
-            if self.kind(node.of[0]) != "truth" or "bits" in kinds or {"truth", "number"} <= kinds:
-                return "bits"
-            return "truth" if "truth" in kinds else "number"
-        return "number"
 
     def constant(self, line: int) -> int | None:
         """The bits of a constant, else None."""
@@ -138,17 +120,8 @@ class Branched:
 
     # ---- which values are read on one side alone
 
-    def _measure(self) -> None:
-        """Find paths of which each side costs what a branch does, or more."""
-        while True:
-            self._cheap.clear()
-            self._find_dear_paths()
-            both = {line for line in self.order if line not in self._joint and all(self._are_dear(line))}
-            if not both:
-                return
-            self._joint |= both
-
     def _find_dear_paths(self) -> None:
+        """Find paths of which each side costs what a branch does, or more."""
         while True:
             self._find_paths()
             costs: dict[Path, int] = defaultdict(int)
@@ -156,9 +129,13 @@ class Branched:
                 for depth in range(1, len(path) + 1):
                     costs[path[:depth]] += COST.get(self.nodes[line].name, 1)
             cheap = {path for path, cost in costs.items() if cost < WORTH}
-            if not cheap:
+            both = {line for line in self.order if line not in self._joint and all(self._are_dear(line))}
+            if not cheap and not both:
                 return
             self._cheap |= cheap
+            if not cheap:
+                self._joint |= both
+                self._cheap.clear()
 
     def _find_paths(self) -> None:
         """On which sides of which conditions each value is read: what is common to all that read it."""
@@ -186,15 +163,18 @@ class Branched:
         return [(condition, ()), *read]
 
     def _side(self, line: int, side: bool) -> Path:
-        """A side of a choice: by ``p and q`` what holds is p, and then q; likewise what does not hold by ``p or q``."""
+        """A side of a choice: by ``p and q`` what holds is p, and then q, and likewise what does not hold by ``p or q``."""
         condition = self._sides(line)[0]  # type: ignore[index]
         return ((condition, side),) if line in self._joint else self._parts(condition, side)
 
     def _parts(self, condition: int, side: bool) -> Path:
         name, of, _ = self.operations[condition]
-        if condition in self._leaves or name != ("and" if side else "or") or not all(self.kind(each) == "truth" for each in of):
+        if condition in self._leaves or name not in ("and", "or") or not all(self.kind(each) == "truth" for each in of):
             return ((condition, side),)
-        return tuple(part for each in sorted(of) for part in self._parts(each, side))
+        if name != ("and" if side else "or"):
+            return ((condition, side),) if side else ()  # where not all of several hold is the usual case: it is computed always
+        parts = [self._parts(each, side) for each in sorted(of)]
+        return tuple(part for each in parts for part in each) if all(parts) else ()
 
     def _sides(self, line: int) -> tuple[int, int | None, int | None] | None:
         """Of a choice its condition, and its values if that holds and if not; None is the truth of the condition itself."""
@@ -216,8 +196,8 @@ class Branched:
         path = self._paths[line]
         found = []
         for of, side in zip(sides[1:], (True, False), strict=True):
-            begin = (*path, self._side(line, side)[0])
-            found.append(of in self._paths and self._paths[of][: len(begin)] == begin)
+            begin = (*path, *self._side(line, side)[:1])
+            found.append(len(begin) > len(path) and of in self._paths and self._paths[of][: len(begin)] == begin)
         return found[0], found[1]
 
     def _split(self) -> None:
@@ -359,6 +339,29 @@ class Branched:
                 for i, branch in enumerate(places.get(of, ())):
                     if branch not in places[line][i : i + 1] and line not in branch.sets and of not in branch.keeps:
                         branch.keeps.append(of)
+
+
+def kind_of(
+    node: tuple[str, tuple[int, ...], int], kind: Callable[[int], str], constant: Callable[[int], int | None], all_bits: int
+) -> str:
+    """Of an operation: "truth", "bits" or "number"; "any" of a constant that may be each."""
+    name, of, given = node
+    kinds = {kind(each) for each in of}
+    if name == "constant":
+        return "any" if given in (0, all_bits) else "number"
+    if name in TRUTHS:
+        return "truth"
+    if name in ON_BITS:
+        return "bits"
+    if name in ON_TRUTHS:
+        is_magnitude = name == "and" and any(constant(each) == all_bits >> 1 for each in of)
+        return "truth" if kinds <= {"truth", "any"} else "number" if is_magnitude and kinds == {"number"} else "bits"
+    if name == "choose":
+        kinds = {kind(each) for each in of[1:]}
+        if kind(of[0]) != "truth" or "bits" in kinds or {"truth", "number"} <= kinds:
+            return "bits"
+        return "truth" if "truth" in kinds else "number"
+    return "number"
 
 
 def _common(a: Path, b: Path) -> Path:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from .language import Assignment, Language, indented
+from .language import FORCE, Assignment, Language, indented, listed
 from .written import Written
 
 TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double"}
@@ -145,6 +146,18 @@ class C(Language):
         """A value that gets a name."""
         return f"const {self.types[line.kind]} {line.name} = {line.text};{note}"
 
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+        return f"{self.types['number']} w[{size}];"
+
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+        return f"for (int i = 0; i < {count}; i++) {line}"
+
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+        return listed(f"static const int {self.table_name(name)}[{len(places)}] = {{", list(map(str, places)), "};", "")
+
     def variable(self, line: Assignment, note: str) -> list[str]:
         """A value that is set again in a branch; with no text if it is set in both."""
         return [f"{self.types[line.kind]} {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
@@ -161,14 +174,17 @@ class C(Language):
 
     def how(self, w: Written) -> list[str]:
         """How to compile and call it."""
-        p, blocks = self.prefix, "".join(f", {of}" for _, of, _ in w.blocks)
+        p, blocks, force = self.prefix, "".join(f", {of}" for of, _ in w.given), ", force" * w.forced("step")
         lines = [
             "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
             f"{p}_defaults(&m) sets the parameters; change any of them and call {p}_prepare(&m).",
-            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s) makes one step.",
+            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s{force}) makes one step.",
         ]
         if w.carries:
-            lines.append(f"{p}_finish(&m, &s, velocities) finds the velocities; in the state {w.slot} stands in their place.")
+            force = ", force" * w.forced("finish")
+            lines.append(
+                f"{p}_finish(&m, &s{force}, velocities) finds the velocities; in the state {w.slot} stands in their place."
+            )
         if w.evaluations:
             lines.append(f"{p}_work(&m, &s) is the energy that the control has given since the start.")
         return lines
@@ -176,6 +192,8 @@ class C(Language):
     def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
         """A program that makes some steps and prints a number of the state."""
         p, blocks = self.prefix, [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
+        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
         return [
             "#include <stdio.h>",
             f'#include "{p}.c"',
@@ -185,13 +203,13 @@ class C(Language):
             f"    {p}_state s;",
             *(
                 line
-                for n, a in blocks
+                for n, a in arrays
                 for line in self.listed(f"const {self.types['number']} {n}[{len(a)}] = {{", a, "};", "    ")
             ),
             "",
             f"    {p}_defaults(&m);",
-            f"    {p}_start(&m, &s{''.join(f', {name}' for name, _ in blocks)});",
-            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s);",
+            f"    {p}_start(&m, &s{''.join(f', {name}' for name in start)});",
+            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s{', force' * w.forced('step')});",
             f'    printf("%.17g\\n", s.{w.shown}[0]);',
             "    return 0;",
             "}",
@@ -199,7 +217,16 @@ class C(Language):
 
     def file(self, w: Written, head: list[str]) -> str:
         """The whole text after the comment at the head."""
-        parts = [self._structures(w), *self._tables(w), self._prepare(w), self._defaults(w), self._start(w), self._step(w)]
+        tables = ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] if w.places else []
+        parts = [
+            self._structures(w),
+            *self._tables(w),
+            *tables,
+            self._prepare(w),
+            self._defaults(w),
+            self._start(w),
+            self._step(w),
+        ]
         if w.carries:
             parts.append(self._finish(w))
         if w.evaluations:
@@ -225,6 +252,9 @@ class C(Language):
         if w.made:
             lines += ["", f"    // Made of these by {p}_prepare."]
             lines += [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
+        lines += ["", f"    // Made of these by {p}_prepare.", f"    {self.types['number']} {w.array}[{w.made_size}];"] * bool(
+            w.made_size
+        )
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
         lines += [f"    {self.types['number']} {name}[{n}];" for name, _, n in w.blocks]
         lines += [f"    {self.types['number']} tally; // what the control has added up"] * bool(w.evaluations)
@@ -246,7 +276,9 @@ class C(Language):
         ]
 
     def _prepare(self, w: Written) -> str:
-        lines = [f"{each.name} = {each.text};" for each in w.made] or ["(void)m;"]
+        lines = [f"{each.name} = {each.text};" for each in w.made]
+        lines += [line for each in w.loops for line in self.statement(each)]
+        lines = lines or ["(void)m;"]
         about = "// What does not change from step to step. To be called after a change of a parameter."
         return "\n".join([about, f"void {self.prefix}_prepare({self.prefix} *m) {{", *indented(lines), "}"])
 
@@ -265,7 +297,7 @@ class C(Language):
 
     def _start(self, w: Written) -> str:
         p, start = self.prefix, w.functions.get("start")
-        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for _, of, n in w.blocks)
+        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for of, n in w.given)
         lines = ["s->step = 0;"] + [f"s->tally = {self.literal(0.0)};"] * bool(w.evaluations)
         lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
         if start:
@@ -282,13 +314,19 @@ class C(Language):
         p, f = self.prefix, w.functions["step"]
         of = {name: f"s->{name}" for name in (w.slot, "y", "tally")}
         lines = ["(void)m;"] * (not f.needs_fields) + [*self.body(f, of, of), "s->step += 1;"]
-        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s) {{", *indented(lines), "}"])
+        force = self._force(w, "step")
+        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s{force}) {{", *indented(lines), "}"])
+
+    def _force(self, w: Written, function: str) -> str:
+        """The argument of a function for a force from outside."""
+        return f", const {self.types['number']} {FORCE}[{w.n_v}]" * w.forced(function)
 
     def _finish(self, w: Written) -> str:
         p, f = self.prefix, w.functions["finish"]
         lines = ["(void)m;"] * (not f.needs_fields)
         lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
-        begin = f"void {p}_finish(const {p} *m, const {p}_state *s, {self.types['number']} velocities[{w.n_v}]) {{"
+        force = self._force(w, "finish")
+        begin = f"void {p}_finish(const {p} *m, const {p}_state *s{force}, {self.types['number']} velocities[{w.n_v}]) {{"
         return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
 
     def _work(self, w: Written) -> str:

@@ -24,6 +24,9 @@ from .names import Field, Names
 if TYPE_CHECKING:
     from .written import Table, Written
 
+#: The block of a force from outside, and the argument.
+FORCE = "force"
+
 #: Characters of a line of numbers.
 WIDTH = 100
 
@@ -65,11 +68,22 @@ class Conditional(NamedTuple):
     """What is computed if something holds, and if not."""
 
     condition: str
-    then: list[Assignment | Conditional]
-    other: list[Assignment | Conditional]
+    then: list[Statement]
+    other: list[Statement]
 
 
-Statement = Assignment | Conditional
+class Loop(NamedTuple):
+    """So many equal operations: what element i of an array is.
+
+    Of the state, ``@y[i]`` is an element before the step, ``#y[i]`` one after it.
+    """
+
+    times: int
+    target: str
+    text: str
+
+
+Statement = Assignment | Conditional | Loop
 
 
 class Place(NamedTuple):
@@ -90,6 +104,7 @@ class Function(NamedTuple):
         of_time: the values that depend on the time alone.
         lines: the values that depend on the state.
         writes: the numbers that it writes.
+        work: the length of the array in which loops compute; 0 without loops.
     """
 
     reads: list[Place]
@@ -98,6 +113,7 @@ class Function(NamedTuple):
     of_time: list[Assignment]
     lines: list[Statement]
     writes: list[Place]
+    work: int = 0
 
 
 class Language(Notation, ABC):
@@ -374,11 +390,13 @@ class Language(Notation, ABC):
             return of[block] if index < 0 else f"{of[block]}[{index}]"
 
         groups: list[tuple[str, Sequence[Statement]]] = [
-            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
+            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads if p.block != FORCE]),
+            ("The force.", [Assignment(p.name, "number", self.given(f"{FORCE}[{p.at}]")) for p in f.reads if p.block == FORCE]),
             ("What depends on the time alone.", f.of_time),
             ("What depends on the state.", f.lines),
         ]
         out = [self.declare(Assignment("t", "number", self.time), "")] if f.needs_time else []
+        out += [self.array(f.work)] * bool(f.work)
         for title, lines in groups:
             if lines:
                 out += ["", f"{self.comment} {title}"]
@@ -387,13 +405,44 @@ class Language(Notation, ABC):
                 if isinstance(each, Assignment) and each.evaluation > evaluation:
                     evaluation = each.evaluation
                     out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
-                out += self.statement(each)
+                out += [self._placed(line, read, write) for line in self.statement(each)]
+        if f.work:
+            return out
         out += ["", f"{self.comment} {after}"]
         out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]
 
+    def given(self, text: str) -> str:
+        """A number of an argument in the precision of the file."""
+        return text
+
+    def _placed(self, line: str, read: Mapping[str, str], write: Mapping[str, str]) -> str:
+        """A line with the names of the blocks that are read and written."""
+        line = re.sub(rf"@{FORCE}(\[.*?\]+)", lambda found: self.given(FORCE + found[1]), line)
+        line = re.sub(r"@(\w+)", lambda found: read[found[1]], line)
+        return re.sub(r"#(\w+)(?=[\[ ])", lambda found: write.get(found[1], found[0]), line)
+
+    @abstractmethod
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+
+    @abstractmethod
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+
+    @abstractmethod
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+
+    def table_name(self, name: str) -> str:
+        """The name of such a table."""
+        return self.helper(name)
+
     def statement(self, each: Statement) -> list[str]:
         """Lines of what is computed."""
+        if isinstance(each, Loop):
+            line = f"{each.target} = {each.text}{self.end}"
+            return [line if each.times == 1 else self.loop(each.times, line)]
         if isinstance(each, Conditional):
             then = [line for inner in each.then for line in self.statement(inner)]
             other = [line for inner in each.other for line in self.statement(inner)]
@@ -441,6 +490,8 @@ def texts(statements: Iterable[Statement]) -> list[str]:
     for each in statements:
         if isinstance(each, Conditional):
             found += [each.condition, *texts(each.then), *texts(each.other)]
+        elif isinstance(each, Loop):
+            found += [each.target, each.text]
         else:
             found.append(each.text)
     return found
