@@ -83,8 +83,8 @@ class Section(NamedTuple):
 class Named(Tracer):
     """Traces a step and notes what its values are called, by their numbers on the tape."""
 
-    def __init__(self, system: Any, tape: Any) -> None:
-        super().__init__(system, tape)
+    def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
+        super().__init__(system, tape, force)
         self.names: dict[int, str] = {}
         self.called: list[tuple[Any, str]] = []
         self._taken: set[str] = set()
@@ -234,7 +234,7 @@ def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[in
             return of[0].shift_down(given)
         case "sample":
             return tape.sample(given, of[0])
-        case "copy":
+        case "copy" | "same":
             return of[0]
         case _:
             return None
@@ -256,7 +256,7 @@ def _leaf(tape: Any, name: str, given: int, single: bool) -> Any:
     match name:
         case "state":
             return tape.state(given)
-        case "parameter":
+        case "parameter" | "force":
             return tape.param(given)
         case "constant":
             return tape.number(number_of(given, single))
@@ -330,6 +330,29 @@ class Writer:
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
 
+    def symbol(self, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None]) -> Any:
+        """An operation on the tape, which has a name there; None if the tape has none."""
+        if name in self.notation.called:
+            return None if of[0] is None else self.notation.called[name](of[0])
+        return again(self.tape, name, of, given, bits, self.notation.single)
+
+    def source(self, name: str, given: int) -> Any:
+        """What a tape has without an operation."""
+        return _leaf(self.tape, name, given, self.notation.single)
+
+    def called(self, symbol: Any) -> str:
+        """The name of a value in the method's text if it is free, which it then no longer is; else ""."""
+        known = "" if symbol is None else self.names.get(symbol.id, "")
+        if not known or known.startswith("−") or known in self._used:
+            return ""
+        self._used.add(known)
+        return known
+
+    def unused(self, letter: str) -> str:
+        """The next name by a letter."""
+        self._numbers[letter] += 1
+        return f"{letter}{self._numbers[letter]}"
+
     def section(
         self,
         when: str,
@@ -339,12 +362,10 @@ class Writer:
         letter: str,
         results: Sequence[str] | None = None,
     ) -> tuple[Section, list[Leaf]]:
-        """A body as a section, with its results, which are named by ``results`` if given, and else by the letter."""
+        """A body as a section, with its results, which are named by ``results`` if given and not "", and else by the letter."""
         operations, places = body
         reads = Counter(place for _, of, _ in operations for place in of)
-        wanted = {
-            place: None if results is None else name for place, name in zip(places, results or [""] * len(places), strict=True)
-        }
+        wanted = {place: name or None for place, name in zip(places, results or [""] * len(places), strict=True)}
         lines: list[Line] = []
         values: list[_Value] = []
 
@@ -354,9 +375,8 @@ class Writer:
                 return given, known if known.lstrip("−").startswith("d") else ""
             if known and not known.startswith("−") and known not in self._used:
                 return known, ""
-            self._numbers[letter] += 1
             note = known if known.startswith("−") else "" if value.symbol is None else self.notes.get(value.symbol.id, "")
-            return f"{letter}{self._numbers[letter]}", note
+            return self.unused(letter), note
 
         def write(place: int) -> None:
             value = values[place]
@@ -367,11 +387,7 @@ class Writer:
 
         def made(name: str, of: list[int], given: int) -> _Value:
             parts = [values[place] for place in of]
-            symbols = [each.symbol for each in parts]
-            if name in self.notation.called:
-                symbol = None if symbols[0] is None else self.notation.called[name](symbols[0])
-            else:
-                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts], self.notation.single)
+            symbol = self.symbol(name, [each.symbol for each in parts], given, [each.bits for each in parts])
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
