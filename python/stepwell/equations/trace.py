@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Shape
-from ..errors import TraceError
+from ..errors import REFUSED, TraceError
 from ..reference.series import among
 from ..reference.types import Array as Numbers
 from .arrays import QUICK_SINES
@@ -178,23 +178,31 @@ class Equations:
 
 
 def run_by(function: Callable[..., Any], name: str, quick_sines: bool, *given: Any, **named: Any) -> Any:
-    """Call a user's function; what it raises is told with its name and the line."""
-    before = QUICK_SINES.set(quick_sines)
+    """Call a user's function; what it raises is told with its name and the line, even if the function itself catches that."""
+    refused: list[TraceError] = []
+    before, outer = QUICK_SINES.set(quick_sines), REFUSED.set(refused)
     try:
-        return function(*given, **named)
+        made = function(*given, **named)
     except RecursionError:
         raise
     except Exception as error:
-        line = _line_of(error, getattr(function, "__code__", None))
-        known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
-        said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
-        told = TraceError(f"{name}{line}: {said}")
-        told.of_shape = (
-            known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
-        )
-        raise told from error
+        raise _told(error, function, name) from error
     finally:
+        REFUSED.reset(outer)
         QUICK_SINES.reset(before)
+    if refused:
+        raise _told(refused[0], function, name) from refused[0]
+    return made
+
+
+def _told(error: Exception, function: Any, name: str) -> TraceError:
+    """The error of a user's function with its name and the line."""
+    line = _line_of(error, getattr(function, "__code__", None))
+    known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
+    said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
+    told = TraceError(f"{name}{line}: {said}")
+    told.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+    return told
 
 
 def kind_of(made: Any) -> str:

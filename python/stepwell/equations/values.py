@@ -231,6 +231,12 @@ class Operators:
 
     __int__ = __index__ = __complex__ = __float__
 
+    def __getattr__(self, name: str) -> NoReturn:
+        if not name.startswith("_") and hasattr(np.ndarray, name):
+            known = ", ".join(each for each in dir(type(self)) if not each.startswith("_") and hasattr(np.ndarray, each))
+            raise TraceError(f"own equations do not know .{name} of a value. Known: {known}")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
         from .arrays import ufunc_of
 
