@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Shape
+from .._value import frozen
 from ..errors import ArgumentError, DTypeError, UnknownNameError
 from ..systems.inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
@@ -142,7 +143,9 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
         parameters[each.name] = each.default
     for parameter, default in parameters.items():
         if not isinstance(default, (Sinusoid, Sampled)) and not callable(default):
-            _checks.numbers(f"{name}: default of {parameter}", default)
+            numbers = _checks.numbers(f"{name}: default of {parameter}", default)
+            if numbers.ndim:
+                parameters[parameter] = frozen(parameter, numbers)
     return parameters
 
 

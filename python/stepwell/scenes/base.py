@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Value, frozen
 from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
@@ -98,7 +98,7 @@ class Scene(Value):
             block = _checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
-            found[name] = block
+            found[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
