@@ -217,8 +217,11 @@ def same_sweep(path: Path, there: dict[str, Any], asked: dict[str, Any]) -> None
     names = [name for name in {**there, **asked} if there.get(name) != asked.get(name)]
     if names:
         told = "; ".join(
-            f"{name}: {_checks.short(there.get(name), 60)} there, {_checks.short(asked.get(name), 60)} asked for"
+            "the equations are others: their first steps have other bits"
+            if name == "first steps"
+            else f"{name}: {_checks.short(there.get(name), 60)} there, {_checks.short(asked.get(name), 60)} asked for"
             for name in names
+            if name != "first steps" or len(names) == 1
         )
         raise ArgumentError(
             f"store: {_checks.short(str(path), _checks.PATH)} is of another sweep and is not continued ({told}); "
