@@ -133,7 +133,8 @@ class Fixed(metaclass=Maker):
 
     def _refuse(self, name: str, what: str) -> None:
         if not name.startswith("_") and DONE in vars(self):
-            raise FixedError(f"{name}: the {name} of {type(self).__name__} cannot be {what}; {self._instead}")
+            kind = getattr(self, "kind_name", type(self).__name__)
+            raise FixedError(f"{name}: the {name} of {kind} cannot be {what}; {self._instead}")
 
     @property
     def _instead(self) -> str:
