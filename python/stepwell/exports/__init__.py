@@ -130,7 +130,7 @@ def export(
         if single:
             _single.check_control(system)
     example = _example(system, blocks, batch, index)
-    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused, single=single)
+    plan = engine.Plan(system.over_steps(how, t0, dt), how, batch, dt, t0, choice=choice, fused=fused, single=single)
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
