@@ -45,9 +45,12 @@ def test_they_are_taken_as_numpys() -> None:
     assert single.y == pytest.approx(plain.y, abs=2.0**-23)
 
 
-def test_parameters_are_not_copied() -> None:
+def test_parameters_are_copied() -> None:
+    """Their owner may go on to write into them."""
     omega = np.linspace(0.5, 2.0, 50)
-    assert np.shares_memory(sw.Oscillator(Tensor(omega)).omega, omega)
+    system = sw.Oscillator(Tensor(omega))
+    omega[:] = np.nan
+    np.testing.assert_array_equal(system.omega, np.linspace(0.5, 2.0, 50))
 
 
 def test_a_world_steps_them_in_place() -> None:

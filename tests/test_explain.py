@@ -80,8 +80,14 @@ def test_who_has_what_in_common() -> None:
     driven = sw.Oscillator([1.0, 2.0], 0.1, a=sw.Sampled([1.0, 2.0], 0.5), form="physical")
     explained = sw.explain(driven, "damped_euler")
     assert [section.when for section in explained.sections if section.lines] == ["member", "step", "member step"]
-    assert lines(explained)[-3:] == ["in each step, for each member", "y' = y + h·v", "v' = v + (c2·y' − c1·v + h·a[s3])"]
-    assert "s1 = floor((t − a.start)/a.interval + 1e-06)" in lines(explained)
+    assert lines(explained)[-3:] == [
+        "in each step, for each member",
+        "y' = y + h·v",
+        "v' = v + (c2·y' − c1·v + h·(a[s12] + s9·(a[s6] − a[s12])))",
+    ]
+    # The sample at the start of the step, that at its end, and for how much of it the latter has been there.
+    assert "s10 = floor(1.0000000000000568·((t + s1 − a.start)/a.interval))" in lines(explained)
+    assert "s7  = (s3 − (a.start + a.interval·s6))/(s2 − s1)" in lines(explained)
 
 
 def test_bodies() -> None:

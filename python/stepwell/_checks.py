@@ -465,7 +465,8 @@ def in_place(
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != dtype or not array.dtype.isnative:
-        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}")
+        other = f', or dtype="{array.dtype}" as an argument' if array.dtype in (np.float32, np.float64) else ""
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}; give such an array{other}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

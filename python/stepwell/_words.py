@@ -13,6 +13,9 @@ StepForm = Literal["direct", "matrix"]
 #: What computes a run.
 Backend = Literal["rust", "numpy"]
 
+#: What is between samples of an input.
+Interpolation = Literal["hold", "linear", "cubic"]
+
 #: What the velocity of an oscillator is.
 OscillatorForm = Literal["canonical", "physical"]
 

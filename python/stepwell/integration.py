@@ -284,14 +284,15 @@ def integrate(
         if single:
             _single.check_control(system)
     system = system.stepped_by(how)
+    stepped = system.over_steps(how, t0, dt)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
         plan = plan._replace(force=spread(force, system.v_shape, batch))
-    if record or system is not plan.system:
+    if record or stepped is not plan.system:
         # In float32 they are computed from the saved states, in float64.
         kept = () if single else tuple(name for name in record if name in system.quantities)
-        plan = plan._replace(system=system, record=kept)
+        plan = plan._replace(system=stepped, record=kept)
     make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
     ended = None
     if asked is not None:

@@ -153,7 +153,8 @@ class World:
             _single.check_inputs(stepped, abs(t0) + first * dt)
         stepped.check_time(abs(t0) + first * dt)
         fused = _checks.flag("fused", fused)
-        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
+        seen = stepped.over_steps(how, t0, dt)
+        plan = engine.Plan(seen, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         # Views: the core knows rows, not axes.
         watched = None if force is None else force.reshape(-1)
         loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry, watched)

@@ -83,7 +83,8 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
     q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
     inputs = [each.signal() for each in plan.system.given_inputs().values()]
-    linear_map = {"n": n_v + n_y, "n_v": n_v, "p": P, "q": q, "inputs": inputs}
+    carries = int(plan.method.carry is not None)
+    linear_map = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
     return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
 
 
@@ -98,7 +99,9 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
 
-    linear = reference.linear_step(p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt)
+    linear = reference.linear_step(
+        p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt, plan.method.carry is not None
+    )
     finish = to_velocity(plan)
 
     def step(t: float, v: Array, y: Array) -> Blocks:

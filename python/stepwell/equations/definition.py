@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Shape
+from .._value import frozen
 from ..errors import ArgumentError, DTypeError, UnknownNameError
 from ..systems.inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
@@ -82,7 +83,8 @@ class Definition:
 
         Args:
             function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` for a first-order system, that returns one number;
-                parameters are those of the system, by name. ``run.energy`` is the invariant called ``energy``.
+                it may take the time before the state, as the rates do, but not depend on it. Parameters are those of the system,
+                by name. ``run.energy`` is the invariant called ``energy``.
 
         Returns:
             The function.
@@ -140,7 +142,8 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     given = list(inspect.signature(function).parameters.values())
     positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+        first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
     parameters = {}
     for each in given:
         if each in positional[:state]:
@@ -152,7 +155,9 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
         parameters[each.name] = each.default
     for parameter, default in parameters.items():
         if not isinstance(default, (Sinusoid, Sampled)) and not callable(default):
-            _checks.numbers(f"{name}: default of {parameter}", default)
+            numbers = _checks.numbers(f"{name}: default of {parameter}", default)
+            if numbers.ndim:
+                parameters[parameter] = frozen(parameter, numbers)
     return parameters
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from .. import engine
 from .._checks import Array, Shape
 from .._value import changed, complete
-from ..reference.signal import Constant, Held, Sine
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
 from ..systems.own import OwnSystem
 
 #: From numbers, and how many axes of their own they have (None if as many as the batch leaves), to others.
@@ -28,6 +28,8 @@ def each(value: Any, change: Change) -> Any:
             return Constant(change(np.asarray(value.value), None))
         case Sine():
             return Sine(*(change(np.asarray(part), None) for part in (value.amplitude, value.omega, value.phase)))
+        case Stepped() | Curve():
+            return type(value)(*(each(part, change) for part in value.parts().values()))
         case Held():
             return Held(change(value.values, 1), value.interval, value.start)
         case _:

@@ -21,7 +21,7 @@ from .._checks import Shape
 from ..engine import Plan
 from ..reference import adaptive, increments
 from ..reference.acceptance import Acceptance
-from ..reference.signal import Constant, Held, Sine
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
 from ..reference.tape import Operation, in_order, needed
 from ..reference.traced import Tracer
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number, number_of
@@ -166,6 +166,9 @@ def named_numbers(plan: Plan, given: Mapping[str, Any]) -> tuple[list[str], list
             case Sine():
                 for part in ("amplitude", "omega", "phase"):
                     add(f"{name}.{part}", getattr(value, part))
+            case Stepped() | Curve():
+                for behind, table in value.parts().items():
+                    add(name + behind, table)
             case Held():
                 tables.append(named(name, ()))
             case np.ndarray():
@@ -442,7 +445,7 @@ def _traced(tracer: Tracer, plan: Plan, attempts: bool) -> list[Any]:
     if plan.form == "matrix":
         inputs = [each.signal() for each in plan.system.given_inputs().values()]
         n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-        return tracer.matrix(plan.method.nodes, n, inputs)
+        return tracer.matrix(plan.method.nodes, n, inputs, plan.method.carry is not None)
     return tracer.attempt(plan.method) if attempts else tracer.step(plan.method)
 
 

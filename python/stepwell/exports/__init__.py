@@ -140,7 +140,8 @@ def export(
         if single:
             _single.check_control(system)
     push = None if push is None else _wide(push, system.v_shape, batch)
-    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused, force=push, single=single)
+    stepped = system.over_steps(how, t0, dt)
+    plan = engine.Plan(stepped, how, batch, dt, t0, choice=choice, fused=fused, force=push, single=single)
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)

@@ -76,7 +76,7 @@ static inline double PREFIX_turn_sign(double x, double y) {
 
 SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
 static double PREFIX_sample(const double *samples, int count, double start, double interval, double t) {
-    double i = floor((t - start) / interval + 1e-06); // t may miss a sample's time by rounding
+    double i = floor((t - start) / interval * 1.0000000000000568); // t may miss a sample's time by rounding
     if (!(i > 0.0)) i = 0.0;
     if (i > count - 1.0) i = count - 1.0;
     return samples[(int)i];
@@ -165,7 +165,10 @@ class C(Language):
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+        number = (
+            f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+        )
+        return of.time("m->", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""

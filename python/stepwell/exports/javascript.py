@@ -53,7 +53,7 @@ function turn_sign(x, y) {
 
 SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
 function sample(samples, start, interval, t) {
-  let i = Math.floor((t - start) / interval + 1e-6); // t may miss a sample's time by rounding
+  let i = Math.floor((t - start) / interval * 1.0000000000000568); // t may miss a sample's time by rounding
   if (!(i > 0)) i = 0;
   return samples[Math.min(i, samples.length - 1)];
 }"""
@@ -151,7 +151,8 @@ class JavaScript(Language):
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
+        number = f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
+        return of.time("this.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""

@@ -240,7 +240,7 @@ class Language(Notation, ABC):
             case "divide":
                 return self.quotient(numbers[0], numbers[1], bits[1])
             case "sample":
-                return Formula(self.sample(given, numbers[0].text))
+                return Formula(self.sample(given, numbers[0].text), SUM if self.tables[given].times else ATOM)
             case "multiply add" | "multiply subtract" | "subtract multiply":
                 made = plain.formula(name, numbers, given, bits)
                 return Formula(f"{self.fma}{made.text.removeprefix('fma')}")

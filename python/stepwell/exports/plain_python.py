@@ -50,7 +50,7 @@ TURN_SIGN = '''def turn_sign(x, y):
 
 SAMPLE = '''def sample(samples, start, interval, t):
     """The sample that holds at a time: the last that is not after it; before all the first."""
-    i = floor((t - start) / interval + 1e-06)  # t may miss a sample's time by rounding
+    i = floor((t - start) / interval * 1.0000000000000568)  # t may miss a sample's time by rounding
     return samples[int(min(i, len(samples) - 1.0)) if i > 0.0 else 0]'''
 
 ALL_BITS = "0xFFFFFFFFFFFFFFFF"
@@ -165,7 +165,8 @@ class Python(Language):
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
+        number = f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
+        return of.time("self.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""

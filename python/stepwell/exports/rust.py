@@ -21,7 +21,7 @@ fn turn_sign(x: f64, y: f64) -> f64 {
 
 SAMPLE = """/// The sample that holds at a time: the last that is not after it; before all the first.
 fn sample(samples: &[f64], start: f64, interval: f64, t: f64) -> f64 {
-    let i = ((t - start) / interval + 1e-06).floor(); // t may miss a sample's time by rounding
+    let i = ((t - start) / interval * 1.0000000000000568).floor(); // t may miss a sample's time by rounding
     let last = samples.len() - 1;
     if i > 0.0 { samples[(i as usize).min(last)] } else { samples[0] }
 }"""
@@ -111,7 +111,8 @@ class Rust(Language):
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample(&{of.name.upper()}_SAMPLES, self.{of.start}, self.{of.interval}, {t})"
+        number = f"sample(&{of.name.upper()}_SAMPLES, self.{of.start}, self.{of.interval}, {t})"
+        return of.time("self.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""

@@ -30,13 +30,21 @@ MEMBERS = ("defaults", "finish", "new", "prepare", "start", "step", "work", "con
 
 
 class Table(NamedTuple):
-    """A sampled input: the name of its samples, the time of the first, and the interval to the next."""
+    """A table of a sampled input: the name of its samples, the time of the first, and the interval to the next.
+
+    If it is one of ``times``, it has the numbers of the samples, from which their times follow.
+    """
 
     name: str
     about: str
     values: list[float]
     start: str
     interval: str
+    times: bool = False
+
+    def time(self, me: str, number: str) -> str:
+        """When the sample of a number is."""
+        return f"{me}{self.start} + {me}{self.interval} * {number}" if self.times else number
 
 
 class Written:
@@ -71,13 +79,21 @@ class Written:
         self._shapes = {each.name: each.shape for each in self.parameters}
         self.tables: list[Table] = []
         tables = Names()
+        of_time: dict[str, list[Field]] = {}
         for table in traced.tables:
-            of_time = [
-                Field(names(f"{table.name}.start"), f"{table.name}: the time of the first sample", [table.start]),
-                Field(names(f"{table.name}.interval"), f"{table.name}: the time to the next sample", [table.interval]),
-            ]
-            self.parameters += of_time
-            self.tables.append(Table(tables(table.name), table.name, table.values, *(each.name for each in of_time)))
+            called, _, part = table.name.rpartition(".")
+            is_part = part == "times" or part.isdigit()
+            called = called if is_part else table.name
+            if called not in of_time:
+                first = "one interval before the first sample" if is_part else "the time of the first sample"
+                of_time[called] = [
+                    Field(names(f"{called}.start"), f"{called}: {first}", [table.start]),
+                    Field(names(f"{called}.interval"), f"{called}: the time to the next sample", [table.interval]),
+                ]
+                self.parameters += of_time[called]
+            values = list(map(float, range(len(table.values)))) if part == "times" else table.values
+            start, interval = (each.name for each in of_time[called])
+            self.tables.append(Table(tables(table.name), table.name, values, start, interval, part == "times"))
         language.tables = self.tables
         kept = operations.kept(list(traced.parts.values()))
         #: Values computed before the steps by loops, the array that holds them, its length, and tables of places.

@@ -17,7 +17,7 @@ from . import adaptive, contact, series_pace
 from .acceptance import Acceptance
 from .around import surrounded
 from .run import linear_step
-from .signal import Constant, Held, Sine
+from .signal import Constant, Curve, Held, Sine, Stepped, of_slot, over
 
 
 def _array(shape: tuple[int, ...], symbols: Any) -> Any:
@@ -67,6 +67,8 @@ class Tracer:
                 return Constant(self.symbols(value.value, batch))
             case Sine():
                 return Sine(*(self.symbols(each, batch) for each in (value.amplitude, value.omega, value.phase)))
+            case Stepped() | Curve():
+                return type(value)(*(self.symbols(each, batch) for each in value.parts().values()))
             case Held():
                 self.tables.append(value)
                 return Sampled(self.tape, next(self._tables))
@@ -111,8 +113,10 @@ class Tracer:
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:
         """The state after a method's ``start`` or ``finish``."""
-        s, (v, y, _) = self.scaled(self.tape.step()), self.state()
-        return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
+        h, t = self.tape.step(), self.tape.time()
+        s, (v, y, _) = self.scaled(h), self.state()
+        with over(of_slot(t, h)):
+            return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
 
     def of_unit_step(self, *, backward: bool = False) -> Any:
         """The system scaled to a step of 1, or of −1 where its time runs backward; without control."""
@@ -160,12 +164,12 @@ class Tracer:
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(*(s.record(name, v, y) for name in names))
 
-    def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any]) -> list[Any]:
+    def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any], carries: bool = False) -> list[Any]:
         """The state after a step in transition-matrix form, with these inputs."""
         p, q = (_array(shape, self._params) for shape in ((n, n), (len(nodes), len(inputs), n)))
         inputs = self.symbols(inputs, self.system.batch)
         s = _array((n,), map(self.tape.state, count()))
-        step = linear_step(p, q.reshape(prod(q.shape[:2]), n), inputs, nodes, self.tape.step())
+        step = linear_step(p, q.reshape(prod(q.shape[:2]), n), inputs, nodes, self.tape.step(), carries)
         return self.flat(step(self.tape.time(), s))
 
     def flat(self, *blocks: Any) -> list[Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Value, frozen
 from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
@@ -98,7 +98,7 @@ class Scene(Value):
             block = _checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
-            found[name] = block
+            found[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
@@ -123,7 +123,8 @@ class Scene(Value):
             dt: the step, in units of time; the scene's if None.
             steps: number of steps; if None, the least number that reaches the horizon.
             **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``. ``control`` is the
-                scene's own if it is not given; ``control=None`` leaves it out.
+                scene's own if it is not given; ``control=None`` leaves it out. With ``tolerance`` steps are adaptive, to ``at``,
+                or to the horizon; ``dt`` is then the first step to try.
 
         Returns:
             A ``Run`` with blocks of shape (saved, *block).
@@ -139,6 +140,9 @@ class Scene(Value):
             raise ArgumentError(
                 f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
+        if "tolerance" in options or "at" in options:
+            options = {"at": [self.horizon], **options}
+            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))

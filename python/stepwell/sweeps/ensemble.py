@@ -198,10 +198,15 @@ def sweep(
         memory=_checks.number("memory", memory, positive=True, unit="bytes"),
         at=times,
     )
-    first, bits = _probe(task, grid)
+    first, bits, names = _probe(task, grid)
     workers = Engine(engine, threads)
     shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk))
     layout = layout_of(task, grid, first, bits, named)
+    if taken := sorted(names & {*layout.coords, *grid.dims}):
+        raise ArgumentError(
+            f'axes: {taken[0]!r} is the name of a result; give the dimension another name, as ("run", values), or '
+            f"the outcome one by name="
+        )
     where = store_of(store)
     kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
     _compute(task, grid, workers, kept, _checks.flag("progress", progress))
@@ -258,18 +263,18 @@ def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:
     return tuple(found)
 
 
-def _probe(task: Task, grid: Grid) -> tuple[System, str]:
-    """The system of the first member, and a hash of what the first steps of the first and the last member compute."""
+def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
+    """The system of the first member, a hash of the first steps of the first and the last member, and names of results."""
     digest = blake2b(digest_size=8)
     for member in dict.fromkeys((0, grid.members - 1)):
         index = np.unravel_index(member, grid.shape)
         one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
-        system, state = probed(task, grid.values(one))
-        for block in state:
+        found = probed(task, grid.values(one))
+        for block in found.state:
             digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
         if member == 0:
-            first = system
-    return first, digest.hexdigest()
+            first = found
+    return first.system, digest.hexdigest(), first.names
 
 
 def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | None) -> int:

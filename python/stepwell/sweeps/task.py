@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _core
+from .. import _checks, _core
 from .._checks import Array
 from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integration import integrate
@@ -138,7 +138,13 @@ def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
     given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
     parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
-    return a_system(system).sized(given.get("v"), given["y"]), given
+    system = a_system(system).sized(given.get("v"), given["y"])
+    if set(values) == {"dt"}:
+        # Nothing else has an axis of members; a chunk of one dt has one.
+        block = _checks.block("y", given["y"], system.y_shape, system.axes)
+        if block.shape == system.y_shape:
+            given["y"] = block[..., np.newaxis]
+    return system, given
 
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
@@ -284,12 +290,16 @@ def _as_many(run: Run, members: int) -> None:
         )
 
 
-def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Array]]:
-    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed.
+class Probed(NamedTuple):
+    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece."""
 
-    Returns:
-        The system, and the state after some steps.
-    """
+    system: System
+    state: tuple[Array, Array]
+    names: set[str]
+
+
+def probed(task: Task, values: dict[str, Any]) -> Probed:
+    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
     with _quiet():
         system, given = made(task, values)
         for each in task.outcomes:
@@ -301,10 +311,21 @@ def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Arr
             begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
             _as_many(begun, 1)
             assert begun.stand is not None
-            return begun.system, (begun.stand.v, begun.stand.y)
+            return Probed(begun.system, (begun.stand.v, begun.stand.y), _names(task, begun))
         first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
         _as_many(first, 1)
-    return first.system, (first.v[-1], first.y[-1])
+        return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))
+
+
+def _names(task: Task, run: Run) -> set[str]:
+    """The names of results, but for those of functions and of exponents; raise if two of them are the same."""
+    parts: list[Found] = []
+    with np.errstate(all="ignore"):
+        for outcome in task.reductions:
+            reduction = outcome.begin()
+            reduction.see(Piece(run, 0))
+            parts.append(reduction.found())
+    return set(together([*parts, dict.fromkeys(("status", "first_bad_step"), Variable((), np.array(run.status), ""))]))
 
 
 #: Of so many steps the bits tell one sweep from another.

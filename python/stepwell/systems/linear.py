@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import counted
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
 from ..reference.product import times
 from ..reference.systems.linear import Linear as Reference
 from .base import System, aligned
-from .inputs import Input, Sampled, as_input
+from .inputs import Input, Pulse, as_input
 
 #: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
 COPIES_OF_A = 5
@@ -75,6 +76,8 @@ class LinearSystem(System):
         self.D = None if D is None else _matrix("D", D, ("r", r), ("m", m), (1, 1) if r == m == 1 else None)
         self.input_names = ("x",) if m == 1 else tuple(f"x[{i}]" for i in range(m))
         self.x = _inputs(x, self.input_names)
+        if velocities is None and B is not None and C is not None:
+            velocities = 0  # a model of inputs and outputs, whose states are of no kind
         self.velocities = _velocities(velocities, n)
         self.coordinates = tuple(i for i in range(n) if i not in set(self.velocities))
         self.v_shape, self.y_shape = (len(self.velocities),), (len(self.coordinates),)
@@ -101,7 +104,9 @@ class LinearSystem(System):
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
-        return [f"{len(self.A)} states", f"{self.v_shape[0]} of them velocities", f"{m} inputs", f"{r} outputs"]
+        v = self.v_shape[0]
+        states = f"{counted(len(self.A), 'state')}{f', {v} of them velocities' if v else ''}"
+        return [states, counted(m, "input"), counted(r, "output")]
 
     @property
     def groups(self) -> tuple[int, ...]:
@@ -120,7 +125,7 @@ class LinearSystem(System):
         """The same system with these samples as its only input."""
         if name not in self.input_names:
             raise KeyError(name)
-        x = [Sampled(values, interval) if name == each else None for each in self.input_names]
+        x = [Pulse(values, interval) if name == each else None for each in self.input_names]
         return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
 
     def _parts(self) -> list[Array]:

@@ -11,7 +11,7 @@ from .._checks import Array, Shape
 from ..errors import ArgumentError
 from ..reference.systems.oscillator import Oscillator as Reference
 from .base import System, shown
-from .inputs import Input, Sampled, as_input, signal
+from .inputs import Input, Pulse, as_input, signal
 
 if TYPE_CHECKING:
     from .._words import OscillatorForm
@@ -128,7 +128,7 @@ class Oscillator(System):
 
     def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:
         """The same oscillator with these samples as its only input."""
-        return self._driven({name: Sampled(values, interval)})
+        return self._driven({name: Pulse(values, interval)})
 
     def _driven(self, inputs: dict[str, Input]) -> Oscillator:
         terms: dict[str, Any] = {"drag": self.drag, "friction": self.friction, "form": self.form}

@@ -28,8 +28,8 @@ use crate::{
         equations::{Equations, next_state},
         linear::products,
     },
-    tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
-    watch,
+    tape::{Counts, Id, Op, Tape, fuse::fuse, split::split_with_times},
+    watch, window,
 };
 
 /// The kind of step.
@@ -141,7 +141,7 @@ pub struct Steps {
 /// The leaves of a tape: parameters, sampled inputs, the step.
 pub(crate) fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
     let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
-    Parameters { given, h, numbers, sample: |table, t| Symbol::new(Op::Sample(table, t.0)) }
+    Parameters { given, h, numbers, sample: window::sample }
 }
 
 /// Numbers of the state.
@@ -213,7 +213,9 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
         }
         How::Method { name, choice } => {
             let (kind, method) = (kind(given)?, method(name)?);
-            let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
+            let carries = method.carry.is_some();
+            let seen = || window::of_step(Symbol::new(Op::Time), Symbol::new(Op::Step), carries);
+            let (tape, (next, tally)) = record(tape, || window::over(given, seen, || step(kind, given, shape, method, *choice)));
             Ok(Steps { tape, next, shape, tally, terms: Vec::new() })
         }
         How::Attempts { name, order, acceptance, backward } => {
@@ -382,10 +384,16 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     let n = shape.v + shape.y;
     let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
     let inputs: Vec<_> = (0..given.whole("inputs")).filter_map(|i| p.signal(&format!("inputs[{i}]"))).collect();
-    for node in nodes {
-        let at = t + Symbol::of(f64::from_bits(*node)) * h;
-        columns.extend(inputs.iter().map(|input| input.at(at)));
-    }
+    window::over(
+        given,
+        || window::of_step(t, h, given.whole("carries") > 0),
+        || {
+            for node in nodes {
+                let at = t + Symbol::of(f64::from_bits(*node)) * h;
+                columns.extend(inputs.iter().map(|input| input.at(at)));
+            }
+        },
+    );
     let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
     // P by rows; Q by columns, nodes and inputs, each with a number for every row.
     let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
@@ -406,8 +414,8 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
-        let mut made = program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter();
-        ids([&made.next().unwrap_or(v), &y])
+        let made = || program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter().next();
+        ids([&window::over(given, || window::of_slot(t, h), made).unwrap_or_else(|| v.clone()), &y])
     }))
 }
 
@@ -458,7 +466,9 @@ fn started(how: &How, choice: usize) -> How {
 
 /// Cuts a tape.
 pub(crate) fn cut<T: Real>(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
-    Stage::new(split(tape, next, &|i| i == BUDGET || given.is_common(i), &|table| given.is_common_table(table)))
+    let of_times = |table: u32| given.tables.get(table as usize).is_some_and(|(name, _)| name.ends_with(".times"));
+    let shared = |i: u32| i == BUDGET || given.is_common(i);
+    Stage::new(split_with_times(tape, next, &shared, &|table| given.is_common_table(table), &of_times))
 }
 
 /// Approximate numbers of operations of the rates of a scene and of a step.

@@ -5,6 +5,7 @@ use crate::{
     controls::{self, energy, projection},
     run::workers::Stop,
     spec::Spec,
+    window::Window,
 };
 
 /// Rates under the control that is given, or the rates themselves.
@@ -62,6 +63,10 @@ impl Rates for ControlledRates {
         let number = |name: &str| spec.given.place(name).map_or(f64::NAN, |place| spec.rows[place].at(first));
         (self.gain, self.target) = (number("control.gain"), self.h * number("control.target"));
         self.rates.prepare(spec, first, count);
+    }
+
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        self.rates.set_window(window);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {
