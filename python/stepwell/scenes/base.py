@@ -26,8 +26,10 @@ from ..systems.base import a_system
 if TYPE_CHECKING:
     from ..explorer import Explorer
 
-#: How many times of the horizon give the exact solution's scale.
-SCALE_SAMPLES = 1001
+#: So many times of the horizon give the exact solution's scale. Where a block differs by more than STEEP of its largest length
+#: from one to the next, a peak may hide between: so many more are taken there, and again between those, down to SHORTEST of the
+#: horizon and up to MAX_SAMPLES in all.
+SCALE_SAMPLES, STEEP, MORE_SAMPLES, SHORTEST, MAX_SAMPLES = 1001, 0.25, 15, 1e-12, 40_000
 
 #: n steps of horizon/n end at the horizon but for two roundings, each of 2⁻⁵³ of the time.
 TIME_ROUNDING = 2.0**-51
@@ -247,7 +249,24 @@ class Scene(Value):
 
     @cached_property
     def _sampled(self) -> tuple[Array, Array]:
-        return self._solution(np.linspace(0.0, self.horizon, SCALE_SAMPLES))[0]
+        """The exact blocks at evenly spaced times, and at more where they change much from one to the next."""
+        t = np.linspace(0.0, self.horizon, SCALE_SAMPLES)
+        states = self._solution(t)[0]
+        between = np.arange(1, MORE_SAMPLES + 1) / (MORE_SAMPLES + 1)
+        while True:
+            steep = np.zeros(len(t) - 1, dtype=bool)
+            for block, shape in zip(states, self._shapes, strict=True):
+                steep |= _length(np.diff(block, axis=0), shape) > STEEP * _length(block, shape).max(initial=0.0)
+            steep &= np.diff(t) > SHORTEST * self.horizon
+            more = (t[:-1][steep, np.newaxis] + np.diff(t)[steep, np.newaxis] * between).ravel()
+            if not len(more) or len(t) + len(more) > MAX_SAMPLES:
+                return states
+            t = np.concatenate([t, more])
+            order = np.argsort(t)
+            t = t[order]
+            further = self._solution(more)[0]
+            v, y = (np.concatenate(both)[order] for both in zip(states, further, strict=True))
+            states = v, y
 
     @cached_property
     def _kinetic_scale(self) -> float:
