@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, engine
+from . import _checks, _going_on, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
@@ -43,7 +43,7 @@ def adaptive_run(
     max_steps: Any,
     record: Any,
     t0: Any,
-    went: tuple[Any, Any] | None,
+    went: tuple[Any, Any, Any] | None,
     control: Any,
     fused: bool,
     threads: int | None,
@@ -51,7 +51,7 @@ def adaptive_run(
     progress: bool,
     asked: list[Event] | None,
 ) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
+    """The run with a tolerance, and where it began, if it did not go on from ``went``: a carry, its method and what it is for."""
     if how.error_order is None:
         able = ", ".join(m.name for m in every_method() if m.error_order is not None)
         raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
@@ -74,7 +74,7 @@ def adaptive_run(
     times = _checks.numbers("at", at, unit="units of time")
     if times.ndim != 1 or len(times) == 0:
         raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
-    carry = None if went is None else _paces_of(how, *went)
+    carry = None if went is None else _paces_of(system, how, went)
     since = t0 if carry is None else float(carry[engine.TARGET].max(initial=t0))
     if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
         begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
@@ -124,8 +124,11 @@ def adaptive_run(
             system = system.controlled(control, v, y, TINY)
         order = order_of_series(how, relative if carry is None else carry[engine.RELATIVE])
         plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
-        paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
-        out = adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
+        if went is None or carry is None:
+            paces, begins = engine.paces(plan, first, relative, absolute), True
+        else:
+            paces, v, y, begins = _going_on.taken_up(system, carry, str(went[2]), v, y)
+        out = adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, begins), paces, v, y)
     accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
     again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
@@ -158,14 +161,7 @@ def adaptive_run(
         _warn_of_lost(engine.pace_of(out.paces, batch))
     if ended is not None:
         ended.tell(run)
-    return run, None if carry is not None else (v, y)
-
-
-def _without_work(paces: Array) -> Array:
-    """The same where no control has done anything yet in this run."""
-    paces = paces.copy()
-    paces[engine.WORK] = 0.0
-    return paces
+    return run, (v, y) if begins else None
 
 
 def _aimed(paces: Array, target: float) -> Array:
@@ -195,18 +191,22 @@ def order_of_series(method: Method, relative: Array) -> int:
     return order
 
 
-def _paces_of(method: Method, carry: Any, carried_by: Any) -> Array:
-    """The numbers that say where the members stand of a run with a tolerance that goes on."""
-    if carried_by is None:
-        raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
+def _paces_of(system: System, method: Method, went: tuple[Any, Any, Any]) -> Array:
+    """The numbers that say where the members stand of a run with a tolerance that goes on, and their states there."""
+    carry, carried_by, carried_for = went
+    for name, each, what in (("carried_by", carried_by, "the method"), ("carried_for", carried_for, "the digest")):
+        if each is None:
+            raise ArgumentError(f"{name}: expected {what} by which the run goes on, as run.resume has it")
+    _going_on.a_digest(carried_for)
     by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
     if by != method.name:
         raise ArgumentError(f"carry: expected that of a run by {method.name}, got one by {by}")
     numbers = _checks.numbers("carry", carry, finite=False)
-    if numbers.shape[:1] != (engine.PACE_NUMBERS,):
+    of_state = prod(system.v_shape) + prod(system.y_shape)
+    if numbers.shape[:1] != (engine.PACE_NUMBERS + of_state,):
         raise ShapeError(
-            f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
-            f"axis, got shape {numbers.shape}"
+            f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member and the "
+            f"{of_state} of its state along the first axis, got shape {numbers.shape}"
         )
     return numbers
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _encounters, _memory, engine
+from . import _checks, _core, _encounters, _going_on, _memory, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
@@ -62,6 +62,7 @@ def integrate(
     start_step: int = 0,
     carry: Any = None,
     carried_by: str | None = None,
+    carried_for: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
 ) -> Run:
@@ -71,7 +72,7 @@ def integrate(
     others. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
     in a batch, in one piece or in several.
 
-    Most runs need ``v``, ``y``, ``dt``, ``steps`` and ``every``, or ``tolerance`` and ``at``. The last five, from
+    Most runs need ``v``, ``y``, ``dt``, ``steps`` and ``every``, or ``tolerance`` and ``at``. The last six, from
     ``start_step`` on, are those of a run that continues another: ``**run.resume`` gives them, and they are not written by hand.
 
     Args:
@@ -119,6 +120,9 @@ def integrate(
             the step-size controller.
         carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
             meaning.
+        carried_for: for which system and state that carry holds, from ``run.resume``. With other parameters or equations, another
+            control, or a ``v`` or ``y`` of your own, the run begins anew from ``v`` and ``y``; with a tolerance at the last time
+            that was asked for, and with the tolerance of before.
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
@@ -167,7 +171,7 @@ def integrate(
         if not isinstance(start_step, int) or start_step != 0:
             fixed["start_step"] = start_step
         _only_fixed(fixed)
-        went = None if carry is None else (carry, carried_by)
+        went = None if carry is None else (carry, carried_by, carried_for)
         asked = None if events is None else _asked(events, "direct")
         run, begun = adaptive_run(
             system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress, asked
@@ -226,10 +230,11 @@ def integrate(
 
     finite = first_bad_step is None
     v = _checks.block("v", v, system.v_shape, system.axes, finite=finite)
-    if carry is not None:
-        v = _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
+    slot = None if carry is None else _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
     y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    if slot is not None:
+        batches["carry"] = slot.shape[len(system.v_shape) :]
     if control is not None:
         batches["control"] = control.batch
     if force is not None:
@@ -253,7 +258,7 @@ def integrate(
         beside=plan.kept * BYTES_PER_TIME,
     )
     if single:
-        for name, block in (("v", v), ("y", y), ("force", force)):
+        for name, block in (("v", v), ("y", y), ("carry", slot), ("force", force)):
             _checks.fits_single(name, block)
         if control is not None:  # whose target is that of the start as it is stepped
             v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
@@ -264,6 +269,9 @@ def integrate(
         if single:
             _single.check_control(system)
     system = system.stepped_by(how)
+    carried = slot is not None and _going_on.holds(carried_for, system, batch, v, y)
+    if slot is not None and carried:
+        v = spread(slot, system.v_shape, batch)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
@@ -272,12 +280,12 @@ def integrate(
         # In float32 they are computed from the saved states, in float64.
         kept = () if single else tuple(name for name in record if name in system.quantities)
         plan = plan._replace(system=system, record=kept)
-    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
+    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carried)
     ended = None
     if asked is not None:
         from .events import driver  # only such runs need it
 
-        ended = driver.Run(asked, v, y, before, carry is not None)
+        ended = driver.Run(asked, v, y, before, carried)
         make = ended.made
     if _checks.flag("progress", progress):
         with bar_of(f"{how.title}, {steps} steps") as told:
@@ -303,9 +311,9 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         fused=fused,
-        collision=partial(_encounters.collision, plan, v, y, carry is not None) if collides else None,
-        encounter=partial(_encounters.of_member, plan, v, y, carry is not None, steps) if collides else None,
-        overshoots=partial(_encounters.overshoots, plan, v, y, carry is not None, steps) if collides else None,
+        collision=partial(_encounters.collision, plan, v, y, carried) if collides else None,
+        encounter=partial(_encounters.of_member, plan, v, y, carried, steps) if collides else None,
+        overshoots=partial(_encounters.overshoots, plan, v, y, carried, steps) if collides else None,
         recorded=out.recorded,
         work=out.work,
         force=plan.force,
@@ -321,7 +329,7 @@ def integrate(
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before)
-    warn_of_nonsense(run, None if carry is not None or before is not None else (v, y))
+    warn_of_nonsense(run, None if carried or before is not None else (v, y))
     return run
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, engine
+from . import _checks, _core, _going_on, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
 from .compatible import fits_together, forced, goes_on_alike, velocities
@@ -42,6 +42,7 @@ class World:
         carry: what the method carries in place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
             the same step.
         carried_by: the method of that carry, from the ``resume`` of a run or a world. Any other method is then refused.
+        carried_for: for which system and state it holds, likewise. With another system or state the world begins anew.
         dt_before: the step so far, likewise. Another ``dt`` is then refused.
         fused: compute each step with fused multiply-adds; see ``integrate``.
         dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
@@ -102,6 +103,7 @@ class World:
         force: Array | None = None,
         carry: Array | None = None,
         carried_by: str | None = None,
+        carried_for: str | None = None,
         dt_before: float | None = None,
         fused: bool = False,
         dtype: Any = "float64",
@@ -148,6 +150,8 @@ class World:
             stepped = system.controlled(control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt)
             fits_together(stepped, how)
             stepped = stepped.stepped_by(how)
+        if carry is not None and not _going_on.holds(carried_for, stepped, batch, v, y):
+            carry = None
         if single:
             _single.check_control(stepped)
             _single.check_inputs(stepped, abs(t0) + first * dt)
@@ -215,7 +219,11 @@ class World:
         if self._force is not None:
             state["force"] = self._force.copy()
         carry = self._core.carry() if self._method.carry is not None else None
-        return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
+        if carry is None:
+            return state
+        members = self._y.shape[len(self._system.y_shape) :]
+        carried_for = _going_on.identity(self._system, members, self._v, self._y)
+        return state | {"carry": carry.reshape(self._v.shape), "carried_for": carried_for}
 
     def __repr__(self) -> str:
         members = self._y.shape[len(self._system.y_shape) :]
