@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _checks, _going_on, engine
-from ._brief import first_of, share
+from ._brief import share
 from ._checks import Array
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
+from ._stops import warn_of_stops
 from .compatible import goes_with_series, not_of_a_step
 from .control import a_control
 from .errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
-from .result import AdaptiveState, Paces, Run, Status
+from .result import AdaptiveState, Paces, Run
 from .systems import System
 from .systems.base import TINY
 
@@ -156,7 +157,8 @@ def adaptive_run(
     for name in record:
         run.recorded[name] = run.quantity(name)
     if stopped:
-        _warn_of_stops(run)
+        run.stopped_at = np.where(out.status == 0, np.nan, out.paces[engine.TIME])
+        warn_of_stops(run)
     if np.count_nonzero(out.paces[engine.ABSOLUTE]):
         _warn_of_lost(engine.pace_of(out.paces, batch))
     if ended is not None:
@@ -224,29 +226,6 @@ def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
         raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(tolerance)} of them")
     relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in tolerance)
     return relative, absolute
-
-
-#: Why a member of a run with a tolerance stopped, in words.
-WHY_STOPPED = {
-    Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
-    "by the errors that the tolerance allows",
-    Status.NOT_FINITE: "no step, however small, gives finite numbers",
-}
-
-
-def _warn_of_stops(run: Run) -> None:
-    assert run.paces is not None
-    stopped = run.status != 0
-    time = float(run.paces.t[stopped].min())
-    first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
-    some = int(np.count_nonzero(stopped))
-    warnings.warn(
-        f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
-        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {WHY_STOPPED[Status(int(run.status[first]))]}",
-        ToleranceWarning,
-        stacklevel=4,
-    )
 
 
 def lost_in_tolerance(pace: Pace) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -328,7 +328,7 @@ def integrate(
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     if out.diverged:
-        _warn(run, before)
+        _warn(run, before, None if carried else (v, y))
     warn_of_nonsense(run, None if carried or before is not None else (v, y))
     return run
 
@@ -361,8 +361,8 @@ def _kept(array: Array) -> Array:
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
 
 
-def _warn(run: Run, before: Whole | None) -> None:
-    """Warn of the members that diverged in this run."""
+def _warn(run: Run, before: Whole | None, start: tuple[Array, Array] | None) -> None:
+    """Warn of the members that diverged in this run; ``start`` is where it began, if not from what a method carries."""
     if not np.count_nonzero(run.status):
         return
     bad = run.first_bad_step >= 0 if before is None else (run.first_bad_step >= 0) & (before < 0)
@@ -375,6 +375,12 @@ def _warn(run: Run, before: Whole | None) -> None:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
+    if start is not None and step == run.start_step + 1:
+        from ._stops import of_the_start  # only such runs need it
+
+        t = run.t0 + run.start_step * run.dt
+        if wrong := of_the_start(run.system, run.status.shape, t, start, first):
+            met = f"; {wrong} at the start, t = {t:g}"
     some = int(np.count_nonzero(bad))
     warnings.warn(
         f"{share(some, bad.shape, bad.size)} diverged{first_of(some, first, bad.size)} at step {step} "

@@ -110,8 +110,9 @@ class Run(Value):
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
         events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
-        stopped_at: the time at which a terminal event stopped each member, NaN for others, shape (*batch); later saved states are
-            that of the event. None if there was no such event to look for.
+        stopped_at: the time at which each member stopped, by a terminal event or, with a tolerance, by itself before the last
+            output time; NaN for others, shape (*batch). Later saved states are that of the event, or NaN. None if none stopped by
+            itself and there was no such event to look for.
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
         force: what was added to v̇, or None, shape (*block, *batch).
