@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _encounters, engine
+from . import _encounters, _known_energy, engine
 from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
 from .control import EnergyControl
@@ -57,6 +57,8 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
     if (text := system.doubt(run.y)) is not None:
         warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
+        if text is None and _is_heard(AccuracyWarning) and (text := _known_energy.told(run, start)) is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
         return
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None

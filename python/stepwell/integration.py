@@ -140,9 +140,11 @@ def integrate(
         ToleranceWarning: how many members stopped before the last time of ``at``, and why; or that an absolute tolerance is so
             large that the motion is lost in it.
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
-            sine; bodies that nothing controls ended with an energy of another size; bodies met within one step,
-            which is then named. That is looked for where it is little work against the run, or where there is reason to
-            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
+            sine; bodies that nothing controls ended with an energy of another size, or with a tolerance any system whose energy
+            or declared invariant is constant; a motion along a line passed a barrier that is higher than its energy; bodies met
+            within one step, which is then named. That is looked for where it is little work against the run, or where there is
+            reason to (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every
+            step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
