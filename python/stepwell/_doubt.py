@@ -143,12 +143,13 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
     """
     n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
-    h, time = run.dt, run.steps * run.dt
+    # Where time runs back, bodies are looked at that go the other way.
+    h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
     # As many states as are little work against the run. Time runs back from the last.
     few = run.status.ndim == 0 and n <= FEW_BODIES
     looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
-    states = [start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1])]
+    states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
     if few:
         if made < FEW_EVALUATIONS:
             return []

@@ -16,7 +16,7 @@ from ._checks import Array
 from ._doubt import warn_of_nonsense
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
 from .adaptive_runs import adaptive_run
-from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
+from .compatible import fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
 from .method_records import Method
@@ -80,7 +80,7 @@ def integrate(
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
+        dt: the step, in units of time, below zero to go back; if None in a continued run, that of it. With a tolerance, the step
             to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
             time from rest.
         steps: number of steps, one or more.
@@ -203,7 +203,7 @@ def integrate(
         )
     if form == "power":
         goes_on_by_a_rule(system)
-    dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    dt = _checks.step(dt)
     if single:
         from . import _single  # only such runs need it
 
@@ -213,14 +213,17 @@ def integrate(
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
     begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
-    if not begin < end < np.inf:
+    if begin == end or not np.isfinite(end):
         raise ArgumentError(
             f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
             f"after {steps} steps of {dt:g}"
         )
-    system.check_time(max(-begin, end))
+    last = max(abs(begin), abs(end))
+    system.check_time(last)
     if single:
-        _single.check_inputs(system, max(-begin, end))
+        _single.check_inputs(system, last)
+    if dt < 0.0:
+        goes_back(system, control)
     every = None if every is None else _checks.count("every", every, 1)
     record = quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)

@@ -11,7 +11,7 @@ import numpy as np
 from . import _checks, _core, _going_on, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
-from .compatible import fits_together, forced, goes_on_alike, velocities
+from .compatible import fits_together, forced, goes_back, goes_on_alike, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
 from .method_records import Method
@@ -31,7 +31,7 @@ class World:
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
-        dt: the step, in units of time, above zero.
+        dt: the step, in units of time, below zero to go back.
         t0: time of step 0.
         start_step: number of the first step.
         start: how to start a method that has several ways; see ``method(…).starts``.
@@ -112,7 +112,7 @@ class World:
         how = find_method(method)
         system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
-        dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        dt = _checks.step(dt)
         single = _checks.is_single(dtype)
         kind: Any = np.float32 if single else np.float64
         if single:
@@ -144,7 +144,10 @@ class World:
                 raise ShapeError(f"carry: expected the shape of v, {v.shape}, got {carry.shape}")
             carry = np.ascontiguousarray(carry, dtype=kind).reshape(-1)
         stepped = system
-        if (control := a_control(control)) is not None:
+        control = a_control(control)
+        if dt < 0.0:
+            goes_back(system, control)
+        if control is not None:
             if _checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
             stepped = system.controlled(control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt)
@@ -154,8 +157,8 @@ class World:
             carry = None
         if single:
             _single.check_control(stepped)
-            _single.check_inputs(stepped, abs(t0) + first * dt)
-        stepped.check_time(abs(t0) + first * dt)
+            _single.check_inputs(stepped, abs(t0) + first * abs(dt))
+        stepped.check_time(abs(t0) + first * abs(dt))
         fused = _checks.flag("fused", fused)
         plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         # Views: the core knows rows, not axes.
