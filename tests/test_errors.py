@@ -159,8 +159,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         "control: leapfrog goes on with v_half in place of v, so it cannot be combined with Projection",
     ),
     # numbers
-    (lambda: run(dt=0.0), E.ArgumentError, "dt: expected numbers above zero in units of time, got 0"),
-    (lambda: run(dt=-0.1), E.ArgumentError, "dt: expected numbers above zero in units of time, got -0.1"),
+    (lambda: run(dt=0.0), E.ArgumentError, "dt: expected a number other than zero in units of time, got 0"),
     (lambda: run(dt=np.nan), E.NotFiniteError, "dt: expected finite numbers in units of time, got nan"),
     (lambda: run(dt=[0.1, 0.2]), E.ShapeError, "dt: expected one number in units of time, got an array of shape (2,)"),
     (lambda: run(dt="fast"), E.DTypeError, "dt: expected real numbers in units of time, got 'fast'"),
@@ -445,7 +444,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         E.ShapeError,
         "v and y: the system's batch (2, 1) does not broadcast to theirs, (3,)",
     ),
-    (lambda: world(dt=0.0), E.ArgumentError, "dt: expected numbers above zero"),
+    (lambda: world(dt=0.0), E.ArgumentError, "dt: expected a number other than zero"),
     (lambda: world().step(-1), E.ArgumentError, "n: expected 0 or more, got -1"),
 ]
 

@@ -279,6 +279,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "start": None,
             "carry": None,
             "carried_by": None,
+            "carried_for": None,
             "first_bad_step": None,
             "dt_before": None,
         }
@@ -308,6 +309,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "start": "first_order",
             "carry": 1.0,
             "carried_by": "verlet",
+            "carried_for": "0" * 64,
             "backend": "numpy",
         },
     ),

@@ -201,6 +201,16 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
     return float(array)
 
 
+def step(value: Any) -> float:
+    """Return ``dt`` as one float other than zero; below zero time runs back."""
+    if type(value) is float and isfinite(value) and value != 0.0:
+        return value
+    dt = number("dt", value, unit="units of time")
+    if dt == 0.0:
+        raise ArgumentError("dt: expected a number other than zero in units of time, got 0")
+    return dt
+
+
 def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     """Return ``value`` as a whole number in ``least … most``."""
     if type(value) is int and least <= value <= most:

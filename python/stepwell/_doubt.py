@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _encounters, engine
+from . import _encounters, _known_energy, engine
 from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
 from .control import EnergyControl
@@ -58,6 +58,8 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
     if (text := system.doubt(run.y)) is not None:
         warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
+        if text is None and _is_heard(AccuracyWarning) and (text := _known_energy.told(run, start)) is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
         return
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None
@@ -144,12 +146,13 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
     """
     n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
-    h, time = run.dt, run.steps * run.dt
+    # Where time runs back, bodies are looked at that go the other way.
+    h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
     # As many states as are little work against the run. Time runs back from the last.
     few = run.status.ndim == 0 and n <= FEW_BODIES
     looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
-    states = [start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1])]
+    states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
     if few:
         if made < FEW_EVALUATIONS:
             return []

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _checks, engine
-from ._brief import first_of, share
+from . import _checks, _going_on, engine
+from ._brief import share
 from ._checks import Array, Shape
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
+from ._stops import warn_of_stops
 from .compatible import goes_with_series, not_of_a_step
 from .control import a_control
 from .errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
 from .reference.acceptance import Acceptance
-from .result import AdaptiveState, Paces, Run, Status
+from .result import AdaptiveState, Paces, Run
 from .systems import System
 from .systems.base import TINY
 
@@ -61,7 +62,7 @@ def adaptive_run(
     options: AdaptiveOptions,
     record: Any,
     t0: Any,
-    went: tuple[Any, Any] | None,
+    went: tuple[Any, Any, Any] | None,
     control: Any,
     fused: bool,
     threads: int | None,
@@ -69,7 +70,7 @@ def adaptive_run(
     progress: bool,
     asked: list[Event] | None,
 ) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
+    """The run with a tolerance, and where it began, if it did not go on from ``went``: a carry, its method and what it is for."""
     control = _steppable(system, how, a_control(control), options, went)
     t0 = _checks.numbers("t0", t0, unit="units of time")
     times = _checks.numbers("at", options.at, unit="units of time")
@@ -91,8 +92,8 @@ def adaptive_run(
     groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
     carry = None
     if went is not None:
-        carry = _paces_of(how, *went, groups)
-        acceptance = acceptance._replace(own=len(carry) == engine.PACE_NUMBERS + 3 * groups)
+        carry = _paces_of(how, went, groups, numbers)
+        acceptance = acceptance._replace(own=len(carry) == engine.PACE_NUMBERS + 3 * groups + numbers)
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
     batches |= {"t0": t0.shape, "at": times.shape[1:]}
     first = most_step = None
@@ -158,11 +159,12 @@ def adaptive_run(
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, carry is None, None if jumps is None else np.sort(sign * jumps, axis=0))
-        if carry is None:
+        if carry is None or went is None:
             assert tolerances is not None
             paces = engine.paces(plan, first, tolerances, most_step, pacing)
         else:
-            paces = _without_work(carry)
+            paces, v, y, begins = _going_on.taken_up(plan, pacing, carry, str(went[2]), v, y)
+            pacing = pacing._replace(begins=begins)
             if most_step is not None:
                 paces[engine.MOST_STEP] = most_step
         out = adapt(plan, pacing, paces, v, y)
@@ -201,12 +203,13 @@ def adaptive_run(
     for name in record:
         run.recorded[name] = run.quantity(name)
     if stopped:
-        _warn_of_stops(run)
+        run.stopped_at = np.where(out.status == 0, np.nan, run.paces.t)
+        warn_of_stops(run)
     if not acceptance.own and np.count_nonzero(out.paces[engine.ABSOLUTE]):
         _warn_of_lost(out.paces, groups)
     if ended is not None:
         ended.tell(run)
-    return run, None if carry is not None else (v, y)
+    return run, (v, y) if pacing.begins else None
 
 
 def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptions, went: Any) -> Any:
@@ -314,13 +317,6 @@ def _name_of(system: System, place: int) -> str:
     return f"{block}[{', '.join(map(str, np.unravel_index(number, shape)))}]" if shape else block
 
 
-def _without_work(paces: Array) -> Array:
-    """The same where no control has done anything yet in this run."""
-    paces = paces.copy()
-    paces[engine.WORK] = 0.0
-    return paces
-
-
 def _aimed(paces: Array, target: float) -> Array:
     """The same with another output time."""
     paces = paces.copy()
@@ -355,15 +351,18 @@ def _relative(carry: Any, acceptance: Acceptance, groups: int) -> Array:
     return np.asarray(carry[engine.PACE_NUMBERS + groups : engine.PACE_NUMBERS + 2 * groups])
 
 
-def _paces_of(method: Method, carry: Any, carried_by: Any, groups: int) -> Array:
-    """The numbers that say where the members stand of a run with a tolerance that goes on."""
-    if carried_by is None:
-        raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
+def _paces_of(method: Method, went: tuple[Any, Any, Any], groups: int, of_state: int) -> Array:
+    """The numbers that say where the members stand of a run with a tolerance that goes on, and their states there."""
+    carry, carried_by, carried_for = went
+    for name, each, what in (("carried_by", carried_by, "the method"), ("carried_for", carried_for, "the digest")):
+        if each is None:
+            raise ArgumentError(f"{name}: expected {what} by which the run goes on, as run.resume has it")
+    _going_on.a_digest(carried_for)
     by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
     if by != method.name:
         raise ArgumentError(f"carry: expected that of a run by {method.name}, got one by {by}")
     numbers = _checks.numbers("carry", carry, finite=False)
-    expected = [engine.PACE_NUMBERS + groups, engine.PACE_NUMBERS + 3 * groups]
+    expected = [engine.PACE_NUMBERS + each * groups + of_state for each in (1, 3)]
     if numbers.shape[:1] not in [(each,) for each in expected]:
         raise ShapeError(
             f"carry: with a tolerance expected that of run.resume, {expected[0]} or {expected[1]} numbers for each member along "
@@ -421,29 +420,6 @@ def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acc
     for group, row in zip(groups, of_each, strict=True):
         least[group] = np.minimum(least[group], row)
     return least
-
-
-#: Why a member of a run with a tolerance stopped, in words.
-WHY_STOPPED = {
-    Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
-    "by the errors that the tolerance allows",
-    Status.NOT_FINITE: "no step, however small, gives finite numbers",
-}
-
-
-def _warn_of_stops(run: Run) -> None:
-    assert run.paces is not None
-    stopped = run.status != 0
-    time = float(run.paces.t[stopped].min())
-    first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
-    some = int(np.count_nonzero(stopped))
-    warnings.warn(
-        f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
-        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {WHY_STOPPED[Status(int(run.status[first]))]}",
-        ToleranceWarning,
-        stacklevel=4,
-    )
 
 
 def lost_in_tolerance(paces: Array, groups: int) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -19,7 +19,7 @@ class StepwellError(Exception):
         ...     sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.0, steps=10)
         ... except sw.StepwellError as error:
         ...     print(error)
-        dt: expected numbers above zero in units of time, got 0
+        dt: expected a number other than zero in units of time, got 0
     """
 
 

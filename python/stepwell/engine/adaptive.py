@@ -147,6 +147,7 @@ def paces(
     t0, groups, own = plan.t0, groups_of(plan), []
     relative, absolute = tolerances.relative, np.zeros(()) if tolerances.absolute is None else tolerances.absolute
     if tolerances.of_groups:
+        absolute = np.zeros_like(relative) if tolerances.absolute is None else absolute
         own = [*relative, *absolute]
         relative, absolute = relative.min(axis=0), absolute.max(axis=0)
     step: Any = first

@@ -48,11 +48,18 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     inputs = list(inputs)
     q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
     for i, node in enumerate(plan.method.nodes):
-        pulse = np.zeros(grid + 1)
-        pulse[_bin(node, grid)] = 1.0
+        pulse, part = np.zeros(grid + 1), abs(plan.dt) / grid
+        # Of a step back in time the last part comes first, and a node is at the end of its part.
+        back = plan.dt < 0.0
+        pulse[grid - _bin(node, grid) if back else _bin(node, grid)] = 1.0
+        start = -(grid + _LATE) * part if back else 0.0
         for j, name in enumerate(inputs):
-            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)))
+            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, part, start)))
     return q
+
+
+#: Nodes are less than 0.9 of a part behind its beginning: so much more of it lies behind all of them.
+_LATE = 0.95
 
 
 def _bin(node: float, grid: int) -> int:
@@ -149,7 +156,7 @@ def _seen(
 
     Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
-    most = _HUGE * min(plan.dt, 1.0)
+    most = _HUGE * min(abs(plan.dt), 1.0)
 
     def is_near(v: Array, y: Array) -> Any:
         return (before < 0) & ~((np.abs(v) < most).all(axis=-1 - before.ndim) & (np.abs(y) < most).all(axis=-1 - before.ndim))

@@ -52,9 +52,11 @@ class AdaptiveRun:
     def tell(self, run: Any) -> None:
         """Give the result what was found."""
         assert self._driver is not None
-        run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
-        if run.stopped_at is not None:
-            run.status = np.where(np.isnan(run.stopped_at), run.status, Status.EVENT).astype(np.int8)
+        by_themselves, stops = run.stopped_at, self._driver.stops()
+        run.events = self._driver.occurrences()
+        if stops is not None:
+            run.status = np.where(np.isnan(stops), run.status, Status.EVENT).astype(np.int8)
+            run.stopped_at = stops if by_themselves is None else np.where(np.isnan(stops), by_themselves, stops)
 
 
 class _Driver(Collected):

@@ -10,7 +10,8 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from .._runs import goes_with_times
-from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
+from .._stops import WHY_STOPPED
+from ..adaptive_runs import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from ..engine import PACE_NUMBERS
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..method_records import Method

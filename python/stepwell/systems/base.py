@@ -345,7 +345,7 @@ class System(Fixed, Value, ABC):
         """The same system without inputs."""
         return self
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> System:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> System:
         """The same system with these samples as its only input."""
         raise KeyError(name)
 

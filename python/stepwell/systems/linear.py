@@ -121,11 +121,11 @@ class LinearSystem(System):
         """The same system without inputs."""
         return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> LinearSystem:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> LinearSystem:
         """The same system with these samples as its only input."""
         if name not in self.input_names:
             raise KeyError(name)
-        x = [Pulse(values, interval) if name == each else None for each in self.input_names]
+        x = [Pulse(values, interval, start) if name == each else None for each in self.input_names]
         return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
 
     def _parts(self) -> list[Array]:

@@ -126,9 +126,9 @@ class Oscillator(System):
         """The same oscillator without inputs."""
         return self._driven({})
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> Oscillator:
         """The same oscillator with these samples as its only input."""
-        return self._driven({name: Pulse(values, interval)})
+        return self._driven({name: Pulse(values, interval, start)})
 
     def _driven(self, inputs: dict[str, Input]) -> Oscillator:
         terms: dict[str, Any] = {"drag": self.drag, "friction": self.friction, "form": self.form}

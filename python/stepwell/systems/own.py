@@ -28,7 +28,7 @@ from .inputs import Input, Sampled, Sinusoid
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_single", "_with_functions", "_bounds", "_met")
+FOUND_LATER = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
 #: Of how many shapes of states it is remembered what they are of.
 MOST_MET = 256
 #: Of how many functions the operations are kept.
@@ -42,6 +42,8 @@ class OwnSystem(System):
     """A system of your own equations: calling a function that is decorated by ``stepwell.system`` returns one."""
 
     kernel = "equations"
+    #: The operations, and what they are known by.
+    _digest: tuple[Any, str] | None = None
     reference = Reference
     #: The control that keeps an invariant as a part of the rates, or None.
     push: Control | None = None
@@ -99,7 +101,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
@@ -328,6 +330,16 @@ class OwnSystem(System):
         if self._with_functions is None or self._with_functions[0] is not self._core:
             self._with_functions = self._core, self._rates({})
         return self._with_functions[1]
+
+    @property
+    def digest(self) -> str:
+        """What its operations are known by; a long list of them takes long to write out, so it is kept."""
+        from ..interop.parts import digest  # only runs that go on need it
+
+        bound = self._retraced()
+        if bound._digest is None or bound._digest[0] is not bound._core:
+            bound._digest = bound._core, digest(bound)
+        return bound._digest[1]
 
     def _retraced(self) -> OwnSystem:
         """With its operations, which an unpickled copy lacks."""
