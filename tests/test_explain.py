@@ -408,7 +408,6 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
             following, v1, y1 = evaluated_attempt(plan, 9)(pace, 9, v, y)
         else:
             s = adaptive.Attempted(system.scaled(1.0, system.batch))
-            axes = len(system.v_shape), len(system.y_shape)
             with np.errstate(all="ignore"):
                 following, v1, y1 = engine.attempts(plan, s)(pace, 9.0, v, y)
         assert_computes(after, v1, y1, *following.numbers)

@@ -213,6 +213,8 @@ def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(_checks, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
     with pytest.raises(sw.errors.TooLargeError, match=r"A: the matrix and its copies of 1 members need 38\.1 MiB, but 30 MiB"):
         sw.LinearSystem(A)
+
+
 @pytest.mark.parametrize("form", ["matrix", "power"])
 def test_transition_matrices_are_counted_before_they_are_made(form: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight numbers for an element of 60 000 × 60 000, and three more for a power of it."""

@@ -111,9 +111,7 @@ def _begun_anew(plan: engine.Plan, pacing: engine.Pacing, pace: Array) -> Array:
     lasts = bool((pace[engine.LASTS] > 0.0).all())
     tolerances = engine.Tolerances(relative, None if lasts else absolute, len(own) > 0)
     numbers = engine.paces(plan._replace(t0=time), None, tolerances, pace[engine.MOST_STEP], pacing)
-    begun = np.broadcast_to(
-        numbers.reshape(len(numbers), *(numbers.shape[1:] or plan.batch and len(plan.batch) * (1,))), pace.shape
-    )
-    begun = np.array(begun)
+    axes = numbers.shape[1:] or len(plan.batch) * (1,)
+    begun = np.array(np.broadcast_to(numbers.reshape(len(numbers), *axes), pace.shape))
     begun[engine.COUNTS] = pace[engine.COUNTS]
     return begun

@@ -203,7 +203,7 @@ def adaptive_run(
     for name in record:
         run.recorded[name] = run.quantity(name)
     if stopped:
-        run.stopped_at = np.where(out.status == 0, np.nan, run.paces.t)
+        run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
         warn_of_stops(run)
     if not acceptance.own and np.count_nonzero(out.paces[engine.ABSOLUTE]):
         _warn_of_lost(out.paces, groups)
