@@ -434,8 +434,8 @@ def attempt(
     least, bound = tolerated(pace, step, acceptance.counts(np.size(v), np.size(y)), old, new)
     error = sizes(*tableau.combined(pair.ERROR, increments), block_axes, groups)
     r = over(error, bound)
-    # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅ may
-    # be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
+    # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅
+    # may be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
     if coarse := getattr(pair, "COARSE", None):
         other = over(sizes(*tableau.combined(coarse, increments), block_axes, groups), bound) / r
         smooth = less(other * other * (other * (r * pace.relative)), SMOOTH * SMOOTH)

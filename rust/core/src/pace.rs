@@ -549,7 +549,13 @@ impl<N: Number> Pace<N> {
 
     /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate is of a
     /// high order; `unseen`: it is only rounding; `longest` and `new` are the largest sizes before, and those that the groups would have.
-    fn decided(&self, high: bool, (r, unseen): (N, N::Truth), (longest, new): (&[N], &[N]), outlook: Outlook<N>) -> (Pace<N>, Vec<N>, N::Truth) {
+    fn decided(
+        &self,
+        high: bool,
+        (r, unseen): (N, N::Truth),
+        (longest, new): (&[N], &[N]),
+        outlook: Outlook<N>,
+    ) -> (Pace<N>, Vec<N>, N::Truth) {
         let number = N::of;
         let Outlook { step, is_extra, ends, runs } = outlook;
         let good = r.at_most(number(1.0)); // NaN is not

@@ -7,8 +7,8 @@ mod world;
 use std::cell::RefCell;
 
 use numpy::{
-    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
-    PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
+    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2,
+    PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{

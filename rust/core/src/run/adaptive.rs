@@ -226,7 +226,8 @@ impl AdaptiveBatch for AdaptiveLanes {
         let lanes = self.step.lanes();
         let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
         let made = one.run(stage, spec, member, &self.state, (lane, lanes));
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales) {
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales)
+        {
             row[lane] = *number;
         }
     }

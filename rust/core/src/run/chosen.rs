@@ -317,7 +317,8 @@ impl<'a> Worker<'a> {
         let (before, after) = self.plan.jumps.split_at(self.plan.jumps.len() / 2);
         let passed = before.partition_point(|row| row.at(member) <= pace.t);
         let Some(after) = passed.checked_sub(1).and_then(|last| after.get(last)) else { return false };
-        let wall = |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
+        let wall =
+            |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
         let after = after.at(member);
         self.group.set_pace(lane, pace.crossed(after, wall(after), self.group.has_terms()));
         true
