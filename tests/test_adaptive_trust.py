@@ -14,7 +14,7 @@ from stepwell.reference.traced import Tracer
 from stepwell.result import Status
 
 PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
-ONES = np.ones(3)
+ONES, NOTHING = np.ones(3), sw.Sampled([0.0], interval=1.0)
 
 
 @sw.system(order=1)
@@ -382,3 +382,42 @@ def test_equal_bits_with_everything(method: str) -> None:
     assert np.array_equal(runs[0].y, runs[1].y)
     for name in ("t", "h", "accepted", "rejected"):
         assert np.array_equal(getattr(runs[0].paces, name), getattr(runs[1].paces, name))
+
+
+# ---- where else the options go
+
+
+def test_inputs_know_their_jumps() -> None:
+    """Held samples are met at their times: as good as a closed form, and no step is rejected for them."""
+    values = np.array([0.0, 1.0, -2.0, 0.5, 0.5, 3.0])
+
+    @sw.system(order=1)
+    def follows(t: Any, y: Any, *, u: Any = NOTHING) -> Any:
+        return u - y
+
+    y, at = 0.0, np.arange(1.0, 7.0)
+    right = []
+    for value in values:  # over each second, y goes to the value by 1 − 1/e
+        y = value + (y - value) * np.exp(-1.0)
+        right.append(y)
+    for method in PAIRS:
+        run = sw.integrate(follows(u=sw.Sampled(values, interval=1.0)), method, y=0.0, tolerance=1e-10, at=at)
+        assert run.y == pytest.approx(right, abs=1e-8)
+        reference = sw.integrate(
+            follows(u=sw.Sampled(values, interval=1.0)), method, y=0.0, tolerance=1e-10, at=at, backend="numpy"
+        )
+        assert np.array_equal(run.y, reference.y)
+
+
+def test_scenes_sweeps_and_solve_ivp() -> None:
+    """The same options, and the same numbers."""
+    options: dict[str, Any] = {"jumps": [7.3, 7.33], "max_step": 0.4, "positive": True}
+    system, at = gated(begin=7.3, end=7.33), [7.32, 8.0]
+    run = sw.integrate(system, "merson", y=0.1, tolerance=1e-8, at=at, **options)
+    scene = sw.scenes.Scene(system, y=0.1, horizon=8.0, **options)
+    assert np.array_equal(scene.run("merson", tolerance=1e-8, at=at).y, run.y)
+    pytest.importorskip("xarray")
+    found = sw.sweep(gated, {"begin": ("run", [7.3]), "end": ("run", [7.33])}, "merson", y=0.1, tolerance=1e-8, at=at, **options)
+    assert found.y_last.values[0] == run.y[-1]
+    with pytest.raises(ArgumentError, match="max_step: goes with tolerance= and at= only"):
+        sw.integrate(system, "merson", y=0.1, dt=0.1, steps=2, max_step=0.1)

@@ -73,7 +73,7 @@ def adaptive_run(
     """The run with a tolerance, and where it began, if it did not go on from ``went``: a carry, its method and what it is for."""
     control = _steppable(system, how, a_control(control), options, went)
     t0 = _checks.numbers("t0", t0, unit="units of time")
-    times = _checks.numbers("at", options.at, unit="units of time")
+    times = _checks.numbers("at", options.at, unit="units of time").copy()  # they become those of the run
     if times.ndim == 0 or len(times) == 0:
         raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
     backward = _is_backward(times, t0)
@@ -112,7 +112,7 @@ def adaptive_run(
     if options.max_step is not None:
         most_step = _checks.numbers("max_step", options.max_step, positive=True, unit="units of time")
         batches["max_step"] = most_step.shape
-    jumps = None if options.jumps is None else _jumps(options.jumps)
+    jumps = _jumps(system, options.jumps, t0, times)
     if jumps is not None:
         batches["jumps"] = jumps.shape[1:]
     if control is not None:
@@ -256,10 +256,16 @@ def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
     raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown}{'…' * (len(times) > 5)}")
 
 
-def _jumps(given: Any) -> Array:
-    """The times that no step crosses, in ascending order, along the first axis."""
+def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
+    """The times that no step crosses, in ascending order along the first axis: those of the user and of inputs."""
+    # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
+    ahead = bool(np.max(times[-1] - t0) >= 0.0)
+    of_inputs = system.jumps(*((float(np.min(t0)), np.inf) if ahead else (-np.inf, float(np.max(t0)))))
+    if given is None:
+        return of_inputs if len(of_inputs) else None
     jumps = np.atleast_1d(_checks.numbers("jumps", given, unit="units of time"))
-    return np.sort(jumps, axis=0)
+    own = np.broadcast_to(of_inputs.reshape(-1, *(jumps.ndim - 1) * (1,)), (len(of_inputs), *jumps.shape[1:]))
+    return np.sort(np.concatenate([jumps, own]), axis=0)
 
 
 def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:

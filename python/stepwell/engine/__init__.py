@@ -12,6 +12,7 @@ import threading
 from .. import _core
 from .adaptive import (
     ABSOLUTE,
+    BLIND,
     COUNTS,
     ERROR,
     HELD,
@@ -47,6 +48,7 @@ from .plan import Arrays, Outcome, Plan, Watched, model, pushes
 
 __all__ = [
     "ABSOLUTE",
+    "BLIND",
     "COUNTS",
     "ERROR",
     "HELD",

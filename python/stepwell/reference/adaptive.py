@@ -48,7 +48,7 @@ OUTSIDE = 16.0
 
 #: The first step is the fraction FIRST of the time in which the state changes, at the start and in two looks ahead: rather too
 #: short than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹² roundings.
-#: After a jump it is that fraction of the step before.
+#: After a jump it is MIN_FACTOR times the step before.
 FIRST, MOVES = 0.01, 1.0 / (1 << 40)
 
 OK, BUDGET, UNDERFLOW, NOT_FINITE = 0, 2, 3, 4
@@ -203,7 +203,9 @@ class Jumps(NamedTuple):
 
     def passed(self, t: Any) -> Any:
         """How many jumps are at or before t."""
-        return np.sum(self.before.reshape(-1, *(self.before.shape[1:] or np.ndim(t) * (1,))) <= t, axis=0)
+        if self.before.ndim == 1:
+            return np.searchsorted(self.before, t, side="right")
+        return np.sum(self.before <= t, axis=0)
 
     def wall(self, t: Any) -> Any:
         """The next time at which a step from t must end, infinite if there is none."""
@@ -217,12 +219,12 @@ class Jumps(NamedTuple):
         passed = self.passed(pace.t)
         t = np.where(there, self._of_each(pace.t, self.after, np.maximum(passed - 1, 0)), pace.t)
         least = MOVES * np.abs(t)
-        first = FIRST * pace.h
+        first = MIN_FACTOR * pace.h
         return pace._replace(
             t=t,
             wall=np.where(there, self.wall(t), pace.wall),
             h=pace.h if series else np.where(there, np.where(first < least, least, first), pace.h),
-            before=np.where(there, FIRST * pace.before if series else 1.0, pace.before),
+            before=np.where(there, MIN_FACTOR * pace.before if series else 1.0, pace.before),
             most=np.where(there, MAX_FACTOR, pace.most),
         )
 

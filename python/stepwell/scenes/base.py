@@ -53,6 +53,9 @@ class Scene(Value):
         until: the last time for which ``exact`` is valid, in units of time; errors after it are NaN, since they are not known.
         control: the control with which ``run`` steps, or None.
         period: the period of the exact solution, in units of time, or None.
+        jumps: times at which rates jump, as ``integrate`` takes them, for adaptive steps; None if there are none.
+        max_step: the longest adaptive step, in units of time, or None.
+        positive: components that must not become negative in adaptive steps, as ``integrate`` takes them, or None.
         name: the name by which it is chosen.
         title: its title in a picture; the name if empty.
         section: section of the document, or a note that the scene is stepwell's own.
@@ -80,6 +83,9 @@ class Scene(Value):
     until: float = math.inf
     control: AnyControl | None = None
     period: float | None = None
+    jumps: Any = None
+    max_step: float | None = None
+    positive: Any = None
     name: str = "unnamed"
     title: str = ""
     section: str = ""
@@ -114,6 +120,10 @@ class Scene(Value):
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
         a_control(self.control)
+        if self.jumps is not None:
+            found["jumps"] = tuple(np.atleast_1d(_checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
+        if self.max_step is not None:
+            found["max_step"] = _checks.number("max_step", self.max_step, positive=True, unit="units of time")
         for name, value in (found | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 
@@ -143,11 +153,17 @@ class Scene(Value):
                 f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
         if "tolerance" in options or "at" in options:
-            options = {"at": [self.horizon], **options}
-            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+            asked: dict[str, Any] = {"control": self.control, "at": [self.horizon]} | self.adaptive_options | options
+            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **asked)
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+
+    @property
+    def adaptive_options(self) -> dict[str, Any]:
+        """Its arguments of ``integrate`` that go with a tolerance."""
+        options = {"jumps": self.jumps, "max_step": self.max_step, "positive": self.positive}
+        return {name: value for name, value in options.items() if value is not None}
 
     def explore(self, *, methods: Any = None, show: bool = True) -> Explorer:
         """Show the scene in the browser: two methods side by side, with sliders for the step and the parameters.

@@ -99,6 +99,8 @@ def arguments(
         order_of_series(method, axis.values)
     goes_with_times(tolerance is not None or "tolerance" in varied, at)
     times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
+    if times.ndim > 1:
+        raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
     _fits_outcomes(outcomes, times)
     given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
     if options["max_steps"] is not None:

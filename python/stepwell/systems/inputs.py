@@ -134,11 +134,11 @@ class Sampled(Fixed, Value):
         jump of the second derivative (cubic), at each sample.
         """
         times: Array = self.times
+        if self.constant:
+            return np.empty(0)
         if self.interpolation == "hold":
             changes = (self.values[1:] != self.values[:-1]).reshape(len(times) - 1, -1).any(axis=1)
             times = times[1:][changes]
-        elif self.constant:
-            times = times[:0]
         return times[(begin < times) & (times < end)]
 
     def over_steps(self, first: float, dt: float) -> Sampled:

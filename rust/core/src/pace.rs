@@ -31,7 +31,7 @@ pub(crate) const ONSET: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The first step is the fraction FIRST of the time in which the state changes, at the start and in two looks ahead: rather too short
 /// than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹² roundings. After a jump
-/// it is that fraction of the step before.
+/// it is MIN_FACTOR times the step before.
 const FIRST: f64 = 0.01;
 const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 
@@ -221,9 +221,9 @@ impl Pace<f64> {
     /// anew. A series chooses its step by itself.
     #[must_use]
     pub fn crossed(self, after: f64, wall: f64, series: bool) -> Self {
-        let (least, first) = (MOVES * after.abs(), FIRST * self.h);
+        let (least, first) = (MOVES * after.abs(), MIN_FACTOR * self.h);
         let h = if series { self.h } else { longer(first, least) };
-        let before = if series { FIRST * self.before } else { 1.0 };
+        let before = if series { MIN_FACTOR * self.before } else { 1.0 };
         Pace { t: after, wall, h, before, most: MAX_FACTOR, ..self }
     }
 
