@@ -23,7 +23,7 @@ const LOW: u32 = 5;
 
 /// A change of y in a step that is smaller than this, relative to the largest length of y so far, is lost in rounding, with some margin. So
 /// an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only rounding.
-const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The first step is the fraction FIRST of the time in which the state changes at the start: rather too short than too long, since it
 /// then grows by MAX_FACTOR a step. Where there is no such time it is BLIND, in units of time. It is at least MOVES times the time of the

@@ -291,13 +291,13 @@ fn trace_begin(tape: Tape, given: &Given, method: &Record) -> Result<(Tape, Vec<
 fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let system = (kind.make)(&parameters(given, Symbol::of(1.0)));
-    let terms = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
+    let (terms, branches) = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
     let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
-    (attempt_by(kind, given, shape, &terms), numbers)
+    (attempt_by(kind, given, shape, (&terms, &branches)), numbers)
 }
 
 /// One attempt by coefficients of a series.
-fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
+fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: series_pace::Known<Symbol>) -> Vec<Id> {
     let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
     let one = parameters(given, Symbol::of(1.0));
     let projected = controls::wrap(&one, (kind.make)(&one), Symbol::of(0.0));
@@ -315,7 +315,7 @@ fn trace_by_terms(tape: Tape, given: &Given, shape: Shape, numbers: usize) -> Re
         let (state, first) = (shape.v + shape.y, shape.v + shape.y + Pace::<Symbol>::NUMBERS);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
         let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
-        let mut next = attempt_by(kind, given, shape, &terms);
+        let mut next = attempt_by(kind, given, shape, (&terms, &[]));
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
     }))
