@@ -21,8 +21,8 @@ Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None]]
 def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
     """The marked values on a tape, each with its bounds, the values that it depends on and its derivatives by them.
 
-    Derivatives join the tape. That of a function may be another function, such as the cosine of a sine; then that one's derivative
-    joins, too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
+    Derivatives join the tape. That of a function may be another function, such as the cosine of a sine; then that one's
+    derivative joins, too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
     """
     found: Functions = []
     with recording(marks):

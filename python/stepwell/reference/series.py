@@ -380,9 +380,7 @@ def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tup
     return expanded(s, order, t, (h, 1.0), v, y)[0]
 
 
-def expanded(
-    s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any
-) -> tuple[list[tuple[Any, Any]], list[Branch]]:
+def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any) -> tuple[list[tuple[Any, Any]], list[Branch]]:
     """The same coefficients, and the branches of functions that the rates are on.
 
     ``lengths`` are the unit of time in powers of which the coefficients are, and this over the step to which ``s`` is scaled.

@@ -75,7 +75,7 @@ def attempt(
 
 
 def unit_of(step: Any) -> Any:
-    """The unit of time of the coefficients: the power of two at or below a step, so that they overflow in no unit of the user's."""
+    """The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's."""
     return and_bits(step, EXPONENT)
 
 
@@ -153,7 +153,7 @@ def reach(
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
-    """Whether all functions stay on their branch within a step, or the step is so short that its motion is tolerated as an error."""
+    """Whether all functions stay on their branch within a step, or all its motion is tolerated as an error."""
     symbols = {each.value.terms[0].id: each for each in branches if hasattr(each.value.terms[0], "id")}
     stays = []
     for value, least, most in (symbols[place] for place in sorted(symbols)) if symbols else branches:

@@ -170,12 +170,7 @@ impl Number for Symbol {
         series::mark(self, series::Mark::Of(function, of));
         self
     }
-    fn series(
-        order: u32,
-        start: &[Symbol],
-        time: [Symbol; 3],
-        rates: &mut dyn FnMut() -> Vec<Symbol>,
-    ) -> Option<Series<Symbol>> {
+    fn series(order: u32, start: &[Symbol], time: [Symbol; 3], rates: &mut dyn FnMut() -> Vec<Symbol>) -> Option<Series<Symbol>> {
         Some(series::of_solution(order, start, time, rates))
     }
 }

@@ -69,7 +69,7 @@ pub fn attempt<N: Number>(
     (next, goes_on(&new_v, v), goes_on(&new_y, y))
 }
 
-/// The unit of time of the coefficients: the power of two at or below a step, so that they overflow in no unit of the user's.
+/// The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's.
 fn unit_of<N: Number>(step: N) -> N {
     step.and_bits(EXPONENT)
 }
@@ -139,8 +139,7 @@ fn reach<N: Number>(
     (N::choose(most.below(reach), most, reach), over(&first, &tolerated))
 }
 
-/// Whether all functions stay on their branch within a step, or the step is so short that its motion is tolerated as an error; none without
-/// branches.
+/// Whether all functions stay on their branch within a step, or all its motion is tolerated as an error; none without branches.
 fn on_branches<N: Number>(branches: &[Branch<N>], share: N, moved: N) -> Option<N::Truth> {
     let zero = N::of(0.0);
     let mut stays = Vec::new();
