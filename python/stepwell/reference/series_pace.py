@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .adaptive import ROUNDING, Attempted, Pace, length2, longer
+from .adaptive import MAX_FACTOR, ROUNDING, Attempted, Pace, length2, longer
 from .bits import add_bits, and_bits, at_most, held, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
@@ -29,7 +29,8 @@ BOUNDS = (1e-280, 1e280)
 MARGIN = 0.7 * 1.4426950408889634
 #: The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
 SHARE = 0.5
-#: A step that failed is tried again with this part of its length.
+#: A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first twofold:
+#: so many are left before what it met.
 SHRINK = 0.25
 
 #: The orders between which a tolerance chooses, and by how much they grow with its logarithm.
@@ -61,14 +62,16 @@ def attempt(
     """One step, or one extra step, which leaves the pace as it is."""
     outlook = pace.outlook(budget)
     unit = unit_of(pace.before)
+    per_unit = 1.0 / unit
     terms, branches = expanded(system.s, order, pace.t, (unit, unit), v, y)
-    far, moved = reach(order, pace, unit, block_axes, v, y, terms, has_branches=bool(branches))
-    share = where(outlook.is_extra, pace.extra, far) / unit
+    far, moved = reach(order, pace, per_unit, block_axes, v, y, terms)
+    share = where(outlook.is_extra, pace.extra * per_unit, far)
     v1, y1 = (value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     new = lengths((v1, y1), block_axes)
     v1, y1, work = system.project(v1, y1)
     stays = on_branches(branches, share, moved) if branches else None
-    following, goes_on = decided(pace, far, new, stays, outlook.is_extra, outlook.runs)
+    tolerable = 0.5 / np.sqrt(moved) * unit
+    following, goes_on = decided(pace, far * unit, new, stays, tolerable, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
@@ -102,54 +105,52 @@ def lengths(blocks: Sequence[Array], block_axes: tuple[int, int]) -> list[Any]:
     return [length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)]
 
 
-def over(squares: Sequence[Any], bounds: Sequence[Any]) -> Any:
-    """The largest of some squares over their bounds. One whose bound is zero has always been zero, and does not count."""
-    shares = [
-        where(at_most(square, 0.0), 0.0, where(less(0.0, bound), square / bound, 0.0))
-        for square, bound in zip(squares, bounds, strict=True)
-    ]
+def over(squares: Sequence[Any], per: Sequence[Any]) -> Any:
+    """The largest of some squares times what is ``per`` them."""
+    shares = [where(at_most(square, 0.0), 0.0, square * weight) for square, weight in zip(squares, per, strict=True)]
     return functools.reduce(longer, shares)
 
 
 def reach(
-    order: int,
-    pace: Pace,
-    unit: Any,
-    block_axes: tuple[int, int],
-    v: Array,
-    y: Array,
-    terms: Sequence[tuple[Array, Array]],
-    *,
-    has_branches: bool,
+    order: int, pace: Pace, per_unit: Any, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]
 ) -> tuple[Any, Any]:
-    """How far the series is as good as is tolerated, and the square of the motion in a unit of time over the tolerated error.
+    """How many units of time the series is as good as is tolerated, and the square of the motion in one over the tolerated error.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
     """
-    present, first, second = (lengths(blocks, block_axes) for blocks in ((v, y), *terms[:2]))
-    before = pace.before / unit
-    # Squares of what is tolerated, of the absolute part and of the relative one, added; and of what is lost in rounding.
-    tolerated, lost, motion = [], [], []
+    present, first, second, last_but_one, last = (
+        lengths(blocks, block_axes) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
+    )
+    before = pace.before * per_unit
+    # Over squares of what is tolerated, of the absolute part and of the relative one, added; and over those of the motion.
+    per_tolerated, per_motion, is_lost = [], [], []
     # A block at zero counts as long as its rate would have made it in the last step.
     for longest, now, rate, bend in zip((pace.longest_v, pace.longest_y), present, first, second, strict=True):
         counts = longer(where(less(0.0, pace.lasts), longest, now), rate * (before * before))
-        tolerated.append(pace.absolute * pace.absolute + (pace.relative * pace.relative) * counts)
-        lost.append((ROUNDING * ROUNDING) * counts)
-        motion.append(longer(longer(rate, bend), lost[-1]))
+        per_tolerated.append(inverse(pace.absolute * pace.absolute + (pace.relative * pace.relative) * counts))
+        lost = (ROUNDING * ROUNDING) * counts
+        per_motion.append(inverse(longer(longer(rate, bend), lost)))
+        is_lost.append(at_most(rate, lost))
 
-    def logarithm(squares: Sequence[Any], bounds: Sequence[Any]) -> Any:
-        return rough_log2(held(over(squares, bounds), *BOUNDS))
+    def logarithm(squares: Sequence[Any], per: Sequence[Any]) -> Any:
+        return rough_log2(held(over(squares, per), *BOUNDS))
 
-    bounds = []
-    for k in (order - 1, order):
-        last = lengths(terms[k - 1], block_axes)
-        bounds.append(logarithm(last, tolerated) * (-0.5 / k) - MARGIN / (order - 1))
-        half = logarithm(last, motion) * (-0.5 / (k - 1)) + (math.log2(SHARE) - math.log2(k) / (k - 1))
-        bounds.append(longer(half, logarithm(first, lost) * -0.5) if has_branches else half)
-    far = rough_exp2(functools.reduce(lambda one, other: where(less(one, other), one, other), bounds)) * unit
-    most = where(less(1.0, pace.most), MAX_GROWTH, 1.0) * pace.before
-    return where(less(most, far), most, far), over(first, tolerated)
+    one, other = logarithm(last_but_one, per_tolerated) * (-0.5 / (order - 1)), logarithm(last, per_tolerated) * (-0.5 / order)
+    by_error = where(less(one, other), one, other) - MARGIN / (order - 1)
+    either = [longer(one, other) for one, other in zip(last_but_one, last, strict=True)]
+    by_radius = logarithm(either, per_motion) * (-0.5 / (order - 2)) + (math.log2(SHARE) - math.log2(order - 1) / (order - 2))
+    # A motion that is lost in rounding has no radius: it goes on as before.
+    by_radius = where(functools.reduce(operator.and_, is_lost, less(by_radius, 0.0)), 0.0, by_radius)
+    far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error))
+    growth = where(less(pace.most, MAX_FACTOR), where(less(1.0, pace.most), pace.most, 1.0), MAX_GROWTH)
+    most = growth * before
+    return where(less(most, far), most, far), over(first, per_tolerated)
+
+
+def inverse(bound: Any) -> Any:
+    """One over a bound. Where that is zero there has never been anything, and what begins now does not count."""
+    return where(less(0.0, bound), 1.0 / bound, 0.0)
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
@@ -192,16 +193,20 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
     return (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
 
 
-def decided(pace: Pace, far: Any, new: Sequence[Any], stays: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
+def decided(
+    pace: Pace, far: Any, new: Sequence[Any], stays: Any, tolerable: Any, is_extra: Any, runs: Any
+) -> tuple[Pace, Any]:
     """The pace after a step, and whether the state advances; ``new`` are squares of the new lengths.
 
-    ``stays`` is whether functions stay on their branch; None without any.
+    ``stays`` is whether functions stay on their branch, None without any; ``tolerable`` a step that may leave it.
     """
     finite = less(new[0] + new[1], np.inf)  # NaN is not
     # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
     fits = finite & less(pace.t, pace.t + 0.25 * far)
     good = fits if stays is None else fits & stays
     shorter = SHRINK * where(less(far, pace.before), far, pace.before)
+    if stays is not None:
+        shorter = where(stays, shorter, longer(shorter, tolerable))
     reached = pace.t + far
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good
@@ -211,7 +216,7 @@ def decided(pace: Pace, far: Any, new: Sequence[Any], stays: Any, is_extra: Any,
         extra=where(is_extra, 0.0, pace.extra),
         held=where(holds, 1.0, pace.held),
         before=where(takes, far, where(fails, shorter, pace.before)),
-        most=where(takes, MAX_GROWTH, where(fails, 1.0, pace.most)),
+        most=where(takes & less(pace.most, MAX_FACTOR), 2.0 * pace.most, where(fails, SHRINK, pace.most)),
         longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
         longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
         accepted=pace.accepted + where(takes, 1.0, 0.0),

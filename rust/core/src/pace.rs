@@ -13,7 +13,7 @@ use crate::{
 /// the error is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
 const SAFETY: f64 = 0.9;
 const MIN_FACTOR: f64 = 0.2;
-const MAX_FACTOR: f64 = 5.0;
+pub(crate) const MAX_FACTOR: f64 = 5.0;
 /// r² below this counts as this.
 const TINY_SQUARE: f64 = 1e-10 * 1e-10;
 /// The sixteenth root of the least p, 1e-4, and its thirty-second.

@@ -7,7 +7,7 @@
 use crate::{
     functions::{rough_exp2, rough_log2},
     number::{Branch, Number},
-    pace::{Pace, ROUNDING, length2, longer},
+    pace::{MAX_FACTOR, Pace, ROUNDING, length2, longer},
     program::coefficients,
     system::{Block, System},
 };
@@ -20,7 +20,8 @@ const BOUNDS: [f64; 2] = [1e-280, 1e280];
 const MARGIN: f64 = 0.7 * std::f64::consts::LOG2_E;
 /// The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
 const SHARE: f64 = 0.5;
-/// A step that failed is tried again with this part of its length.
+/// A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first twofold: so many
+/// are left before what it met.
 const SHRINK: f64 = 0.25;
 /// The bits of an exponent.
 const EXPONENT: u64 = 0x7FF << 52;
@@ -54,13 +55,15 @@ pub fn attempt<N: Number>(
 ) -> (Pace<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
     let unit = unit_of(pace.before);
-    let (reach, moved) = reach(&pace, unit, [v, y], terms, !branches.is_empty());
-    let share = N::choose(outlook.is_extra, pace.extra, reach) / unit;
+    let per_unit = N::of(1.0) / unit;
+    let (reach, moved) = reach(&pace, per_unit, [v, y], terms);
+    let share = N::choose(outlook.is_extra, pace.extra * per_unit, reach);
     let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), share), value(y, terms.iter().map(|term| &term.1), share));
     let new = lengths([&new_v, &new_y]);
     let (new_v, new_y) = projected.project(new_v, new_y);
     let stays = on_branches(branches, share, moved);
-    let (next, took) = decided(&pace, reach, (new, stays), outlook.is_extra, outlook.runs);
+    let tolerable = N::of(0.5) / moved.sqrt() * unit;
+    let (next, took) = decided(&pace, reach * unit, (new, stays, tolerable), outlook.is_extra, outlook.runs);
     let next = match projected.tally() {
         Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
         None => next,
@@ -93,50 +96,52 @@ fn lengths<N: Number>(blocks: [&Block<N>; 2]) -> [N; 2] {
     blocks.map(length2)
 }
 
-/// The largest of some squares over their bounds. One whose bound is zero has always been zero, and does not count.
-fn over<N: Number>(squares: &[N], bounds: &[N]) -> N {
+/// The largest of some squares times what is `per` them.
+fn over<N: Number>(squares: &[N], per: &[N]) -> N {
     let zero = N::of(0.0);
-    let share = |(square, bound): (&N, &N)| {
-        let share = N::choose(zero.below(*bound), *square / *bound, zero);
-        N::choose(square.at_most(zero), zero, share)
-    };
-    squares.iter().zip(bounds).map(share).reduce(longer).unwrap_or(zero)
+    let share = |(square, per): (&N, &N)| N::choose(square.at_most(zero), zero, *square * *per);
+    squares.iter().zip(per).map(share).reduce(longer).unwrap_or(zero)
 }
 
-/// How far the series is as good as is tolerated, and the square of the motion in a unit of time over the tolerated error. In `before` the
-/// pace has the length of the last step that was taken; a held one does not count, for it is made once more and must be the same.
-fn reach<N: Number>(
-    pace: &Pace<N>,
-    unit: N,
-    start: [&Block<N>; 2],
-    terms: &[(Block<N>, Block<N>)],
-    has_branches: bool,
-) -> (N, N) {
+/// One over a bound. Where that is zero there has never been anything, and what begins now does not count.
+fn inverse<N: Number>(bound: N) -> N {
+    N::choose(N::of(0.0).below(bound), N::of(1.0) / bound, N::of(0.0))
+}
+
+/// How many units of time the series is as good as is tolerated, and the square of the motion in one over the tolerated error. In `before`
+/// the pace has the length of the last step that was taken; a held one does not count, for it is made once more and must be the same.
+fn reach<N: Number>(pace: &Pace<N>, per_unit: N, start: [&Block<N>; 2], terms: &[(Block<N>, Block<N>)]) -> (N, N) {
+    let (zero, number) = (N::of(0.0), N::of);
     let order = terms.len();
     let of = |k: usize| lengths([&terms[k - 1].0, &terms[k - 1].1]);
-    let (present, first, second) = (lengths(start), of(1), of(2));
-    let before = pace.before / unit;
-    // Squares of what is tolerated, of the absolute part and of the relative one, added; and of what is lost in rounding.
-    let (mut tolerated, mut lost, mut motion) = (Vec::new(), Vec::new(), Vec::new());
+    let (present, first, second, last_but_one, last) = (lengths(start), of(1), of(2), of(order - 1), of(order));
+    let before = pace.before * per_unit;
+    // Over squares of what is tolerated, of the absolute part and of the relative one, added; and over those of the motion.
+    let (mut per_tolerated, mut per_motion, mut is_lost) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..present.len() {
         // A block at zero counts as long as its rate would have made it in the last step.
-        let counts = N::choose(N::of(0.0).below(pace.lasts), pace.longest[i], present[i]);
+        let counts = N::choose(zero.below(pace.lasts), pace.longest[i], present[i]);
         let counts = longer(counts, first[i] * (before * before));
-        tolerated.push(pace.absolute * pace.absolute + (pace.relative * pace.relative) * counts);
-        lost.push(N::of(ROUNDING * ROUNDING) * counts);
-        motion.push(longer(longer(first[i], second[i]), lost[i]));
+        per_tolerated.push(inverse(pace.absolute * pace.absolute + (pace.relative * pace.relative) * counts));
+        let lost = number(ROUNDING * ROUNDING) * counts;
+        per_motion.push(inverse(longer(longer(first[i], second[i]), lost)));
+        is_lost.push(first[i].at_most(lost));
     }
-    let logarithm = |squares: &[N], bounds: &[N]| rough_log2(over(squares, bounds).clamped(BOUNDS[0], BOUNDS[1]));
-    let bounds = [order - 1, order].map(|k| {
-        let (last, of) = (of(k), k as f64);
-        let by_error = logarithm(&last, &tolerated) * N::of(-0.5 / of) - N::of(MARGIN / (order - 1) as f64);
-        let half = logarithm(&last, &motion) * N::of(-0.5 / (of - 1.0)) + N::of(SHARE.log2() - of.log2() / (of - 1.0));
-        [by_error, if has_branches { longer(half, logarithm(&first, &lost) * N::of(-0.5)) } else { half }]
-    });
-    let least = bounds.into_iter().flatten().reduce(|one, other| N::choose(one.below(other), one, other));
-    let reach = rough_exp2(least.unwrap_or(N::of(f64::NAN))) * unit;
-    let most = N::choose(N::of(1.0).below(pace.most), N::of(MAX_GROWTH), N::of(1.0)) * pace.before;
-    (N::choose(most.below(reach), most, reach), over(&first, &tolerated))
+    let logarithm = |squares: &[N], per: &[N]| rough_log2(over(squares, per).clamped(BOUNDS[0], BOUNDS[1]));
+    let p = order as f64;
+    let one = logarithm(&last_but_one, &per_tolerated) * number(-0.5 / (p - 1.0));
+    let other = logarithm(&last, &per_tolerated) * number(-0.5 / p);
+    let by_error = N::choose(one.below(other), one, other) - number(MARGIN / (p - 1.0));
+    let either: Vec<N> = last_but_one.iter().zip(&last).map(|(one, other)| longer(*one, *other)).collect();
+    let by_radius = logarithm(&either, &per_motion) * number(-0.5 / (p - 2.0));
+    let by_radius = by_radius + number(SHARE.log2() - (p - 1.0).log2() / (p - 2.0));
+    // A motion that is lost in rounding has no radius: it goes on as before.
+    let is_lost = is_lost.into_iter().fold(by_radius.below(zero), |all, each| all & each);
+    let by_radius = N::choose(is_lost, zero, by_radius);
+    let reach = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error));
+    let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
+    let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * before;
+    (N::choose(most.below(reach), most, reach), over(&first, &per_tolerated))
 }
 
 /// Whether all functions stay on their branch within a step, or all its motion is tolerated as an error; none without branches.
@@ -171,11 +176,11 @@ fn furthest<N: Number>(terms: &[Option<N>], share: N, part: impl Fn(N) -> N) -> 
 }
 
 /// What comes after a step, and whether the state goes on. `new`: squares of the lengths of the new blocks. `stays`: whether functions stay
-/// on their branch; none without any.
+/// on their branch, none without any; `tolerable`: a step that may leave it.
 fn decided<N: Number>(
     pace: &Pace<N>,
     reach: N,
-    (new, stays): ([N; 2], Option<N::Truth>),
+    (new, stays, tolerable): ([N; 2], Option<N::Truth>, N),
     is_extra: N::Truth,
     runs: N::Truth,
 ) -> (Pace<N>, N::Truth) {
@@ -185,6 +190,7 @@ fn decided<N: Number>(
     let fits = finite & pace.t.below(pace.t + number(0.25) * reach);
     let good = stays.map_or(fits, |stays| fits & stays);
     let shorter = number(SHRINK) * N::choose(reach.below(pace.before), reach, pace.before);
+    let shorter = stays.map_or(shorter, |stays| N::choose(stays, shorter, longer(shorter, tolerable)));
     let reached = pace.t + reach;
     let passes = pace.target.below(reached);
     let (takes, holds, fails) = (runs & good & !passes, runs & good & passes, runs & !good);
@@ -196,7 +202,10 @@ fn decided<N: Number>(
         extra: N::choose(is_extra, number(0.0), pace.extra),
         held: N::choose(holds, number(1.0), pace.held),
         before: N::choose(takes, reach, N::choose(fails, shorter, pace.before)),
-        most: N::choose(takes, number(MAX_GROWTH), N::choose(fails, number(1.0), pace.most)),
+        most: {
+            let failed = N::choose(fails, number(SHRINK), pace.most);
+            N::choose(takes & pace.most.below(number(MAX_FACTOR)), number(2.0) * pace.most, failed)
+        },
         longest: [longest(0), longest(1)],
         accepted: pace.accepted + count(takes),
         rejected: pace.rejected + count(fails),
