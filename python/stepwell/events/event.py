@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import _checks
 from .._value import Fixed, Value
 from ..errors import ArgumentError, DTypeError
+
+if TYPE_CHECKING:
+    from .._words import Direction
 
 #: Default of ``most``: so many occurrences of an event are kept for each member.
 MOST_KEPT = 1000
@@ -20,7 +23,7 @@ class Event(Fixed, Value):
     Args:
         function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
             in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
-        direction: 1 for changes from below zero to above, −1 for those from above to below, 0 for both.
+        direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
         terminal: whether a member stops at the first such change.
         most: so many occurrences are kept for each member, the first ones; all are counted.
         name: its name in ``run.events``; if None, that of the function.
@@ -39,7 +42,7 @@ class Event(Fixed, Value):
         self,
         function: Callable[..., Any],
         *,
-        direction: int = 0,
+        direction: int | Direction = 0,
         terminal: bool = False,
         most: int = MOST_KEPT,
         name: str | None = None,
@@ -52,7 +55,7 @@ class Event(Fixed, Value):
         if name is not None and not isinstance(name, str):
             raise DTypeError(f"name: expected a name or None, got {_checks.short(name)} ({type(name).__name__})")
         self.function = function
-        self.direction = _checks.count("direction", direction, -1, 1)
+        self.direction = _checks.direction("direction", direction)
         self.terminal = _checks.flag("terminal", terminal)
         self.most = _checks.count("most", most, 1)
         self.name = function.__name__ if name is None else name

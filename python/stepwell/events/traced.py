@@ -51,7 +51,8 @@ class Quantity:
         head, rest = own[: len(state)], own[len(state) :]
         expected = f"({', '.join(state)}, *, …)"
         if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
-            raise ArgumentError(f"events: {event.name}: expected a function {expected}, got ({', '.join(map(str, own))})")
+            why = f", since {system.kind_name} has velocities" if self.has_v and len(head) == 2 else ""
+            raise ArgumentError(f"events: {event.name}: expected a function {expected}{why}, got ({', '.join(map(str, own))})")
         taken = []
         for each in rest:
             if each.name in given and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):

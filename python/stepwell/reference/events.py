@@ -69,7 +69,7 @@ def located(trial: Trial, before: Array, after: Array, v: Array, y: Array, width
 
 def width_at(t: Array, h: Array) -> Array:
     """To which share of the steps from these times, of these lengths, a change of sign is located."""
-    return np.maximum(SHARE, SPACING * (np.abs(t) / h))
+    return np.maximum(SHARE, SPACING * np.abs(t / h))
 
 
 def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, done: int) -> Array:

@@ -1,8 +1,8 @@
 """Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 
 The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the
-length of a block of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
-step is the least of these for j = p − 1 and p and both blocks, times exp(−0.7/(p − 1)).
+size of a group of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
+step is the least of these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)).
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from .adaptive import MAX_FACTOR, ROUNDING, Attempted, Pace, length2, longer
+from .acceptance import Acceptance
+from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, over, sizes, stacked, total
 from .bits import add_bits, and_bits, at_most, held, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
@@ -23,7 +24,7 @@ from .types import Array
 
 #: The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 MAX_GROWTH = 1024.0
-#: The squared length of the last terms over the tolerated one, between bounds whose logarithms exist.
+#: The size of the last terms over the tolerated one, between bounds whose logarithms exist.
 BOUNDS = (1e-280, 1e280)
 #: The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
 MARGIN = 0.7 * 1.4426950408889634
@@ -57,21 +58,29 @@ def order_of(tolerance: float) -> int:
 
 
 def attempt(
-    order: int, system: Attempted, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
+    order: int,
+    system: Attempted,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    pace: Pace,
+    budget: Any,
+    v: Array,
+    y: Array,
 ) -> tuple[Pace, Array, Array]:
     """One step, or one extra step, which leaves the pace as it is."""
-    outlook = pace.outlook(budget)
+    outlook, groups = pace.outlook(budget), acceptance.groups
     unit = unit_of(pace.before)
-    per_unit = 1.0 / unit
     terms, branches = expanded(system.s, order, pace.t, (unit, unit), v, y)
-    far, moved = reach(order, pace, per_unit, block_axes, v, y, terms)
-    share = where(outlook.is_extra, pace.extra * per_unit, far)
+    far, moved = reach(order, pace, unit, block_axes, acceptance, v, y, terms)
+    bound = pace.wall - pace.t
+    ends = less(bound, far)
+    step = where(ends, bound, far)
+    share = where(outlook.is_extra, pace.extra, step) * (1.0 / unit)
     v1, y1 = (value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
-    new = lengths((v1, y1), block_axes)
+    new = sizes(v1, y1, block_axes, groups)
     v1, y1, work = system.project(v1, y1)
     stays = on_branches(branches, share, moved) if branches else None
-    tolerable = 0.5 / np.sqrt(moved) * unit
-    following, goes_on = decided(pace, far * unit, new, stays, tolerable, outlook.is_extra, outlook.runs)
+    following, goes_on = decided(pace, step, ends, new, stays, 0.5 / moved * unit, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
@@ -100,57 +109,54 @@ def value(start: Array, terms: Sequence[Array], share: Any) -> Array:
     return end
 
 
-def lengths(blocks: Sequence[Array], block_axes: tuple[int, int]) -> list[Any]:
-    """The squares of the lengths to which errors are relative: of both blocks."""
-    return [length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)]
-
-
-def over(squares: Sequence[Any], per: Sequence[Any]) -> Any:
-    """The largest of some squares times what is ``per`` them."""
-    shares = [where(at_most(square, 0.0), 0.0, square * weight) for square, weight in zip(squares, per, strict=True)]
-    return functools.reduce(longer, shares)
-
-
 def reach(
-    order: int, pace: Pace, per_unit: Any, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]
+    order: int,
+    pace: Pace,
+    unit: Any,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    v: Array,
+    y: Array,
+    terms: Sequence[tuple[Array, Array]],
 ) -> tuple[Any, Any]:
-    """How many units of time the series is as good as is tolerated, and the square of the motion in one over the tolerated error.
+    """How far the series is as good as is tolerated, and the motion in one unit of time over the tolerated error.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
     """
+    groups, counts = acceptance.groups, acceptance.counts(np.size(v), np.size(y))
     present, first, second, last_but_one, last = (
-        lengths(blocks, block_axes) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
+        sizes(*blocks, block_axes, groups) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
     )
-    before = pace.before * per_unit
-    # Over squares of what is tolerated, of the absolute part and of the relative one, added; and over those of the motion.
-    per_tolerated, per_motion, is_lost = [], [], []
-    # A block at zero counts as long as its rate would have made it in the last step.
-    for longest, now, rate, bend in zip((pace.longest_v, pace.longest_y), present, first, second, strict=True):
-        counts = longer(where(less(0.0, pace.lasts), longest, now), rate * (before * before))
-        per_tolerated.append(inverse(pace.absolute * pace.absolute + (pace.relative * pace.relative) * counts))
-        lost = (ROUNDING * ROUNDING) * counts
-        per_motion.append(inverse(longer(longer(rate, bend), lost)))
-        is_lost.append(at_most(rate, lost))
+    relative, absolute = pace.tolerances()
+    # A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    standing = []
+    for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
+        longest, now = pace.longest[block], present[block]
+        onset = ONSET * longer(largest(longest), largest(now)) if len(now) > 1 else 0.0
+        standing += [where(less(0.0, size), size, onset) if len(now) > 1 else size for size in longest]
+    counts_as = longer(where(less(0.0, pace.lasts), stacked(standing), present), first * (pace.before * (1.0 / unit)))
+    tolerated = absolute + relative * counts_as
+    # What begins at zero, where nothing else has been, tolerates no error: it does not count.
+    bound = where(less(0.0, tolerated), tolerated, np.inf)
 
-    def logarithm(squares: Sequence[Any], per: Sequence[Any]) -> Any:
-        return rough_log2(held(over(squares, per), *BOUNDS))
+    def logarithm(size: Any) -> Any:
+        return rough_log2(held(size, *BOUNDS))
 
-    one, other = logarithm(last_but_one, per_tolerated) * (-0.5 / (order - 1)), logarithm(last, per_tolerated) * (-0.5 / order)
-    by_error = where(less(one, other), one, other) - MARGIN / (order - 1)
-    either = [longer(one, other) for one, other in zip(last_but_one, last, strict=True)]
-    by_radius = logarithm(either, per_motion) * (-0.5 / (order - 2)) + (math.log2(SHARE) - math.log2(order - 1) / (order - 2))
+    moved, lost = over(first, bound), ROUNDING * counts_as
+    one, other = over(last_but_one, bound), over(last, bound)
+    by_one, by_other = logarithm(one) * (-1.0 / (order - 1)), logarithm(other) * (-1.0 / order)
+    by_error = where(less(by_one, by_other), by_one, by_other) - MARGIN / (order - 1)
+    motion = longer(longer(moved, over(second, bound)), over(lost, bound))
+    falls = logarithm(longer(one, other)) - logarithm(motion)
+    by_radius = falls * (-1.0 / (order - 2)) + (math.log2(SHARE) - math.log2(order - 1) / (order - 2))
     # A motion that is lost in rounding has no radius: it goes on as before.
-    by_radius = where(functools.reduce(operator.and_, is_lost, less(by_radius, 0.0)), 0.0, by_radius)
-    far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error))
-    growth = where(less(pace.most, MAX_FACTOR), where(less(1.0, pace.most), pace.most, 1.0), MAX_GROWTH)
-    most = growth * before
-    return where(less(most, far), most, far), over(first, per_tolerated)
-
-
-def inverse(bound: Any) -> Any:
-    """One over a bound. Where that is zero there has never been anything, and what begins now does not count."""
-    return where(less(0.0, bound), 1.0 / bound, 0.0)
+    is_lost = functools.reduce(operator.and_, at_most(first, lost), less(by_radius, 0.0))
+    by_radius = where(is_lost, 0.0, by_radius)
+    far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error)) * unit
+    limited = where(less(1.0, pace.most), pace.most, 1.0)
+    most = where(less(pace.most, MAX_FACTOR), limited, MAX_GROWTH) * pace.before
+    return pace.shortened(where(less(most, far), most, far), pace.t), moved
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
@@ -162,11 +168,11 @@ def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
             stays.append(at_most(least, furthest(value.terms, share, lambda term: where(less(term, 0.0), term, 0.0))))
         if most < np.inf:
             stays.append(at_most(furthest(value.terms, share, lambda term: where(less(0.0, term), term, 0.0)), most))
-    return at_most(moved * (share * share), 1.0) | functools.reduce(operator.and_, stays)
+    return at_most(moved * share, 1.0) | functools.reduce(operator.and_, stays)
 
 
 def furthest(terms: Sequence[Any], share: Any, part: Callable[[Any], Any]) -> Any:
-    """How far the terms to one side alone would take a value within a step, at which it cannot be."""
+    """How far the terms to one side alone would take a value within a step: no further can it be."""
     total = None
     for term in reversed(terms[1:]):
         beyond = None if total is None else share * total
@@ -194,31 +200,30 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
 
 
 def decided(
-    pace: Pace, far: Any, new: Sequence[Any], stays: Any, tolerable: Any, is_extra: Any, runs: Any
+    pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any
 ) -> tuple[Pace, Any]:
-    """The pace after a step, and whether the state advances; ``new`` are squares of the new lengths.
+    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
 
     ``stays`` is whether functions stay on their branch, None without any; ``tolerable`` a step that may leave it.
     """
-    finite = less(new[0] + new[1], np.inf)  # NaN is not
+    finite = less(total(new), np.inf)  # NaN is not
     # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
-    fits = finite & less(pace.t, pace.t + 0.25 * far)
+    fits = finite & (ends | less(pace.t, pace.t + 0.25 * step))
     good = fits if stays is None else fits & stays
-    shorter = SHRINK * where(less(far, pace.before), far, pace.before)
+    shorter = SHRINK * where(less(step, pace.before), step, pace.before)
     if stays is not None:
         shorter = where(stays, shorter, longer(shorter, tolerable))
-    reached = pace.t + far
+    reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good
     following = pace._replace(
         t=where(takes, reached, pace.t),
-        h=where(takes | holds, far, where(fails, shorter, pace.h)),
+        h=where(takes | holds, step, where(fails, shorter, pace.h)),
         extra=where(is_extra, 0.0, pace.extra),
         held=where(holds, 1.0, pace.held),
-        before=where(takes, far, where(fails, shorter, pace.before)),
+        longest=where(takes & less(pace.longest, new), new, pace.longest),
+        before=where(takes & ~ends, step, where(fails, shorter, pace.before)),
         most=where(takes & less(pace.most, MAX_FACTOR), 2.0 * pace.most, where(fails, SHRINK, pace.most)),
-        longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
-        longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
         accepted=pace.accepted + where(takes, 1.0, 0.0),
         rejected=pace.rejected + where(fails, 1.0, 0.0),
         extra_steps=pace.extra_steps + where(holds | is_extra, 1.0, 0.0),
