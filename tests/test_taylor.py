@@ -516,6 +516,41 @@ def test_no_step_crosses_a_singularity(name: str, tolerance: float) -> None:
     assert abs(float(run.paces.t) / end - 1.0) < 4.0 * steps * (tolerance + EPS)
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("backward", [False, True])
+def test_one_singular_component_among_others_ends_the_run(tolerance: float, backward: bool) -> None:
+    """Components that are larger and move smoothly hide no pole of another, forward or backward in time: as above, 4nτ."""
+    sign = -1.0 if backward else 1.0
+
+    @sw.system(order=1)
+    def among_others(t: Any, y: Any) -> Any:
+        return sign * np.stack([-0.5 / y[0], 1e3 * np.cos(2.0 * t), -0.3 * y[2]])
+
+    with pytest.warns(ToleranceWarning, match=r"too small to move the time"):
+        run = sw.integrate(among_others(), "taylor", y=[1.0, 0.0, 1.0], tolerance=tolerance, at=[sign * 1.5])
+    assert run.paces is not None
+    assert run.status != 0
+    steps = float(run.paces.accepted)
+    assert abs(abs(float(run.paces.t)) - 1.0) < 4.0 * steps * (tolerance + EPS)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_steps_end_at_jumps_and_at_branches(tolerance: float) -> None:
+    """ẏ = |t − 1.3| has the integral (t − 1.3)·|t − 1.3|/2; no step crosses 0.9 and 2.1, nor goes on behind 1.3 as before."""
+
+    @sw.system(order=1)
+    def kinked(t: Any, y: Any) -> Any:
+        return np.sqrt((t - 1.3) ** 2) + 0.0 * y
+
+    at = np.array([0.5, 1.0, 1.5, 3.0])
+    run = sw.integrate(kinked, "taylor", y=1.0, tolerance=tolerance, at=at, jumps=[0.9, 2.1])
+    assert run.paces is not None
+    assert run.status == 0
+    true = 1.0 + 0.5 * ((at - 1.3) * np.abs(at - 1.3) + 1.3**2)
+    # Each of n steps errs by less than 2τ of the largest length.
+    assert np.max(np.abs(run.y - true)) < 2.0 * tolerance * true.max() * float(run.paces.accepted)
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-9, 1e-15])
 @pytest.mark.parametrize("offset", [0.0, 1e3])
 def test_bodies_that_collide_head_on_stop(tolerance: float, offset: float) -> None:

@@ -398,7 +398,7 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
     each_its_own = np.broadcast_arrays(t, h)[0] if np.ndim(h) else t
     times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(each_its_own)
-    lengths = [(each, length) for each, length in np.broadcast(times, h)]
+    clocks = [(each, length) for each, length in np.broadcast(times, h)]
     rates = s.dv(times, *blocks), s.dy(times, *blocks)
     seeds = [each for block in blocks for each in block.flat]
     found = [
@@ -414,7 +414,7 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
             known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
             terms.append(known if known is None or by is None else by * known)
             seed.terms.append(terms[-1])
-        for time, length in lengths:
+        for time, length in clocks:
             time.terms.append(length if k == 0 else None)
         numbers = [zero if term is None else term for term in terms]
         made.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))

@@ -1,8 +1,9 @@
 """Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 
-The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the
-size of a group of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
-step is the least of these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)).
+The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
+coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of
+these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected
+only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ BOUNDS = (1e-280, 1e280)
 MARGIN = 0.7 * 1.4426950408889634
 #: The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
 SHARE = 0.5
-#: A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first twofold:
-#: so many are left before what it met.
+#: A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first
+#: twofold: so many are left before what it met.
 SHRINK = 0.25
 
 #: The orders between which a tolerance chooses, and by how much they grow with its logarithm.
@@ -199,9 +200,7 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
     return (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
 
 
-def decided(
-    pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any
-) -> tuple[Pace, Any]:
+def decided(pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
     """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
 
     ``stays`` is whether functions stay on their branch, None without any; ``tolerable`` a step that may leave it.

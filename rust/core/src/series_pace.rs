@@ -1,8 +1,10 @@
 //! Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 //!
-//! The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the size
-//! of a group of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is
-//! the least of these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)). `reference/series_pace.py` is the specification.
+//! The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
+//! coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of these for
+//! j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected only if a function
+//! might leave its branch within it, if a number is not finite or if it does not move the time. `reference/series_pace.py` is the
+//! specification.
 
 use crate::{
     functions::{rough_exp2, rough_log2},
