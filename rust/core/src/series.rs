@@ -255,7 +255,11 @@ fn factors_of(value: Symbol) -> Option<(Vec<(Symbol, Symbol)>, Option<[f64; 2]>)
         Mark::Of(Function::Sin, x) => (vec![(x, cos(x))], None),
         Mark::Of(Function::Cos, x) => (vec![(x, -sin(x))], None),
         Mark::Of(Function::Log, x) => (vec![(x, Symbol::of(1.0) / x)], None),
-        Mark::Factors(factors, bounds) => (factors, bounds),
+        Mark::Factors(mut factors, bounds) => {
+            // Whole numbers stay as they are within a step: that of a remainder, which may be made after it, is only there to be seen.
+            factors.retain(|(of, _)| !matches!(operation(of.0), Op::Floor(_)));
+            (factors, bounds)
+        }
     })
 }
 
