@@ -298,6 +298,9 @@ impl Program {
     }
 }
 
+/// Coefficients of v and y, from the first on.
+pub type Terms<N> = Vec<(DVector<N>, DVector<N>)>;
+
 /// The Taylor coefficients of v and y around a state, from the first on, and the branches of functions that the rates are on; NaN of numbers,
 /// which have no series. The time is that of [`Number::series`].
 pub(crate) fn coefficients<N: Number>(
@@ -306,7 +309,7 @@ pub(crate) fn coefficients<N: Number>(
     time: [N; 3],
     v: &DVector<N>,
     y: &DVector<N>,
-) -> (Vec<(DVector<N>, DVector<N>)>, Vec<Branch<N>>) {
+) -> (Terms<N>, Vec<Branch<N>>) {
     let start: Vec<N> = v.iter().chain(y).copied().collect();
     let t = time[0];
     let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();

@@ -22,7 +22,7 @@ pub enum Mark {
     /// It is a function of another value.
     Of(Function, Symbol),
     /// Its derivatives by other values, pairs of a value and the derivative by it; and its bounds, if it is one branch of several.
-    Factors(Vec<(Symbol, Symbol)>, Option<[f64; 2]>),
+    Factors(Factors, Option<[f64; 2]>),
 }
 
 thread_local! {
@@ -43,6 +43,9 @@ pub fn mark(value: Symbol, mark: Mark) {
         }
     });
 }
+
+/// Pairs of a value and the derivative by it.
+pub type Factors = Vec<(Symbol, Symbol)>;
 
 /// A coefficient; none if it is known to be zero.
 type Term = Option<Symbol>;
@@ -249,7 +252,7 @@ impl Series {
 }
 
 /// The derivatives of a marked value by those that it is a function of, and its bounds if it is one branch of several.
-fn factors_of(value: Symbol) -> Option<(Vec<(Symbol, Symbol)>, Option<[f64; 2]>)> {
+fn factors_of(value: Symbol) -> Option<(Factors, Option<[f64; 2]>)> {
     let mark = MARKS.with_borrow(|marks| marks.as_ref()?.get(&value.0).cloned())?;
     Some(match mark {
         Mark::Of(Function::Sin, x) => (vec![(x, cos(x))], None),

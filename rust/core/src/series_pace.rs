@@ -10,7 +10,7 @@ use crate::{
     functions::{rough_exp2, rough_log2},
     number::{Branch, Number},
     pace::{Acceptance, MAX_FACTOR, ONSET, Pace, ROUNDING, Scales, largest, longer, over, total},
-    program::coefficients,
+    program::{Terms, coefficients},
     system::{Block, System},
 };
 
@@ -28,9 +28,7 @@ const SHRINK: f64 = 0.25;
 /// The bits of an exponent.
 const EXPONENT: u64 = 0x7FF << 52;
 
-/// Coefficients of v and y, from the first on.
-pub type Terms<N> = Vec<(Block<N>, Block<N>)>;
-/// The same, and the branches of functions that the rates are on.
+/// Coefficients of v and y, and the branches of functions that the rates are on.
 pub type Known<'a, N> = (&'a [(Block<N>, Block<N>)], &'a [Branch<N>]);
 
 /// The coefficients at the start of a step, and the branches of functions that the rates are on. The system is scaled to a step of 1.

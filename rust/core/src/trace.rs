@@ -18,7 +18,7 @@ use crate::{
     method::Record,
     number::{Number, Symbol, record},
     pace::{Acceptance, Attempted, Backward, Pace, Scales, Stretched, attempt},
-    program::Program,
+    program::{Program, Terms},
     real::{Precision, Real},
     run::stage::Stage,
     series_pace,
@@ -370,7 +370,7 @@ fn trace_by_terms(tape: Tape, given: &Given, how: &How, shape: Shape, numbers: u
         let state = shape.v + shape.y;
         let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
-        let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let terms: Terms<Symbol> = (0..numbers / state).map(of).collect();
         let mut next = scene.attempt_by((&terms, &[]));
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
