@@ -189,11 +189,12 @@ class Tape:
         dy: list[Symbol] | None = None,
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
-        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]]]] = ...,
+        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None]] = ...,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
 
-        ``functions`` are values with, for each that they depend on, the derivative by it.
+        ``functions`` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its
+        bounds.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """

@@ -228,7 +228,7 @@ def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptio
         goes_with_series(system, control)
         if options.positive is not None:
             raise UnsupportedError(
-                f"positive: {how.name} chooses each step before it is made and rejects none; use one that does, as dop853"
+                f"positive: {how.name} rejects no step for the sign of a component; use a method that does, such as dop853"
             )
     not_of_a_step(system.keeper if control is None else control)
     if options.tolerance is not None and went is not None:

@@ -13,7 +13,7 @@ use crate::{
 /// the error is estimated in a higher order than [`LOW`], it is SAFETY·r^(−3/32)·p^(1/32).
 const SAFETY: f64 = 0.9;
 const MIN_FACTOR: f64 = 0.2;
-const MAX_FACTOR: f64 = 5.0;
+pub(crate) const MAX_FACTOR: f64 = 5.0;
 /// r below this counts as this.
 const TINY: f64 = 1e-10;
 /// The sixteenth root of the least p, 1e-4, and its thirty-second.
@@ -23,7 +23,7 @@ const LOW: u32 = 5;
 
 /// A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some margin. So
 /// an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only rounding.
-const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 /// A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one component after
 /// the other, each at first with a power of the time that is beyond the order of the method: relative to itself its first step would
 /// always be all wrong, however short.

@@ -18,7 +18,7 @@ use crate::{
     method::Record,
     number::{Number, Symbol, record},
     pace::{Acceptance, Attempted, Backward, Pace, Scales, Stretched, attempt},
-    program::Program,
+    program::{Program, Terms},
     real::{Precision, Real},
     run::stage::Stage,
     series_pace,
@@ -330,13 +330,13 @@ impl AttemptsOf<'_> {
     /// Steps by a series of that order, and its coefficients.
     fn series(&self, order: u32) -> (Vec<Id>, Vec<Id>) {
         let (v, y) = self.state();
-        let terms = series_pace::terms(order, self.scaled(Symbol::of(1.0)).as_ref(), &self.pace().0, &v, &y);
+        let (terms, branches) = series_pace::terms(order, self.scaled(Symbol::of(1.0)).as_ref(), &self.pace().0, &v, &y);
         let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
-        (self.attempt_by(&terms), numbers)
+        (self.attempt_by((&terms, &branches)), numbers)
     }
 
     /// One attempt by coefficients of a series.
-    fn attempt_by(&self, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
+    fn attempt_by(&self, terms: series_pace::Known<Symbol>) -> Vec<Id> {
         let ((v, y), (pace, scales)) = (self.state(), self.pace());
         let budget = Symbol::new(Op::Param(BUDGET));
         let projected = self.projected();
@@ -370,8 +370,8 @@ fn trace_by_terms(tape: Tape, given: &Given, how: &How, shape: Shape, numbers: u
         let state = shape.v + shape.y;
         let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
-        let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
-        let mut next = scene.attempt_by(&terms);
+        let terms: Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let mut next = scene.attempt_by((&terms, &[]));
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
     }))

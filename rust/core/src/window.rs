@@ -77,7 +77,7 @@ pub fn sample(table: u32, t: Symbol) -> Symbol {
     let (before, after) = (at(table, from), at(table, to));
     let seen = mean(window, at(table + 1, to), before, after);
     if series::is_marking() {
-        series::mark(seen, series::Mark::Factors(Vec::new())); // it is the same all over the step, though made of the time
+        series::mark(seen, series::Mark::Factors(Vec::new(), None)); // it is the same all over the step, though made of the time
     }
     seen
 }

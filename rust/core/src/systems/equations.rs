@@ -40,8 +40,9 @@ pub struct Invariant {
     pub square: Id,
 }
 
-/// A value that is a function of others: pairs of a value and the derivative by it.
-pub type Marked = (Id, Vec<(Id, Id)>);
+/// A value that is a function of others: pairs of a value and the derivative by it; and, if it is one branch of several, the bits of its
+/// bounds.
+pub type Marked = (Id, Vec<(Id, Id)>, Option<[u64; 2]>);
 
 /// The rates of a system, as operations.
 #[derive(Clone, Debug)]
@@ -117,9 +118,9 @@ impl Equations {
             square: at(kept.square),
         });
         let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
-        let functions = self.functions.into_iter().filter(|(value, _)| needed[*value as usize]);
-        let functions =
-            functions.map(|(value, by)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect()));
+        let functions = self.functions.into_iter().filter(|(value, ..)| needed[*value as usize]);
+        let functions = functions
+            .map(|(value, by, bounds)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect(), bounds));
         let functions = functions.collect();
         Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions)
     }
@@ -167,7 +168,7 @@ impl Equations {
 
     /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not count.
     pub fn chooses(&self) -> bool {
-        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by)| (*value, by)).collect();
+        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by, _)| (*value, by)).collect();
         let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
         for op in &self.ops {
             let (operands, n) = op.operands();
@@ -185,6 +186,7 @@ impl Equations {
                 Some(by) if by.is_empty() => return true, // as floor and sign, whose derivative is zero between jumps
                 Some(by) => open.extend(by.iter().flat_map(|(of, factor)| [*of, *factor])),
                 None if matches!(op, Op::Select(truth, ..) if varies[truth as usize]) => return true,
+                None if rounds_or_works_on_bits(op) => return true,
                 None => open.extend(&operands[..n]),
             }
         }
@@ -210,13 +212,13 @@ impl Equations {
         needed
     }
 
-    /// Likewise, and for functions also what their derivatives depend on.
+    /// Likewise, and for functions also what they and their derivatives depend on.
     fn needed_with_functions(&self, mut roots: Vec<Id>) -> Vec<bool> {
         let mut needed = self.needed(&roots);
         loop {
             let known = roots.len();
-            for (_, by) in self.functions.iter().filter(|(value, _)| needed[*value as usize]) {
-                roots.extend(by.iter().map(|(_, factor)| *factor).filter(|factor| !needed[*factor as usize]));
+            for (_, by, _) in self.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
+                roots.extend(by.iter().flat_map(|(of, factor)| [*of, *factor]).filter(|id| !needed[*id as usize]));
             }
             if roots.len() == known {
                 return needed;
@@ -270,8 +272,8 @@ pub trait Operand: Number {
         false
     }
 
-    /// Notes the derivatives of a value by others.
-    fn mark(self, _by: Vec<(Self, Self)>) {}
+    /// Notes the derivatives of a value by others, and its bounds.
+    fn mark(self, _by: Vec<(Self, Self)>, _bounds: Option<[f64; 2]>) {}
 }
 
 impl Operand for f64 {
@@ -291,9 +293,17 @@ impl Operand for Symbol {
         series::is_marking()
     }
 
-    fn mark(self, by: Vec<(Symbol, Symbol)>) {
-        series::mark(self, series::Mark::Factors(by));
+    fn mark(self, by: Vec<(Symbol, Symbol)>, bounds: Option<[f64; 2]>) {
+        series::mark(self, series::Mark::Factors(by, bounds));
     }
+}
+
+/// Whether its value is constant but for jumps, or is made bit by bit: outside of a function there is no smooth value of such an operation.
+fn rounds_or_works_on_bits(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Floor(_) | Op::And(..) | Op::Or(..) | Op::Xor(..) | Op::AddBits(..) | Op::ShiftUp(..) | Op::ShiftDown(..)
+    )
 }
 
 struct Own<N: Number> {
@@ -376,8 +386,9 @@ impl<N: Operand> Own<N> {
             made.push(value);
         }
         if N::is_marking() {
-            for (value, by) in self.equations.functions.iter().filter(|(value, _)| needed[*value as usize]) {
-                made[*value as usize].mark(by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect());
+            for (value, by, bounds) in self.equations.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
+                let by = by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect();
+                made[*value as usize].mark(by, bounds.map(|bounds| bounds.map(f64::from_bits)));
             }
         }
         Block::from_iterator(roots.len(), roots.iter().map(|id| made[*id as usize]))
