@@ -421,3 +421,18 @@ def test_scenes_sweeps_and_solve_ivp() -> None:
     assert found.y_last.values[0] == run.y[-1]
     with pytest.raises(ArgumentError, match="max_step: goes with tolerance= and at= only"):
         sw.integrate(system, "merson", y=0.1, dt=0.1, steps=2, max_step=0.1)
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+def test_equal_bits_of_a_batch_with_two_blocks(method: str) -> None:
+    """Each component of v and of y is one group, and of members at rest no number of the batch counts as one of the block."""
+
+    @sw.system
+    def hangs(t: Any, v: Any, y: Any) -> Any:
+        return -np.sin(y)
+
+    asked: dict[str, Any] = {"v": np.array([0.0, 0.0, 1.0]), "y": np.array([1.0, 0.0, 0.0]), "tolerance": 1e-6, "at": [0.01, 4.0]}
+    runs = [sw.integrate(hangs(), method, backend=backend, **asked) for backend in ("rust", "numpy")]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert runs[0].paces is not None
+    assert runs[0].paces.accepted[0] < 100

@@ -6,6 +6,7 @@ The increments of a step h are h times those of a step of 1, so a system is scal
 import operator
 from collections.abc import Callable, Sequence
 from functools import reduce
+from math import prod
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -338,22 +339,28 @@ def begin(
         rates = s.dv(pace.t, v, y), s.dy(pace.t, v, y)
         longest = sizes(v, y, block_axes, groups)
         least = MOVES * longer(pace.t, -pace.t)
-        time = shortest(longest, sizes(*rates, block_axes, groups), groups, v, y)
+        counts = Acceptance(groups).counts(*numbers_in(v, y, block_axes))
+        time = shortest(longest, sizes(*rates, block_axes, groups), counts)
         chosen = longer(where(less(time, np.inf), FIRST * time, -pace.h), least)
         h = chosen
         for part in (0.5, 1.0):
             ahead = part * chosen
             t1, v1, y1 = pace.t + ahead, v + ahead * rates[0], y + ahead * rates[1]
-            time = shortest(longest, sizes(s.dv(t1, v1, y1), s.dy(t1, v1, y1), block_axes, groups), groups, v, y)
+            time = shortest(longest, sizes(s.dv(t1, v1, y1), s.dy(t1, v1, y1), block_axes, groups), counts)
             h = where(less(FIRST * time, h), FIRST * time, h)
         h = where(less(0.0, pace.h), pace.h, longer(h, least))
         h = pace.shortened(h, pace.t)
     return pace._replace(h=h, longest=longest, before=h if series else pace.before)
 
 
-def shortest(lengths: Any, rates: Any, groups: tuple[int, ...], v: Array, y: Array) -> Any:
-    """The shortest time in which a group changes by its size; infinite if there is none."""
-    of_v, of_y = Acceptance(groups).counts(np.size(v), np.size(y))
+def numbers_in(v: Array, y: Array, block_axes: tuple[int, int]) -> list[int]:
+    """How many numbers v and y of a member have."""
+    return [prod(np.shape(block)[:axes]) for block, axes in zip((v, y), block_axes, strict=True)]
+
+
+def shortest(lengths: Any, rates: Any, counts: tuple[int, int]) -> Any:
+    """The shortest time in which a group of v or of y changes by its size; infinite if there is none."""
+    of_v, of_y = counts
     times = [length / rate for length, rate in zip(lengths, rates, strict=True)]
     if of_v and of_y:
         times += [np.sqrt(length / rate) for length, rate in zip(paired(lengths[of_v:], of_v), rates[:of_v], strict=True)]
@@ -433,7 +440,7 @@ def attempt(
     increments = pair.stages(s, pace.t, step, v, y)
     v1, y1 = tableau.plus(v, y, pair.WEIGHTS, increments)
     old, new = sizes(v, y, block_axes, groups), sizes(v1, y1, block_axes, groups)
-    least, bound = tolerated(pace, step, acceptance.counts(np.size(v), np.size(y)), old, new)
+    least, bound = tolerated(pace, step, acceptance.counts(*numbers_in(v, y, block_axes)), old, new)
     error = sizes(*tableau.combined(pair.ERROR, increments), block_axes, groups)
     r = over(error, bound)
     # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .acceptance import Acceptance
-from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, over, sizes, stacked, total
+from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
 from .bits import add_bits, and_bits, at_most, held, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
@@ -125,7 +125,7 @@ def reach(
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
     """
-    groups, counts = acceptance.groups, acceptance.counts(np.size(v), np.size(y))
+    groups, counts = acceptance.groups, acceptance.counts(*numbers_in(v, y, block_axes))
     present, first, second, last_but_one, last = (
         sizes(*blocks, block_axes, groups) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
     )
