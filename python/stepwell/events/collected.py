@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import engine
 from .._checks import Array
-from ..reference.events import located, width_at
+from ..reference.events import located
 from ..reference.types import Whole
 from .event import Event
 from .members import Members
@@ -122,7 +122,8 @@ class Collected:
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
             return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end, width_at(t, length))
+        low, high = np.zeros(len(member)), np.ones(len(member))
+        share, v, y = located(trial, low, high, changes.g, changes.g_end, changes.v_end, changes.y_end)
         return Found(member, changes.step, share, t + share * length, v, y)
 
     def stops(self) -> Array | None:
