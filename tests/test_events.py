@@ -162,7 +162,7 @@ def test_mistake_the_core_notices_another_quantity_is_noticed(monkeypatch: pytes
     found = sweep(every=None)
     monkeypatch.setattr(driver, "FEW_MEMBERS", 1)
     right = driver.watched
-    never = sw.Event(lambda t, v, y: y * y + 1.0)
+    never = sw.Event(lambda t, v, y: y * y + 1e6)
 
     def wrong(quantities: Any, plan: Any) -> Any:
         return right([Quantity(never, plan.system, {}) for _ in quantities], plan)

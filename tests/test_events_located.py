@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.events import collected, driver
+from stepwell.events import collected
 from stepwell.events.trials import Trials
 from stepwell.reference import events
 
@@ -25,6 +25,7 @@ def found(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
     def trial(which: Any, share: Any) -> Any:
         nonlocal trials
         trials += 1
+        assert trials < 10_000  # of a search that does not end
         return g(share), share[np.newaxis], -share[np.newaxis]
 
     ends = np.zeros(n), np.ones(n)
@@ -49,8 +50,9 @@ HARD: dict[str, Callable[[Any], Any]] = {
 @pytest.mark.parametrize("g", HARD.values(), ids=HARD)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_no_function_takes_more_trials_than_bisection_and_one(g: Callable[[Any], Any]) -> None:
-    """Bisection of 1 down to 2⁻⁴⁸ takes 48, and from there to 2⁻⁵²·0.3 another 6. The first round may be one trial behind it, and a
-    later one two, since it reckons in powers of two. What is returned is at or past the zero, by no more than the roundings of 0.3.
+    """Bisection of 1 down to 2⁻⁴⁸ takes 48, and from there to 2⁻⁵²·0.3 another 6. The first round may be one trial behind
+    it, and a later one two, since it reckons in powers of two. What is returned is at or past the zero, by no more than the
+    roundings of 0.3.
     """
     (share,), trials = found(g)
     assert trials <= (48 + 1) + (6 + 2)
@@ -216,6 +218,90 @@ def test_bounces() -> None:
     assert error_of_bounces("rk4", dt=0.01, steps=400) < 1000 * 4 * U
 
 
+# ---- more than one in a step
+
+
+@sw.system(order=1)
+def integrated(t: Any, y: Any, *, a: float = 0.0, b: float = 0.0, c: float = 0.0) -> Any:
+    """ẏ = p'(t) for the polynomial p with these roots, so that y = p(t)."""
+    return (t - a) * (t - b) + (t - a) * (t - c) + (t - b) * (t - c)
+
+
+def there(t: Any, y: Any) -> Any:
+    return y
+
+
+def roots_by(method: str, roots: Any, begin: float, **steps: Any) -> Any:
+    """Where y is zero, from a time before."""
+    y = float(np.prod(begin - np.array(roots)))
+    run = sw.integrate(integrated(a=roots[0], b=roots[1], c=roots[2]), method, y=y, t0=begin, events=there, **steps)
+    return run.events["there"].t
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+def test_two_changes_of_sign_in_an_adaptive_step_are_found(method: str, tolerance: float) -> None:
+    """A method of third order or more makes no error in a cubic, so that its steps grow as long as they may: of twelve cubics the
+    changes of sign come in pairs in one step, at any place of it.
+
+    Bound: y is off by the roundings of some tens of numbers up to 200 and of its rates, and moves by 0.1 or more a unit of time at
+    its zeros, which are 0.2 apart or more.
+    """
+    random = np.random.default_rng(5)
+    for _ in range(12):
+        roots = np.cumsum(0.2 + 3.0 * random.random(3)) - 6.0
+        np.testing.assert_allclose(roots_by(method, roots, -8.0, tolerance=tolerance, at=[8.0]), roots, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.order >= 3 and not m.needs_acceleration])
+@pytest.mark.parametrize("dt", [0.7, 3.0, 6.0, 12.0])
+def test_two_changes_of_sign_in_a_step_of_fixed_length_are_found(method: str, dt: float) -> None:
+    """ẏ = 3t² + 12t − 4 from y(−8) = −120 on; with steps of 6 and 12 a zero is at an end of a step, or all are in one."""
+    found = roots_by(method, [-6.0, -2.0, 2.0], -8.0, dt=dt, steps=int(np.ceil(12.0 / dt)))
+    np.testing.assert_allclose(found, [-6.0, -2.0, 2.0], rtol=0, atol=1e-12)
+
+
+def test_the_core_notices_a_step_there_and_back() -> None:
+    """Of a hundred members, each of which is below zero for a hundredth of a step: found as by looking at every state.
+
+    y = (t − a)² − b² has its zeros at a ± b; Heun's method makes no error in it.
+    """
+
+    @sw.system(order=1)
+    def valley(t: Any, y: Any, *, a: float = 0.0) -> Any:
+        return 2.0 * (t - a)
+
+    a, b = np.linspace(3.0, 8.0, 100), 5e-4
+    run = sw.integrate(valley(a=a), "standard_heun", y=a * a - b * b, dt=0.1, steps=100, events=there)
+    assert (run.events["there"].count == 2).all()
+    # y is off by the roundings of a hundred numbers up to 64, and moves at 2b = 1e-3.
+    np.testing.assert_allclose(run.events["there"].t.reshape(-1, 2), np.stack([a - b, a + b], -1), rtol=0, atol=100 * 64 * U / 1e-3)
+
+
+def test_a_touch_without_a_change_of_sign_is_no_event() -> None:
+    """y = (t − 1)² + c for c = 10⁻⁶ and 0, seen by steps of 0.3; of the second only roundings could be found, and none of another
+    size.
+    """
+    above = sw.integrate(parabola(), "rk4", y=1.0 + 1e-6, dt=0.3, steps=8, events=there)
+    assert above.events["there"].count == 0
+    touches = sw.integrate(parabola(), "rk4", y=1.0, dt=0.3, steps=8, events=there).events["there"]
+    assert (np.abs(touches.y) < 10 * U).all()
+    assert (np.abs(touches.t - 1.0) < 10 * U**0.5).all()
+
+
+@sw.system(order=1)
+def parabola(t: Any, y: Any) -> Any:
+    return 2.0 * (t - 1.0)
+
+
+def test_mistake_a_step_whose_ends_have_one_sign_is_not_looked_into(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "bends", lambda parts: np.zeros(len(parts.of), dtype=bool))
+    with pytest.raises(AssertionError):
+        test_two_changes_of_sign_in_an_adaptive_step_are_found("merson", 1e-3)
+    with pytest.raises(AssertionError):
+        test_the_core_notices_a_step_there_and_back()
+
+
 # ---- whatever the units are
 
 
@@ -294,7 +380,12 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
 def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     from test_events import test_a_state_at_zero_counts_once_and_not_at_the_start as check
 
-    monkeypatch.setattr(driver, "crosses", lambda a, b, _: ((a <= 0) & (b >= 0)) | ((a >= 0) & (b <= 0)))
+    def twice(look: Any, parts: Any) -> Any:
+        found, stuck = events.parted(look, parts)
+        begins = parts.some(parts.g_low == 0.0)
+        return events.joined([begins._replace(high=begins.low, g_low=-np.sign(begins.slope_low)), found]), stuck
+
+    monkeypatch.setattr(collected, "parted", twice)
     with pytest.raises(AssertionError):
         check()
 

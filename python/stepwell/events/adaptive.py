@@ -10,7 +10,6 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses
 from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
@@ -110,27 +109,30 @@ class _Driver(Collected):
         """Find the events within these steps; which of the members stop."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         given, h = self.members.numbers(index), out.lengths(now)
-        g = [quantity(out.t, v, y, given) for quantity in self.quantities]
-        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
-        if not np.any([each.any() for each in changes]):
+        g, moves = [quantity(out.t, v, y, given) for quantity in self.quantities], out.t[1:] > out.t[:-1]
+        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
+        if not np.any([each.any() for each in may]):
             return np.zeros(len(index), dtype=bool)
         taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(out.t[1:] > out.t[:-1], axis=0)]) + before[0]
 
-        def known(e: int, row: Whole, member: Whole) -> Changes:
-            begins, ends = ([each[..., row + later, member] for each in states] for later in (0, 1))
-            step, places = taken[row, member].astype(np.int64), (row, member)
-            return Changes(index[member], step, out.t[places], h[places], g[e][places], g[e][row + 1, member], *begins, *ends)
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            step, places = taken[row, place].astype(np.int64), (row, place)
+            low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][places], g[e][row + 1, place])
+            return Changes(row, place, index[place], step, out.t[places], h[places], low, high, *values, *begins, *ends)
 
+        changes = [self.changes(e, each & moves, known) for e, each in enumerate(may)]
         # Of steps that go beyond the end, or began before this run, only a part is in it.
         partial = out.t[1:] > self.end
         if goes_on:
             partial |= out.t[:-1] < self.since[index]
         for e, each in enumerate(changes):
-            row, member = np.nonzero(each & partial)
-            if len(row):
-                t = self.located(e, known(e, row, member)).t
-                each[row, member] = (t <= self.end) & (t > self.since[index[member]])
-        stops = self.take(index, len(h), changes, known)
+            beyond = np.flatnonzero(partial[each.row, each.place])
+            if len(beyond):
+                t = self.located(e, each.some(beyond)).t
+                inside = (t <= self.end) & (t > self.since[each.member[beyond]])
+                changes[e] = each.some(np.delete(np.arange(len(each.row)), beyond[~inside]))
+        stops = self.take(index, len(h), changes)
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         which, whose = stops.which, index[stops.which]

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import engine
 from .._checks import Array
-from ..reference.events import located
+from ..reference.events import Parts, located, may_change, parted
 from ..reference.types import Whole
 from .event import Event
 from .members import Members
@@ -21,7 +21,7 @@ from .trials import Trials
 #: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
 LOCATED_AT_ONCE = 1 << 12
 
-#: Makes the changes of sign of one event, in these steps of these members.
+#: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
 Known = Callable[[int, Whole, Whole], Changes]
 
 
@@ -44,6 +44,8 @@ class Collected:
         self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
         self.trials = trials(plan, self.members)
         self.stopped_at = np.full(plan.members, np.nan)
+        #: Each quantity one state before those that are looked at next; NaN where that is not known.
+        self.before = np.full((len(events), plan.members), np.nan)
         self.clear()
 
     def clear(self) -> None:
@@ -52,50 +54,87 @@ class Collected:
         self.found: list[list[Found]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]
 
-    def take(self, index: Whole, steps: int, changes: list[Any], known: Known) -> Stops | None:
+    def changes(self, e: int, may: Any, known: Known) -> Changes:
+        """Where one event changes its sign in those steps, of shape (steps, members), in which it may."""
+        steps = known(e, *np.nonzero(may))
+        member, t, h = steps.member, steps.t, steps.h
+
+        def look(which: Any, share: Array) -> tuple[Array, Array, Array, Array]:
+            index, part = member[which], share * h[which]
+            v, y = self.trials.step(index, t[which], part, steps.v[..., which], steps.y[..., which])
+            there = t[which] + part
+            g = self.quantities[e](there, v, y, self.members.numbers(index))
+            return g, self._slope(e, index, there, h[which], v, y), v, y
+
+        if not len(member):
+            return steps
+        slopes = self._slope(e, member, t, h, steps.v, steps.y), self._slope(e, member, t + h, h, steps.v_end, steps.y_end)
+        whole = Parts(np.arange(len(t)), steps.low, steps.high, steps.g, steps.g_end, *slopes, steps.v_end, steps.y_end)
+        parts, _ = parted(look, whole)
+        if direction := self.events[e].direction:
+            parts = parts.some(parts.g_low * direction < 0.0)
+        some = steps.some(parts.of)
+        return some._replace(
+            low=parts.low, high=parts.high, g=parts.g_low, g_end=parts.g_high, v_end=parts.v, y_end=parts.y
+        )
+
+    def may_change(self, e: int, index: Whole, g: Array) -> Any:
+        """In which of some steps of these members an event may change its sign, from its values at all of their ends."""
+        may = may_change(self.before[e, index], g)
+        self.before[e, index] = g[-2]
+        return may
+
+    def _slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
+        """By how much the quantity would change in a step that goes on as the states do."""
+        rates = self.trials.rates(index, t, h, v, y)
+        return self.quantities[e].slope(t, v, y, self.members.numbers(index), h, *rates)
+
+    def take(self, index: Whole, steps: int, changes: list[Changes]) -> Stops | None:
         """Count and keep changes of sign, up to the first terminal event of each member; None if no member stops.
 
         Args:
             index: the members.
             steps: how many there are.
-            changes: of each event, in which steps it is, shape (steps, members).
-            known: what is known of such changes; members are counted among these.
+            changes: of each event, in the order of time of each member.
         """
         # The step in which a member stops; later ones do not count.
         last = np.full(len(index), steps)
-        for each, event in zip(changes, self.events, strict=True):
-            if event.terminal:
-                last = np.minimum(last, np.where(each.any(axis=0), each.argmax(axis=0), steps))
+        for e, each in enumerate(changes):
+            ends = each.some(self._ends(e, each.member))
+            np.minimum.at(last, ends.place, ends.row)
         stops = last < steps
-        if stops.any():
-            changes = [each & (np.arange(steps)[:, np.newaxis] <= last) for each in changes]
         in_last: list[tuple[Found, Whole]] = []
         for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
-            step, member = np.nonzero(each)
             if stops.any():
-                mine = step == last[member]
-                in_last.append((self.located(e, known(e, step[mine], member[mine])), member[mine]))
-                step, member = step[~mine], member[~mine]
-            if len(step):
-                kept = ordinals(member) + self.count[e, index[member]] <= event.most
-                self.count[e, index] += np.bincount(member, minlength=len(index))
-                self._put_off(e, known(e, step[kept], member[kept]))
+                mine = each.some(each.row == last[each.place])
+                in_last.append((self.located(e, mine), mine.place))
+                each = each.some(each.row < last[each.place])  # noqa: PLW2901
+            if len(each.row):
+                kept = ordinals(each.member) + self.count[e, each.member] <= event.most
+                self.count[e, index] += np.bincount(each.place, minlength=len(index))
+                self._put_off(e, each.some(kept))
         return self._stopped(index, in_last, last, stops) if stops.any() else None
+
+    def _ends(self, e: int, member: Whole) -> Any:
+        """Which of these further occurrences, in the order of time of each member, end its run."""
+        terminal = self.events[e].terminal
+        return ordinals(member) + self.count[e, member] >= terminal if terminal else np.zeros(len(member), dtype=bool)
 
     def _stopped(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any) -> Stops:
         """Let members stop at the first terminal event of their last step."""
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
-        for (each, member), event in zip(in_last, self.events, strict=True):
-            if event.terminal:
-                first = each.share < end[member]
-                ends, who = each.some(first), member[first]
-                end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
+        for e, (each, member) in enumerate(in_last):
+            first = np.flatnonzero(self._ends(e, each.member))
+            first = first[np.unique(member[first], return_index=True)[1]]
+            first = first[each.share[first] < end[member[first]]]
+            ends, who = each.some(first), member[first]
+            end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
         for e, ((each, member), event) in enumerate(zip(in_last, self.events, strict=True)):
-            before_it = each.share <= end[member]  # what comes after the end of a member is not there
-            kept = each.some(before_it)
-            self.count[e, kept.member] += 1
-            self.found[e].append(kept.some(self.count[e, kept.member] <= event.most))
+            kept = each.some(each.share <= end[member])  # what comes after the end of a member is not there
+            few = ordinals(kept.member) + self.count[e, kept.member] <= event.most
+            np.add.at(self.count[e], kept.member, 1)
+            self.found[e].append(kept.some(few))
         self.stopped_at[index[stops]] = times[stops]
         return Stops(stops, last, times, v, y)
 
@@ -122,8 +161,8 @@ class Collected:
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
             return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        low, high = np.zeros(len(member)), np.ones(len(member))
-        share, v, y = located(trial, low, high, changes.g, changes.g_end, changes.v_end, changes.y_end)
+        ends = changes.low, changes.high, changes.g, changes.g_end
+        share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
         return Found(member, changes.step, share, t + share * length, v, y)
 
     def stops(self) -> Array | None:
@@ -137,7 +176,7 @@ class Collected:
             self.locate_waiting(e)
             found = self.found[e]
             member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            order = np.lexsort((step, member))
+            order = np.lexsort((t, step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
             made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses
+from ..reference.events import near
 from ..reference.types import Whole
 from ..result import Status
 from .collected import Collected
@@ -84,6 +84,8 @@ class _Driver(Collected):
         self.slot = np.empty((*blocks[0], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.done = 0
+        #: Members one of whose quantities is near to zero where the steps end that were made last.
+        self.close = np.zeros(total, dtype=bool)
         self.watched: engine.Watched | None = None
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
@@ -151,9 +153,13 @@ class _Driver(Collected):
         if done + now.steps == self._next_save(done):
             self._save(done + now.steps, 0, index, out.v, out.y)
         end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
-        noticed = out.noticed[-1] > 0.0
-        for quantity, event, before in zip(self.quantities, self.events, out.noticed, strict=False):
-            noticed |= crosses(before, quantity(np.array(end), out.v[-1], out.y[-1], given), event.direction)
+        noticed = (out.noticed[-1] > 0.0) | self.close[index]
+        self.close[index] = False
+        for e, (quantity, before) in enumerate(zip(self.quantities, out.noticed, strict=False)):
+            g = quantity(np.array(end), out.v[-1], out.y[-1], given)
+            self.close[index] |= near(g, before)
+            noticed |= near(g, before) | near(before, g)
+            self.before[e, index] = before
         stopped, where = np.zeros(len(index), dtype=bool), np.flatnonzero(noticed)
         size = max(1, most // now.steps)
         for first in range(0, len(where), size):
@@ -162,7 +168,10 @@ class _Driver(Collected):
             again = now._replace(system=again.system, batch=again.batch, force=again.force, every=1, watched=None)
             then = at.some(these)
             states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
+            last = self.before[:, index[these]]
+            self.before[:, index[these]] = np.nan
             stopped[these] = self._look(again, index[these], states, done)
+            self.before[:, index[these]] = last
         return stopped, len(where) / len(index)
 
     def _next_save(self, done: int) -> int:
@@ -187,14 +196,20 @@ class _Driver(Collected):
         t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
         g = [quantity(t, v, y, given) for quantity in self.quantities]
-        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
+        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
         if (out.first_bad >= 0).any():
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
-            finite = (out.first_bad < 0) | (ends < out.first_bad)
-            changes = [each & finite for each in changes]
-        stops = self.take(
-            index, now.steps, changes, lambda e, step, member: self._changes(now, index, g[e], states, step, member)
-        )
+            may = [each & ((out.first_bad < 0) | (ends < out.first_bad)) for each in may]
+
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            number = now.first + row
+            low, high, h = np.zeros(len(row)), np.ones(len(row)), np.full(len(row), now.dt)
+            begin: Any = now.t0 + number * now.dt
+            values = g[e][row, place], g[e][row + 1, place]
+            return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
+
+        stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         after = np.searchsorted(self.saves, done + stops.step, "right")
@@ -203,14 +218,6 @@ class _Driver(Collected):
             for kept_states, state in zip(self.kept, (stops.v, stops.y), strict=True):
                 kept_states[place:][..., index[these]] = state[..., these]
         return stops.which
-
-    def _changes(self, now: engine.Plan, index: Whole, g: Array, states: Any, step: Whole, member: Whole) -> Changes:
-        """What is known of the changes of sign of these members in these steps."""
-        begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
-        numbers = now.first + step
-        t: Any = now.t0 + numbers * now.dt
-        h = np.full(len(step), now.dt)
-        return Changes(index[member], numbers, t, h, g[step, member], g[step + 1, member], *begins, *ends)
 
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""

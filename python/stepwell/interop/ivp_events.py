@@ -12,7 +12,7 @@ from .._checks import Array
 from ..errors import DTypeError
 from .ivp_function import takes
 
-#: A zero is located to so much, relative to its time or to the time since the start of its step, whichever is more: four roundings.
+#: A zero is located to four roundings of its time, or of the time since the start of its step, whichever are more.
 ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
 
 #: Shorter brackets have no roundings of their own.
