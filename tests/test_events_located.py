@@ -393,7 +393,7 @@ def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.
 def test_mistake_a_secant_without_a_bound_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regula falsi alone: one end of the bracket stays where it is."""
 
-    def secant(low: Any, high: Any, g_low: Any, g_high: Any, within: Any, left: Any) -> Any:
+    def secant(low: Any, high: Any, g_low: Any, g_high: Any, within: Any, unit: Any, left: Any) -> Any:
         return np.clip((g_high * low - g_low * high) / (g_high - g_low), low + 0.5 * within, high - 0.5 * within)
 
     monkeypatch.setattr(events, "_next", secant)

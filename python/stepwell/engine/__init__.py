@@ -31,7 +31,7 @@ from .adaptive import (
     pace_of,
     paces,
 )
-from .direct import advance
+from .direct import advance, to_slot
 from .plan import Arrays, Outcome, Plan, Watched, model, pushes
 
 __all__ = [
@@ -61,6 +61,7 @@ __all__ = [
     "pace_of",
     "paces",
     "pushes",
+    "to_slot",
 ]
 
 if hasattr(os, "register_at_fork"):

@@ -21,6 +21,9 @@ from .trials import Trials
 #: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
 LOCATED_AT_ONCE = 1 << 12
 
+#: What stands for the slope of a quantity that begins at zero without one, on the side from which it came.
+LEAST_SLOPE = float(np.finfo(float).tiny)
+
 #: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
 Known = Callable[[int, Whole, Whole], Changes]
 
@@ -56,7 +59,13 @@ class Collected:
 
     def changes(self, e: int, may: Any, known: Known) -> Changes:
         """Where one event changes its sign in those steps, of shape (steps, members), in which it may."""
-        steps = known(e, *np.nonzero(may))
+        return self.within(e, known(e, *np.nonzero(may)))[0]
+
+    def within(self, e: int, steps: Changes, at: Array | None = None) -> tuple[Changes, Whole]:
+        """The parts of whole steps in which one event changes its sign, and which steps return to it within roundings.
+
+        ``at`` is not zero for steps that begin at the event, since it changed the state there: the side from which it came.
+        """
         member, t, h = steps.member, steps.t, steps.h
 
         def look(which: Any, share: Array) -> tuple[Array, Array, Array, Array]:
@@ -67,16 +76,22 @@ class Collected:
             return g, self._slope(e, index, there, h[which], v, y), v, y
 
         if not len(member):
-            return steps
-        slopes = self._slope(e, member, t, h, steps.v, steps.y), self._slope(e, member, t + h, h, steps.v_end, steps.y_end)
-        whole = Parts(np.arange(len(t)), steps.low, steps.high, steps.g, steps.g_end, *slopes, steps.v_end, steps.y_end)
-        parts, _ = parted(look, whole)
+            return steps, member
+        slope, slope_end = (
+            self._slope(e, member, at_time, h, *state)
+            for at_time, state in ((t, (steps.v, steps.y)), (t + h, (steps.v_end, steps.y_end)))
+        )
+        g = steps.g
+        if at is not None:
+            g, slope = np.where(at != 0.0, 0.0, g), np.where((at != 0.0) & (slope == 0.0), at * LEAST_SLOPE, slope)
+        whole = Parts(np.arange(len(t)), steps.low, steps.high, g, steps.g_end, slope, slope_end, steps.v_end, steps.y_end)
+        parts, stuck = parted(look, whole)
+        if at is not None:
+            stuck = stuck[at[stuck] != 0.0]
         if direction := self.events[e].direction:
             parts = parts.some(parts.g_low * direction < 0.0)
-        some = steps.some(parts.of)
-        return some._replace(
-            low=parts.low, high=parts.high, g=parts.g_low, g_end=parts.g_high, v_end=parts.v, y_end=parts.y
-        )
+        ends = {"low": parts.low, "high": parts.high, "g": parts.g_low, "g_end": parts.g_high}
+        return steps.some(parts.of)._replace(**ends, v_end=parts.v, y_end=parts.y), stuck
 
     def may_change(self, e: int, index: Whole, g: Array) -> Any:
         """In which of some steps of these members an event may change its sign, from its values at all of their ends."""
@@ -100,7 +115,7 @@ class Collected:
         # The step in which a member stops; later ones do not count.
         last = np.full(len(index), steps)
         for e, each in enumerate(changes):
-            ends = each.some(self._ends(e, each.member))
+            ends = each.some(self.ends(e, each.member))
             np.minimum.at(last, ends.place, ends.row)
         stops = last < steps
         in_last: list[tuple[Found, Whole]] = []
@@ -115,7 +130,7 @@ class Collected:
                 self._put_off(e, each.some(kept))
         return self._stopped(index, in_last, last, stops) if stops.any() else None
 
-    def _ends(self, e: int, member: Whole) -> Any:
+    def ends(self, e: int, member: Whole) -> Any:
         """Which of these further occurrences, in the order of time of each member, end its run."""
         terminal = self.events[e].terminal
         return ordinals(member) + self.count[e, member] >= terminal if terminal else np.zeros(len(member), dtype=bool)
@@ -125,18 +140,21 @@ class Collected:
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
         for e, (each, member) in enumerate(in_last):
-            first = np.flatnonzero(self._ends(e, each.member))
+            first = np.flatnonzero(self.ends(e, each.member))
             first = first[np.unique(member[first], return_index=True)[1]]
             first = first[each.share[first] < end[member[first]]]
             ends, who = each.some(first), member[first]
             end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
-        for e, ((each, member), event) in enumerate(zip(in_last, self.events, strict=True)):
-            kept = each.some(each.share <= end[member])  # what comes after the end of a member is not there
-            few = ordinals(kept.member) + self.count[e, kept.member] <= event.most
-            np.add.at(self.count[e], kept.member, 1)
-            self.found[e].append(kept.some(few))
+        for e, (each, member) in enumerate(in_last):
+            self.note(e, each.some(each.share <= end[member]))  # what comes after the end of a member is not there
         self.stopped_at[index[stops]] = times[stops]
         return Stops(stops, last, times, v, y)
+
+    def note(self, e: int, found: Found) -> None:
+        """Count and keep these."""
+        few = ordinals(found.member) + self.count[e, found.member] <= self.events[e].most
+        np.add.at(self.count[e], found.member, 1)
+        self.found[e].append(found.some(few))
 
     def _put_off(self, e: int, changes: Changes) -> None:
         """Locate these with others, as many at once as are quick together."""
@@ -167,7 +185,8 @@ class Collected:
 
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""
-        return self.stopped_at.reshape(self.plan.batch) if any(event.terminal for event in self.events) else None
+        ends = any(event.terminal or event.then for event in self.events)
+        return self.stopped_at.reshape(self.plan.batch) if ends else None
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Those of each event, by name."""

@@ -13,9 +13,10 @@ from .._checks import Array
 from ..reference.events import near
 from ..reference.types import Whole
 from ..result import Status
-from .collected import Collected
+from .collected import Collected, Known
 from .event import Event
 from .parts import At, Changes
+from .resets import Resets, Stretch, warn_of_rest
 from .traced import watched
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
@@ -60,7 +61,7 @@ class Run:
     def made(self, plan: engine.Plan) -> engine.Outcome:
         """Make it."""
         check_room(self._events, plan)
-        self._driver = _Driver(plan, self._events)
+        self._driver = (_Resetting if any(event.then for event in self._events) else _Driver)(plan, self._events)
         return self._driver.run(*self._start)
 
     def tell(self, run: Any) -> None:
@@ -70,6 +71,7 @@ class Run:
         if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
             run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
             run.encounter = run.overshoots = None  # these go through all of the steps
+        self._driver.tell_of_rest(run)
 
 
 class _Driver(Collected):
@@ -190,8 +192,8 @@ class _Driver(Collected):
             else:
                 kept[first:last][..., index] = state[where]
 
-    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
-        """Find the events within these steps; which of the members stop."""
+    def _may(self, now: engine.Plan, index: Whole, out: engine.Outcome) -> tuple[Known, list[Any]]:
+        """What is known of these steps, and in which of them an event may change its sign."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
@@ -209,6 +211,11 @@ class _Driver(Collected):
             values = g[e][row, place], g[e][row + 1, place]
             return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
 
+        return known, may
+
+    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        known, may = self._may(now, index, out)
         stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
         if stops is None:
             return np.zeros(len(index), dtype=bool)
@@ -219,6 +226,9 @@ class _Driver(Collected):
                 kept_states[place:][..., index[these]] = state[..., these]
         return stops.which
 
+    def tell_of_rest(self, run: Any) -> None:
+        """Tell of members that came to rest at an event."""
+
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""
         batch, blocks = self.plan.batch, (self.plan.system.v_shape, self.plan.system.y_shape)
@@ -226,3 +236,94 @@ class _Driver(Collected):
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
         return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+
+
+class _Resetting(_Driver):
+    """A run with events that change the state: where the first of a group is, the group's steps end, and go on from there."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
+        super().__init__(plan, events)
+        self.resets = Resets(self)
+        self.rests = np.full(plan.members, -1)
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+        plan, piece, some = self.plan, FIRST_STEPS, self.members.plan(index)
+        while done < plan.steps and len(index):
+            size = max(1, most // LEAST_STEPS)
+            if len(index) > size:
+                for first in range(0, len(index), size):
+                    these = np.arange(first, min(first + size, len(index)))
+                    self._group(index[these], at.some(these), most, done)
+                return
+            steps = min(max(1, min(piece, most // len(index), MOST_STEPS)), plan.steps - done)
+            now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
+            out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+            before = self.before[:, index]
+            known, may = self._may(now, index, out)
+            changes = [self.changes(e, each, known) for e, each in enumerate(may)]
+            # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
+            rows = [each.row[self.resets.end(e, each.member)] for e, each in enumerate(changes)]
+            row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
+            at_event = self.resets.at[:, index].any(axis=0) if row == 0 else np.zeros(len(index), dtype=bool)
+            for e, each in enumerate(changes):
+                ends = self.resets.end(e, each.member) & (each.row == row)
+                at_event[each.place[ends]] = True
+            now = now._replace(steps=min(row + 1, steps))
+            if now.steps < steps:
+                self.before[:, index] = before
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                known, _ = self._may(now, index, out)
+            self.take(
+                index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]
+            )
+            slot, gone = out.slot, np.zeros(len(index), dtype=bool)
+            if row < steps:
+                slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
+            self._save(done, now.steps, index, out.v, out.y)
+            at = At(slot, out.y[-1], out.first_bad, True)
+            self.slot[..., index], self.first_bad[index] = at.slot, at.bad
+            if gone.any():
+                self._stay(index, gone, out, done + row)
+                self.done += int(gone.sum()) * (plan.steps - done - now.steps)
+                index, at = index[~gone], at.some(~gone)
+                some = self.members.plan(index) if len(index) else some
+            self.done += now.steps * len(gone)
+            done, piece = done + now.steps, 2 * now.steps if row < steps else 4 * piece
+            if plan.progress is not None:
+                plan.progress(self.done / (plan.steps * plan.members))
+
+    def _through(
+        self, now: engine.Plan, index: Whole, out: engine.Outcome, known: Known, which: Whole, row: int
+    ) -> tuple[Array, Any]:
+        """Take some members through the last of these steps; what all carry then, and which of them stop."""
+        step = known(0, np.full(len(which), row), which)
+        member = index[which]
+        end = now.t0 + (step.step + 1) * now.dt
+        states = step.v, step.y, step.v_end, step.y_end
+        arrived = self.resets.through(Stretch(member, step.step, step.t, end - step.t, *states, self.resets.at[:, member]))
+        out.v[-1][..., which], out.y[-1][..., which] = arrived.v, arrived.y
+        self.resets.at[:, member], self.before[:, member] = arrived.at, np.nan
+        gone, self.rests[member] = ~np.isnan(arrived.t), arrived.rests
+        self.stopped_at[member[gone]] = arrived.t[gone]
+        slot = out.slot
+        if now.method.carry is not None:
+            anew = self.members.plan(member)._replace(first=now.first + now.steps)
+            slot[..., which] = engine.to_slot(anew, arrived.v, arrived.y)
+        else:
+            slot = out.v[-1]
+        stops = np.zeros(len(index), dtype=bool)
+        stops[which[gone]] = True
+        return slot, stops
+
+    def _stay(self, index: Whole, gone: Any, out: engine.Outcome, step: int) -> None:
+        """Keep the states of members that stop in this step."""
+        place = int(np.searchsorted(self.saves, step, "right"))
+        for kept, state in zip(self.kept, (out.v[-1], out.y[-1]), strict=True):
+            kept[place:][..., index[gone]] = state[..., gone]
+        self.first_bad[index[gone]], self.slot[..., index[gone]] = -1, np.nan
+
+    def tell_of_rest(self, run: Any) -> None:
+        rests = (self.rests >= 0).reshape(self.plan.batch)
+        if rests.any():
+            run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
+            warn_of_rest([event.name for event in self.events], self.rests, self.stopped_at, self.plan.batch)

@@ -162,7 +162,9 @@ class NewState:
         if len(self._shapes) == 2 and not (isinstance(result, (tuple, list)) and len(result) == 2):
             raise TraceError(f"{self._name}: expected the new state (v, y), got {kind_of(result)}")
         blocks = []
-        for name, shape, block in zip("vy"[-len(self._shapes) :], self._shapes, result if len(self._shapes) == 2 else [result], strict=True):
+        for name, shape, block in zip(
+            "vy"[-len(self._shapes) :], self._shapes, result if len(self._shapes) == 2 else [result], strict=True
+        ):
             numbers = objects(block)
             wrong = next((each for each in numbers.flat if not isinstance(each, (Scalar, int, float))), None)
             if wrong is not None or numbers.shape not in ((), shape):

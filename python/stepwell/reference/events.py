@@ -16,7 +16,8 @@ SPACING = 2.0**-52
 SHARE, MOST_TRIALS = 2.0**-48, 49
 #: Brackets shorter than this share of a step are not cut any further.
 LEAST_SHARE = 2.0**-1000
-#: By what multiple of its squared width a trial is moved towards the middle of the bracket, so that both ends come nearer.
+#: By what multiple of its squared width, over the width at first, a trial is moved towards the middle of the bracket, so that both
+#: ends come nearer.
 TRUNCATION = 0.02
 
 #: A step in which g keeps its sign is looked into where g at one of its ends is no more than so many times the bend there: by how
@@ -25,7 +26,7 @@ REACH = 4.0
 #: How much further than at its ends g may bend within a step, as a share of the control points of the cubic with the same values
 #: and slopes at both ends, which lie a third of the step from them. Of a step in which it changes its sign such a share is less:
 #: of a straight line, which has one zero, both points must not seem to be across.
-BENDS, BENDS_TWICE = 2.0, 1.25
+BENDS, BENDS_TWICE = 1.4, 1.25
 #: A part of a step is halved so many times, to find two zeros in it: a smooth g that touches zero is then within its roundings.
 MOST_HALVINGS = 26
 #: The same where g begins at zero and is known to leave it: a bracket begins where it has done so.
@@ -35,7 +36,6 @@ MOST_HALVINGS_FROM_ZERO = 60
 Trial = Callable[[Any, Array], tuple[Array, Array, Array]]
 #: The same with the slope of g along the motion, over the time of the whole step, behind g.
 Look = Callable[[Any, Array], tuple[Array, Array, Array, Array]]
-
 
 
 class Parts(NamedTuple):
@@ -150,12 +150,24 @@ def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
         parts = parts.some(split)
         if not len(parts.of):
             break
-        middle = 0.5 * (parts.low + parts.high)
+        middle = np.where(leaves_zero[split] & (halving % 3 < 2), _return(parts), 0.5 * (parts.low + parts.high))
         g, slope, v, y = look(parts.of, middle)
         first_half = parts._replace(high=middle, g_high=g, slope_high=slope, v=v, y=y)
         parts = joined([first_half, parts._replace(low=middle, g_low=g, slope_low=slope)])
     once = joined(brackets)
     return once.some(np.lexsort((once.high, once.of))), stuck
+
+
+def _return(parts: Parts) -> Array:
+    """Where to cut parts in which g leaves zero and returns: at first behind its return, then between both.
+
+    The parabola with the same slope at zero tells, if it returns within the part; else it is the middle.
+    """
+    width = parts.high - parts.low
+    with np.errstate(all="ignore"):
+        back = parts.slope_low * width / (parts.slope_low * width - parts.g_high)
+        cut = np.where(1.5 * back < 0.75, 1.5 * back, 0.5 * back)
+    return parts.low + width * np.where((cut > 0.0) & (cut < 0.75), cut, 0.5)
 
 
 def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, v: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -179,16 +191,17 @@ def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, 
     low, high, v, y, n = low.copy(), high.copy(), v.copy(), y.copy(), len(low)
     sign = np.where(g_low < 0.0, 1.0, -1.0)
     g_low, g_high = sign * g_low, sign * g_high
-    within, left = np.full(n, SHARE), np.full(n, MOST_TRIALS)
+    within, left, unit = np.full(n, SHARE), np.full(n, MOST_TRIALS), high - low
     while True:
         width = high - low
         live = np.flatnonzero((width > np.maximum(SPACING * high, LEAST_SHARE)) & (g_high != 0.0))
         if not len(live):
             return high, v, y
         again = live[(width[live] <= within[live]) | (left[live] == 0)]
-        within[again] = SPACING * high[again]
+        within[again], unit[again] = SPACING * high[again], width[again]
         left[again] = np.frexp(width[again])[1] - np.frexp(within[again])[1] + 2
-        share = _next(low[live], high[live], g_low[live], g_high[live], within[live], left[live])
+        ends = low[live], high[live], g_low[live], g_high[live]
+        share = _next(*ends, within[live], unit[live], left[live])
         left[live] -= 1
         g, v_there, y_there = trial(live, share)
         g = sign[live] * g
@@ -199,16 +212,16 @@ def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, 
         v[..., after_it], y[..., after_it] = v_there[..., past], y_there[..., past]
 
 
-def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, left: Whole) -> Array:
+def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, unit: Array, left: Whole) -> Array:
     """The next trial within brackets: the secant's, a little towards the middle, and not too far from the middle.
 
-    The brackets come down to ``within`` in so many trials as are left.
+    The brackets come down from ``unit`` to ``within`` in so many trials as are left.
     """
     width, middle = high - low, 0.5 * (low + high)
     with np.errstate(all="ignore"):
         secant = (g_high * low - g_low * high) / (g_high - g_low)
         towards = np.where(secant <= middle, 1.0, -1.0)
-        moved = TRUNCATION * (width * width)
+        moved = TRUNCATION * (width / unit) * width
         near = np.where(moved <= np.abs(middle - secant), secant + towards * moved, middle)
     edge = SPACING * high  # both ends must be able to move
     near = np.minimum(np.maximum(near, low + edge), high - edge)
