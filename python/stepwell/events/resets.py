@@ -18,6 +18,9 @@ from .traced import NewState
 
 #: A member whose state was changed more often than so many times within one step is at rest.
 MOST_IN_A_STEP = 1000
+#: Times between changes of the state shrink geometrically if their ratios differ by no more than this; the limit is then where the
+#: geometric series of times and states ends, if that is within the step.
+SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
 #: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved may
 #: be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
 LEAST_LEFT = 2.0**-36
@@ -106,8 +109,23 @@ class Resets:
         n, end, step = len(stretch.member), stretch.t + stretch.h, stretch.h
         v, y, at = stretch.v_end.copy(), stretch.y_end.copy(), np.zeros_like(stretch.at)
         times, stops, rests, live = np.full(n, np.nan), np.zeros(n, dtype=bool), np.full(n, -1), np.arange(n)
+        flight, ratio = np.full(n, np.nan), np.full(n, np.nan)
         for resets in range(MOST_IN_A_STEP + 1):
             ahead, returns = self._ahead(stretch, step[live])
+            with np.errstate(all="ignore"):
+                last, flight = flight, np.where(((stretch.at != 0.0) & (ahead.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan)
+                before, ratio = ratio, flight / last
+                rest_of_series = ratio / (1.0 - ratio)
+                limit = ahead.t + flight * rest_of_series
+                settled = (np.abs(ratio - before) <= SETTLED) & (ratio <= LARGEST_RATIO) & (limit < end[live]) & (returns < 0)
+            if settled.any():
+                which = settled & (ahead.share < np.inf) & ~ahead.stops
+                returns = np.where(which, np.argmax(ahead.at != 0.0, axis=0), returns)
+                v_limit, y_limit = (
+                    np.where(which, now + (now - earlier) * rest_of_series, earlier)
+                    for now, earlier in ((ahead.v, stretch.v), (ahead.y, stretch.y))
+                )
+                stretch = stretch._replace(t=np.where(which, limit, stretch.t), v=v_limit, y=y_limit)
             if resets == MOST_IN_A_STEP:
                 returns = np.where(ahead.share < np.inf, np.argmax(stretch.at != 0.0, axis=0), returns)
             rest, stop = returns >= 0, (returns < 0) & ahead.stops
@@ -125,7 +143,7 @@ class Resets:
             at[:, live[arrives & soon]] = stretch.at[:, arrives & soon]
             if not goes_on.any():
                 break
-            live = live[goes_on]
+            live, flight, ratio = live[goes_on], flight[goes_on], ratio[goes_on]
             stretch = self._anew(stretch.member[goes_on], stretch.step[goes_on], end[live], ahead, goes_on)
         return Arrived(v, y, at, stops, rests, times)
 
