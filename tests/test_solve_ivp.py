@@ -167,7 +167,7 @@ def test_states_are_those_of_a_run_to_the_bit() -> None:
         return [10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
 
     times = np.linspace(0.0, 5.0, 41)
-    run = sw.integrate(lorenz, "merson", y=[1.0, 2.0, 3.0], tolerance=(1e-6, np.sqrt(3) * 1e-8), at=times)
+    run = sw.integrate(lorenz, "merson", y=[1.0, 2.0, 3.0], tolerance=(1e-6, 1e-8), at=times)
     options: dict[str, Any] = {"t_span": (0.0, 5.0), "y0": [1.0, 2.0, 3.0], "method": "merson", "rtol": 1e-6, "atol": 1e-8}
     once = sw.solve_ivp(lorenz, t_eval=times, **options)
     stepped = sw.solve_ivp(lorenz.function, t_eval=times, dense_output=True, **options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -175,3 +176,79 @@ def test_a_run_of_another_system_is_refused() -> None:
     run = sw.integrate(sw.Chain(3), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
     with pytest.raises(ShapeError, match="at: expected a run of"):
         sw.analyse(sw.NBody(), "rk4", at=run)
+
+
+# ---- equations of one's own that are linear, or at rest
+
+
+@sw.system(order=1)
+def lags(t, y, *, time=1.0, fast=20.0, bend=0.0):
+    """Equal lags in a chain, driven, and a fast one behind them."""
+    slow = [(before - each) / time for before, each in zip([np.sin(t), *y[:-2]], y[:-1], strict=True)]
+    return np.array([*slow, y[-2] - fast * y[-1] + bend * y[-1] ** 2])
+
+
+@sw.system(order=1)
+def bent(t, y, *, fast=20.0, bend=0.1):
+    """The same, at rest where all are zero."""
+    return np.array([-y[0], y[0] - y[1], y[1] - y[2], y[2] - fast * y[3] + bend * y[3] ** 2])
+
+
+@sw.system(order=1)
+def parallel(t, y, *, time=0.5, fast=30.0):
+    """Equal lags under one drive, and a fast one."""
+    drive = np.where(t < 1.0, 1.0, 0.0)
+    return np.array([*((drive - each) / time for each in y[:-1]), y[:-1].sum() - fast * y[-1]])
+
+
+@sw.system
+def swings(t, v, y, *, omega=3.0):
+    """Equal oscillators, each pulled by the one before it."""
+    return np.array([-(omega**2) * y[0] + np.cos(t), *(before - omega**2 * each for before, each in itertools.pairwise(y))])
+
+
+def as_linear(system: sw.System, v: Any, y: Any) -> sw.LinearSystem:
+    return sw.LinearSystem(sw.jacobian(system, v=v, y=y).matrix, velocities=0 if v is None else len(v))
+
+
+@pytest.mark.parametrize("method", ["standard_euler", "false_euler", "rk4", "merson", "dop853", "taylor"])
+@pytest.mark.parametrize("n", [3, 4, 7])
+def test_own_linear_equations_have_the_limit_of_the_linear_system(n: int, method: str) -> None:
+    """Also where eigenvalues meet, which rounding would hide in the eigenvalues of a step: the fast one decides."""
+    y = np.linspace(1.0, 2.0, n + 1)
+    for system, fast in ((lags(), 20.0), (parallel(), 30.0)):
+        limit = sw.stability_limit(system, method, y=y)
+        assert limit.decided
+        assert float(limit) == float(sw.stability_limit(as_linear(system, None, y), method))
+        alone = sw.stability_limit(sw.LinearSystem([[-fast]], velocities=0), method)
+        assert float(limit) == pytest.approx(float(alone), rel=1e-14)
+        assert limit.mode.rate == pytest.approx(-fast, rel=1e-14)
+        assert limit.mode.y.shape == (n + 1,)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "leapfrog", "rk4", "verlet"])
+def test_own_oscillators_that_are_equal_have_the_limit_of_one(method: str) -> None:
+    limit = sw.stability_limit(swings(), method, v=np.zeros(4), y=np.ones(4))
+    assert limit.decided
+    assert float(limit) == pytest.approx(sw.method(method).limit / 3.0, rel=1e-12)
+
+
+def test_a_batch_of_own_linear_equations() -> None:
+    fast = np.array([2.0, 20.0, 200.0])
+    limits = sw.stability_limit(lags(fast=fast), "rk4", y=np.ones(5))
+    assert limits.decided.all()
+    np.testing.assert_allclose(limits, 2.785293563405282 / fast, rtol=1e-14)
+    assert [mode.y.shape for mode in limits.modes] == [(5,)] * 3
+
+
+def test_what_bends_is_decided_where_it_rests() -> None:
+    """All stages of a step are then at one state, so the step is a polynomial of the matrix there. Elsewhere it stays open."""
+    system, rest = bent(), np.zeros(4)
+    limit = sw.stability_limit(system, "rk4", y=rest)
+    assert float(limit) == float(sw.stability_limit(as_linear(system, None, rest), "rk4"))
+    with pytest.warns(sw.AccuracyWarning, match=r"is NaN: it is between dt = .* and .*, where rounding hides .* LinearSystem"):
+        moving = sw.stability_limit(system, "rk4", y=rest + 1.0)
+    assert math.isnan(moving)
+    assert not moving.decided
+    assert 0.0 <= moving.stable < moving.grows
+    assert "not decided" in repr(moving)

@@ -147,7 +147,7 @@ __all__ = [
 def isa() -> str:
     """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
 
-    At ``baseline`` steps are interpreted (``STEPWELL_KERNELS=interpret``); at the others they become machine code.
+    At ``interpret`` steps are interpreted; at the others they become machine code.
 
     Example:
         >>> sw.isa() in sw.isa_levels()
@@ -160,7 +160,7 @@ def isa_levels() -> list[str]:
     """The CPU levels that this machine has.
 
     Example:
-        >>> "baseline" in sw.isa_levels()
+        >>> "interpret" in sw.isa_levels()
         True
     """
     return _core.isa_levels()

@@ -5,6 +5,11 @@ A message says what was given, what was expected, and the argument's name.
 
 from __future__ import annotations
 
+from contextvars import ContextVar
+
+#: The errors of what is being traced, in their order; None while nothing is.
+REFUSED: ContextVar[list[TraceError] | None] = ContextVar("refused", default=None)
+
 
 class StepwellError(Exception):
     """The base class of every error that stepwell raises intentionally.
@@ -14,7 +19,7 @@ class StepwellError(Exception):
         ...     sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.0, steps=10)
         ... except sw.StepwellError as error:
         ...     print(error)
-        dt: expected numbers above zero in units of time, got 0
+        dt: expected a number other than zero in units of time, got 0
     """
 
 
@@ -43,6 +48,12 @@ class TraceError(ArgumentError):
 
     #: Whether the cause may be a state of another shape than the function expects.
     of_shape = False
+
+    def __init__(self, *said: object) -> None:
+        super().__init__(*said)
+        # A user's `except Exception` may swallow it; what went on to be traced would not be the user's equations.
+        if (refused := REFUSED.get()) is not None:
+            refused.append(self)
 
 
 class TooLargeError(ArgumentError, MemoryError):

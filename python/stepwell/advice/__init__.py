@@ -23,7 +23,7 @@ from ..scenes import scene as find_scene
 from . import predict
 from .adaptive import AdaptiveTrials
 from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
-from .motion import SINGLE_STEP_ROUNDING, Grid, motion_of
+from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
 from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
 from .trials import Times, Trial, Trials, step_times, tried_times
@@ -49,6 +49,9 @@ LONGEST_FRAME = 100.0
 
 #: The most numbers of a state: with more, no useful run would be short enough to be tried.
 MAX_NUMBERS = 100_000
+
+#: Errors for which advice would name what is good enough by luck: this, a tenth of it and so on.
+LARGEST_HINTED = 0.1
 
 #: A scene by its name, made once: some take long to compute their true motion.
 _named = cache(find_scene)
@@ -145,8 +148,9 @@ def advise(
     times, noise = _times(scene, candidates)
     noise = noise if cost == "time" else 0.0
     prices = times if cost == "time" else {each.name: float(each.evaluations) for each in candidates}
+    hints = _hints(known, trials, [each for each in candidates if each.dtype == "float64"], prices, tolerance, most)
     search = Search(tolerance, known.grid.spans, prices, most, lambda: trials.work + SINGLE_WORK * narrow.work + adaptive.work)
-    found, missed = search.run(candidates)
+    found, missed = search.run(candidates, hints=hints)
 
     spent = _Spending(known.grid, adaptive, times)
     broken = [each for each in candidates if each.name in found and not spent.fits(each, found[each.name].k, budget)]
@@ -203,6 +207,26 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
                 raise
             return str(error)
     return None
+
+
+def _hints(
+    known: Motion, trials: Trials, candidates: Sequence[Candidate], prices: Mapping[str, float], tolerance: float, most: float
+) -> dict[str, set[int]]:
+    """What searches for larger errors find in short runs, by the candidate's name.
+
+    Where errors do not fall with the step, what is good enough by luck lies between what a search for a small error tries. Advice
+    for a larger error would name it, though it is good enough for both.
+    """
+    hints: dict[str, set[int]] = {}
+    allowed = LARGEST_HINTED
+    while allowed > tolerance:
+        adaptive = AdaptiveTrials(known, ERROR_SHARE * allowed, trials.long)
+        again = [Adaptive(each.method, adaptive) if isinstance(each, Adaptive) else each for each in candidates]
+        search = Search(allowed, known.grid.spans, prices, most, short=trials.long)
+        for name, each in search.run(again)[0].items():
+            hints.setdefault(name, set()).add(each.k)
+        allowed *= 0.1
+    return hints
 
 
 def _times(scene: Scene, candidates: Sequence[Candidate]) -> tuple[dict[str, float], float]:

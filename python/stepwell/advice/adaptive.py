@@ -59,11 +59,11 @@ class AdaptiveTrials:
         #: Number of runs, and their function evaluations in total.
         self.made, self.work = 0, 0.0
 
-    def look(self, method: Method, tolerance: float) -> Trial:
-        """The run, at some of the marks."""
+    def look(self, method: Method, tolerance: float, share: float = 1.0) -> Trial:
+        """The run, at some of the marks; if it is made for this, with this share of the most function evaluations."""
         key = (method.name, tolerance)
         if key not in self._trials:
-            trial = self._run(method, tolerance)
+            trial = self._run(method, tolerance, share)
             if trial.error <= self.allowed:
                 error, _ = self._errors(method, tolerance, self.marks[:: max(1, len(self.marks) // FIRST_SAMPLES)])
                 trial = trial._replace(error=max(trial.error, float(error.max())))
@@ -86,15 +86,15 @@ class AdaptiveTrials:
             self._confirmed[key] = trial
         return self._confirmed[key]
 
-    def _errors(self, method: Method, tolerance: float, at: Array) -> tuple[Array, Run]:
-        run = self._integrated(method, tolerance, at)
+    def _errors(self, method: Method, tolerance: float, at: Array, share: float = 1.0) -> tuple[Array, Run]:
+        run = self._integrated(method, tolerance, at, share)
         return self.scene.state_error(run), run
 
-    def _run(self, method: Method, tolerance: float) -> Trial:
+    def _run(self, method: Method, tolerance: float, share: float) -> Trial:
         """The run that is judged, with its error at the output times."""
         key = (method.name, tolerance)
         if key not in self._runs:
-            errors, run = self._errors(method, tolerance, self.asked)
+            errors, run = self._errors(method, tolerance, self.asked, share)
             assert run.paces is not None
             steps = int(run.paces.evaluations) // method.attempt_evaluations
             stopped = bool(run.status)
@@ -102,9 +102,9 @@ class AdaptiveTrials:
             self._runs[key] = Trial(self.grid.end / steps, steps, error, stopped, int(run.paces.rejected))
         return self._runs[key]
 
-    def _integrated(self, method: Method, tolerance: float, at: Array) -> Run:
+    def _integrated(self, method: Method, tolerance: float, at: Array, share: float) -> Run:
         self.made += 1
-        scene, most = self.scene, max(1, int(self.most / method.attempt_evaluations))
+        scene, most = self.scene, max(1, int(share * self.most / method.attempt_evaluations))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
             warnings.simplefilter("ignore", AccuracyWarning)

@@ -13,6 +13,7 @@ from typing import Protocol
 from ..method_records import Method
 from .adaptive import AdaptiveTrials
 from .motion import Grid
+from .predict import keeps_margin, longest_step
 from .trials import ASYMPTOTIC_ERROR, Trial, Trials, single_name
 
 #: The k that stands for a tolerance of 1; one more makes steps 1.5 % shorter there.
@@ -23,6 +24,10 @@ LEAST_TOLERANCE = 1e-16
 
 #: Steps below the normal numbers of float32 have fewer digits.
 LEAST_SINGLE_STEP = 2.0**-126
+
+#: The first run with a tolerance may make this share of the evaluations of a run: where stability bounds the steps, a loose
+#: tolerance costs as much as a tight one, and a search that began with such runs of every method would have nothing left.
+FIRST_RUN_SHARE = 1 / 16
 
 #: The error of a run with a tolerance is measured at many times, but not at every one: it may be at most this share of
 #: what is allowed.
@@ -60,6 +65,12 @@ class Candidate(Protocol):
     def confirm(self, k: int) -> Trial:
         """The same, measured more closely."""
 
+    def within_limit(self, k: int) -> int:
+        """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
+
+    def keeps_margin(self, k: int) -> bool:
+        """Whether runs with somewhat longer steps do not blow up."""
+
     def possible(self, k: int) -> bool:
         """Whether there is such a run."""
 
@@ -91,6 +102,14 @@ class Fixed:
     def confirm(self, k: int) -> Trial:
         """The same run, at every step."""
         return self.trials.confirm(self.method, self.grid.dt(k), self.grid.steps(k))
+
+    def within_limit(self, k: int) -> int:
+        """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
+        return max(k, math.ceil(self.grid.span / longest_step(self.trials, self.method)))
+
+    def keeps_margin(self, k: int) -> bool:
+        """Whether runs with somewhat longer steps do not blow up."""
+        return keeps_margin(self.trials, self.method, self.grid.dt(k))
 
     def possible(self, k: int) -> bool:
         """Whether a step still moves the time."""
@@ -167,12 +186,21 @@ class Adaptive:
 
     def look(self, k: int) -> Trial:
         """The run with that k."""
-        self.seen[k] = trial = self.trials.look(self.method, self.tolerance(k))
+        share = FIRST_RUN_SHARE if k == self.first else 1.0
+        self.seen[k] = trial = self.trials.look(self.method, self.tolerance(k), share)
         return trial
 
     def confirm(self, k: int) -> Trial:
         """The same, at many more times."""
         return self.trials.confirm(self.method, self.tolerance(k))
+
+    def within_limit(self, k: int) -> int:
+        """Steps that blow up are rejected."""
+        return k
+
+    def keeps_margin(self, k: int) -> bool:
+        """Steps that blow up are rejected."""
+        return True
 
     def possible(self, k: int) -> bool:
         """Whether the tolerance is above the rounding."""

@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..method_records import Method
 from ..scenes import Scene
-from ..stability import Mode, analyse, maps, stability_limit
+from ..stability import Mode, analyse, maps
+from ..stability.limit import limit_of
 from .trials import Trials
 
 #: Times at which a prediction is compared with the exact modes.
@@ -22,6 +23,10 @@ MAX_CONDITION = 1e8
 #: States of the true motion at which a system that is not linear is taken for one; not one with more numbers than this, for
 #: eigenvalues take long.
 LINEARIZED_STATES, MAX_NUMBERS = 400, 128
+
+#: A step that is so many times as long as an advised one must not blow up either: more than twice how far apart the steps are at
+#: which the observed limit is looked for.
+MARGIN = 1.05
 
 #: The observed limit is searched on a geometric grid of this many steps in a factor of two: 2.2 % apart.
 RUNGS_PER_OCTAVE = 32
@@ -98,15 +103,33 @@ def limit(trials: Trials, method: Method, fastest: float | None) -> Limit:
     """The limit of a method on a scene; ``fastest`` is what ``fastest_oscillation`` found of one that is not linear."""
     scene = trials.scene
     if scene.system.linear and scene.control is None:
-        found = stability_limit(scene.system, method)
+        found = limit_of(scene.system, method)
         mode: Mode | None = found.mode
         if mode is None:
-            return Limit(found.dt, "linear", None, None)
-        kind = mode.kind if found.decided else f"{mode.kind}; not decided between {found.dt:.6g} and {found.grows:.6g}"
-        return Limit(found.dt, "linear", kind, abs(mode.rate.imag))
+            return Limit(found.stable, "linear", None, None)
+        kind = mode.kind if found.decided else f"{mode.kind}; not decided between {found.stable:.6g} and {found.grows:.6g}"
+        return Limit(found.stable, "linear", kind, abs(mode.rate.imag))
     if not fastest:
         return Limit(None, "frozen", None, None)
     return Limit(method.limit / fastest, "frozen", "the fastest oscillation along the motion", fastest)
+
+
+def longest_step(trials: Trials, method: Method) -> float:
+    """The longest step that keeps a margin to the limit of a linear system; infinite where there is none.
+
+    What grows with every step, if slowly, has no limit to keep away from.
+    """
+    scene = trials.scene
+    if not scene.system.linear or scene.control is not None:
+        return math.inf
+    return limit_of(scene.system, method).stable / MARGIN or math.inf
+
+
+def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
+    """Whether runs with steps up to ``MARGIN`` times as long do not blow up either. Of a linear system the limit is known."""
+    horizon = trials.scene.horizon
+    steps = (math.floor(horizon / (dt * ratio)) for ratio in (MARGIN, math.sqrt(MARGIN)))
+    return trials.scene.system.linear or not any(trials.unstable(method, horizon / n, n) for n in steps if n)
 
 
 def fastest_oscillation(trials: Trials) -> float | None:
@@ -139,7 +162,7 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
     Args:
         trials: runs of the scene.
         method: the method.
-        stable: a number of steps over the horizon with which the method is stable.
+        stable: a number of steps over the horizon with which the method is stable, and with ``MARGIN`` times fewer.
     """
     horizon = trials.scene.horizon
 
@@ -147,7 +170,8 @@ def observed_limit(trials: Trials, method: Method, stable: int) -> float:
         n = round(float(2.0 ** (j / RUNGS_PER_OCTAVE)))
         return trials.unstable(method, horizon / n, n)
 
-    low, high = 2 * RUNGS_PER_OCTAVE, max(2 * RUNGS_PER_OCTAVE, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable)))
+    low = 2 * RUNGS_PER_OCTAVE
+    high = max(low, math.ceil(RUNGS_PER_OCTAVE * math.log2(stable / MARGIN)))
     # From the fine end, which is known, since what is coarse may be stable again by chance.
     last = high
     for j in range(high - RUNGS_PER_OCTAVE, low - 1, -RUNGS_PER_OCTAVE):

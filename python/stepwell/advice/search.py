@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ from .trials import ASYMPTOTIC_ERROR, Trial
 MAX_EVALUATIONS, SIZE_EXPONENT = 16_000_000, 1.5
 
 #: All runs of a search together make at most about so many times MAX_EVALUATIONS: each run may make this share of what is left.
-TOTAL_BUDGET, RUN_SHARE = 2.5, 0.5
+TOTAL_BUDGET, RUN_SHARE = 4.0, 0.5
 
 #: A candidate that costs more than this many times the cheapest is given up.
 MAX_COST_RATIO = 10.0
@@ -54,6 +54,10 @@ LATER_RUN_SHARE = 1 / 4
 
 #: The number of steps that the order predicts is wrong by up to this factor.
 PREDICTION_FACTOR = 3.0
+
+
+#: After a run with a tolerance that stopped early k is so many times as large.
+STOPPED_LEAP = 4
 
 
 class Found(NamedTuple):
@@ -100,17 +104,25 @@ class Search:
         prices: what a step costs, by the candidate's name.
         longest: the most function evaluations of a run.
         spent: returns how many all runs have made so far.
+        short: the most of a run where only short ones are worth it.
     """
 
     def __init__(
-        self, tolerance: float, spans: int, prices: Mapping[str, float], longest: float, spent: Callable[[], float] = lambda: 0.0
+        self,
+        tolerance: float,
+        spans: int,
+        prices: Mapping[str, float],
+        longest: float,
+        spent: Callable[[], float] = lambda: 0.0,
+        short: float = math.inf,
     ) -> None:
         self.tolerance, self.spans, self.prices, self.longest, self.spent = tolerance, spans, prices, longest, spent
+        self.short = short
 
     @property
     def most(self) -> float:
         """Rate evaluations that the next run may make."""
-        return min(self.longest, RUN_SHARE * max(0.0, TOTAL_BUDGET * self.longest - self.spent()))
+        return min(self.short, self.longest, RUN_SHARE * max(0.0, TOTAL_BUDGET * self.longest - self.spent()))
 
     def cost(self, candidate: Candidate, k: int) -> float:
         """Of a span, in a run that was made."""
@@ -134,13 +146,25 @@ class Search:
         return candidate.possible(k) and made.steps * candidate.evaluations * (k / known) <= self.most
 
     def run(
-        self, candidates: Sequence[Candidate], ceilings: Mapping[str, float] = MappingProxyType({})
+        self,
+        candidates: Sequence[Candidate],
+        ceilings: Mapping[str, float] = MappingProxyType({}),
+        hints: Mapping[str, Collection[int]] = MappingProxyType({}),
     ) -> tuple[dict[str, Found], dict[str, Missed]]:
-        """What was found, and what was given up, by the candidate's name; ``ceilings`` are the most steps in a span, if any."""
+        """What was found, and what was given up, by the candidate's name.
+
+        ``ceilings`` are the most steps in a span, if any, ``hints`` are k that may be good enough.
+        """
         octaves, missed = self.octaves(candidates, ceilings)
         by_name = {candidate.name: candidate for candidate in candidates}
         found: dict[str, Found] = {}
         best = math.inf
+        for name in missed.keys() & hints.keys():
+            hinted = self.least(by_name[name], None, hints[name])
+            if hinted is not None:
+                del missed[name]
+                found[name] = Found(hinted, by_name[name].confirm(hinted), hinted, None)
+                best = min(best, self.cost(by_name[name], hinted))
         for name in sorted(octaves, key=lambda name: self.cost(by_name[name], octaves[name])):
             candidate, k = by_name[name], octaves[name]
             cost = self.cost(candidate, k)
@@ -156,6 +180,7 @@ class Search:
             )
             if least is None and self.confirmed(candidate, k):
                 least = k  # what is finer would take too long to look for
+            least = self.least(candidate, least, hints.get(name, ()))
             if least is None:
                 missed[name] = Missed("inaccurate", k, candidate.look(k), None)
                 continue
@@ -168,6 +193,21 @@ class Search:
             else:
                 found[name] = found[name]._replace(robust=self.robust(candidate, k), expected=self.expected(candidate, k))
         return found, missed
+
+    def least(self, candidate: Candidate, k: int | None, hints: Collection[int]) -> int | None:
+        """The cheapest of a k that is good enough, if any, and of hints that are; or the next that keeps away from blowing up."""
+        good = [n for n in hints if self.confirmed(candidate, n)]
+        good += [k] if k is not None else []
+        least = min(good, key=lambda n: self.cost(candidate, n), default=None)
+        if least is None:
+            return None
+        begin = candidate.within_limit(least)
+        for n in sorted({begin, *rungs(begin, 2 * begin)}):
+            if not self.affordable(candidate, n, least):
+                return None
+            if self.confirmed(candidate, n) and candidate.keeps_margin(n):
+                return n
+        return None
 
     def octaves(self, candidates: Sequence[Candidate], ceilings: Mapping[str, float]) -> tuple[dict[str, int], dict[str, Missed]]:
         """For each candidate the first k in a ladder of doublings that is good enough; the cheapest run is always made next."""
@@ -188,15 +228,17 @@ class Search:
             least = max(2.0, (wanted or self.at_least(candidate, k, trial)) / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
             # What a run with a tolerance cost that stopped early says nothing of one that does not.
+            stopped = trial.unstable and candidate.by == "tolerance"
+            following = STOPPED_LEAP * k if stopped else 2 * k
             made, ceiling = trial.steps * candidate.evaluations, ceilings.get(candidate.name, math.inf)
             most = self.most if cost * least <= best else min(self.most, LATER_RUN_SHARE * self.longest)
-            if not candidate.possible(2 * k) or made * least > most or trial.steps / self.spans * least > ceiling:
+            if not candidate.possible(following) or made * least > most or trial.steps / self.spans * least > ceiling:
                 missed[candidate.name] = Missed(kind, k, trial, wanted)
-            elif cost * least > MAX_COST_RATIO * best and not (trial.unstable and candidate.by == "tolerance"):
+            elif cost * least > MAX_COST_RATIO * best and not stopped:
                 missed[candidate.name] = Missed("unstable" if trial.unstable else "dominated", k, trial, wanted, expensive=True)
             else:
                 # Of equally expensive ones that which came farther goes first.
-                heapq.heappush(waiting, (2.0 * cost / trial.made, i, 2 * k))
+                heapq.heappush(waiting, (2.0 * cost / trial.made, i, following))
         return found, missed
 
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:

@@ -20,6 +20,13 @@ from ..systems import System
 from .evaluate import Evaluation
 from .modes import directional, jacobian
 
+#: Operations whose values change in time; and those of which no value is the same in one region and another beyond it.
+CHANGING = ("time", "sample")
+SMOOTH = {"constant", "parameter", "state", "time", "step", "add", "subtract", "multiply", "divide", "negate", "square root"}
+
+#: At so many places derivatives are compared.
+PLACES = 3
+
 #: The most systems whose derivatives are kept: a search for a limit needs the same ones many times.
 MAX_KEPT = 8
 
@@ -77,6 +84,17 @@ class Traced:
         pairs = zip(self.state, changes, strict=True)
         return self.evaluation(self.roots + directional(self.tape, self.roots, pairs, self.marks))
 
+    def along(self, directions: int) -> list[Symbol]:
+        """The values, and their derivatives along several changes of the state: of a value in each direction, then of the next.
+
+        The numbers of the changes come behind the state's own in the same order. The sum that a control accumulates has the first
+        place behind the state, too, but no value depends on it.
+        """
+        first = self.length
+        changes = [[self.tape.state(first + i * directions + j) for i in range(self.length)] for j in range(directions)]
+        each = [directional(self.tape, self.roots, zip(self.state, change, strict=True), self.marks) for change in changes]
+        return self.roots + [derivative for of_one in zip(*each, strict=True) for derivative in of_one]
+
     @property
     def room(self) -> int:
         """The number of the state at which the changes begin."""
@@ -105,6 +123,42 @@ def _roots(tracer: Tracer, what: str, method: Method | None) -> list[Symbol]:
 def _wide(system: System, dv: Any, dy: Any) -> tuple[Any, Any]:
     """Rates over whole blocks."""
     return tuple(np.broadcast_to(each, shape) for each, shape in ((dv, system.v_shape), (dy, system.y_shape)))  # type: ignore[return-value]
+
+
+class Reading(NamedTuple):
+    """What rates and their derivatives are computed from.
+
+    Attributes:
+        time: whether the rates depend on time, by themselves or by samples.
+        linear: whether they are linear in the state, with coefficients that do not change in time.
+    """
+
+    time: bool
+    linear: bool
+
+
+def reading(system: System) -> Reading:
+    """What a system's rates and their derivatives are computed from, as their tape says.
+
+    Derivatives that are sums, products and roots of the state are the same everywhere if they are so at places drawn at random:
+    as where the parameter is zero by which a square of the state is multiplied.
+    """
+    traced = Traced(system, "rates")
+    if len(traced.tape) * traced.length <= MAX_WHOLE:
+        derivatives = [each for row in jacobian(traced.tape, traced.roots, traced.state, traced.marks) for each in row]
+    else:
+        changes = [traced.tape.state(traced.room + i) for i in range(traced.length)]
+        derivatives = directional(traced.tape, traced.roots, zip(traced.state, changes, strict=True), traced.marks)
+    of_rates, of_derivatives = (traced.tape.operations(roots)[0] for roots in (traced.roots, derivatives))
+    timed = any(name in CHANGING for name, _, _ in of_rates)
+    if not any(name in CHANGING or (name == "state" and number < traced.room) for name, _, number in of_derivatives):
+        return Reading(timed, True)
+    if not {name for name, _, _ in of_derivatives} <= SMOOTH:
+        return Reading(timed, False)
+    drawn, evaluation = np.random.default_rng(PLACES), traced.evaluation(derivatives)
+    changed = list(drawn.normal(size=traced.length))
+    values = [evaluation([*drawn.normal(size=traced.length), np.zeros(()), *changed], t=drawn.normal()) for _ in range(PLACES)]
+    return Reading(timed, all(np.array_equal(a, b) for other in values[1:] for a, b in zip(values[0], other, strict=True)))
 
 
 class _Kept(NamedTuple):

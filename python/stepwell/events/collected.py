@@ -46,6 +46,8 @@ class Collected:
         self.members = Members(plan)
         self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
         self.trials = trials(plan, self.members)
+        #: Times of a plan that goes backward are negated until they are told.
+        self.sign = -1.0 if plan.backward else 1.0
         self.stopped_at = np.full(plan.members, np.nan)
         #: Each quantity one state before those that are looked at next; NaN where that is not known.
         self.before = np.full((len(events), plan.members), np.nan)
@@ -72,7 +74,7 @@ class Collected:
             index, part = member[which], share * h[which]
             v, y = self.trials.step(index, t[which], part, steps.v[..., which], steps.y[..., which])
             there = t[which] + part
-            g = self.quantities[e](there, v, y, self.members.numbers(index))
+            g = self.quantity(e, there, v, y, self.members.numbers(index))
             return g, self._slope(e, index, there, h[which], v, y), v, y
 
         if not len(member):
@@ -90,8 +92,12 @@ class Collected:
             stuck = stuck[at[stuck] != 0.0]
         if direction := self.events[e].direction:
             parts = parts.some(parts.g_low * direction < 0.0)
-        ends = {"low": parts.low, "high": parts.high, "g": parts.g_low, "g_end": parts.g_high}
-        return steps.some(parts.of)._replace(**ends, v_end=parts.v, y_end=parts.y), stuck
+        of = steps.some(parts.of)._replace(low=parts.low, high=parts.high, g=parts.g_low, g_end=parts.g_high)
+        return of._replace(v_end=parts.v, y_end=parts.y), stuck
+
+    def quantity(self, e: int, t: Array, v: Array, y: Array, numbers: dict[str, Any]) -> Array:
+        """The quantity of one event at times of the plan."""
+        return self.quantities[e](self.sign * t, v, y, numbers)
 
     def may_change(self, e: int, index: Whole, g: Array) -> Any:
         """In which of some steps of these members an event may change its sign, from its values at all of their ends."""
@@ -102,7 +108,7 @@ class Collected:
     def _slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
         """By how much the quantity would change in a step that goes on as the states do."""
         rates = self.trials.rates(index, t, h, v, y)
-        return self.quantities[e].slope(t, v, y, self.members.numbers(index), h, *rates)
+        return self.quantities[e].slope(self.sign * t, v, y, self.members.numbers(index), self.sign * h, *rates)
 
     def take(self, index: Whole, steps: int, changes: list[Changes]) -> Stops | None:
         """Count and keep changes of sign, up to the first terminal event of each member; None if no member stops.
@@ -123,7 +129,7 @@ class Collected:
             if stops.any():
                 mine = each.some(each.row == last[each.place])
                 in_last.append((self.located(e, mine), mine.place))
-                each = each.some(each.row < last[each.place])  # noqa: PLW2901
+                each = each.some(each.row < last[each.place])
             if len(each.row):
                 kept = ordinals(each.member) + self.count[e, each.member] <= event.most
                 self.count[e, index] += np.bincount(each.place, minlength=len(index))
@@ -177,7 +183,7 @@ class Collected:
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
             index, h = member[which], share * length[which]
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
-            return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
+            return self.quantity(e, t[which] + h, v, y, self.members.numbers(index)), v, y
 
         ends = changes.low, changes.high, changes.g, changes.g_end
         share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
@@ -186,7 +192,7 @@ class Collected:
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""
         ends = any(event.terminal or event.then for event in self.events)
-        return self.stopped_at.reshape(self.plan.batch) if ends else None
+        return self.sign * self.stopped_at.reshape(self.plan.batch) if ends else None
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Those of each event, by name."""
@@ -194,9 +200,9 @@ class Collected:
         for e, (event, count) in enumerate(zip(self.events, self.count, strict=True)):
             self.locate_waiting(e)
             found = self.found[e]
-            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            order = np.lexsort((t, step, member))
+            member, step, share, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
+            order = np.lexsort((share, step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
-            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
+            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], self.sign * t[order], v, y)
         return made

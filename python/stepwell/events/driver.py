@@ -39,7 +39,7 @@ LEAST_BETWEEN_SAVES = 32
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
     """Raise if what may be kept of the events would not fit in memory."""
     numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    rows = sum(numbers * (1 if event.terminal else min(event.most, plan.steps)) for event in events)
+    rows = sum(numbers * min(event.most, int(event.terminal) or plan.steps) for event in events)
     _checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
 
 
@@ -264,7 +264,7 @@ class _Resetting(_Driver):
             # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
             rows = [each.row[self.resets.end(e, each.member)] for e, each in enumerate(changes)]
             row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
-            at_event = self.resets.at[:, index].any(axis=0) if row == 0 else np.zeros(len(index), dtype=bool)
+            at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
             for e, each in enumerate(changes):
                 ends = self.resets.end(e, each.member) & (each.row == row)
                 at_event[each.place[ends]] = True
@@ -276,7 +276,8 @@ class _Resetting(_Driver):
             self.take(
                 index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]
             )
-            slot, gone = out.slot, np.zeros(len(index), dtype=bool)
+            slot: Array = out.slot
+            gone: Any = np.zeros(len(index), dtype=bool)
             if row < steps:
                 slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
             self._save(done, now.steps, index, out.v, out.y)

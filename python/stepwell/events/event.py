@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _checks
 from .._value import Fixed, Value
 from ..errors import ArgumentError, DTypeError
+
+if TYPE_CHECKING:
+    from .._words import Direction
 
 #: Default of ``most``: so many occurrences of an event are kept for each member.
 MOST_KEPT = 1000
@@ -22,8 +25,8 @@ class Event(Fixed, Value):
     Args:
         function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
             in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
-        direction: 1 for changes from below zero to above, −1 for those from above to below, 0 for both. If None, as an attribute
-            ``direction`` of the function says, as SciPy reads it; 0 without one.
+        direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
+            If None, as an attribute ``direction`` of the function says, as SciPy reads it; 0 without one.
         terminal: whether a member stops at the first such change; a whole number stops it at so many. If None, as an attribute
             ``terminal`` of the function says; False without one.
         then: ``then(t, v, y)``, which returns the state (v, y) from which a member goes on at each such change; for a system
@@ -45,7 +48,7 @@ class Event(Fixed, Value):
         self,
         function: Callable[..., Any],
         *,
-        direction: int | None = None,
+        direction: int | Direction | None = None,
         terminal: bool | int | None = None,
         then: Callable[..., Any] | None = None,
         most: int = MOST_KEPT,
@@ -85,7 +88,7 @@ def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], 
     its_own = None if attribute is None else read(f"{function.__name__}.{name}", attribute)
     if argument is None:
         return otherwise if its_own is None else its_own
-    asked = _checks.count(name, argument, -1, 1) if name == "direction" else read(name, argument)
+    asked = _checks.direction(name, argument) if name == "direction" else read(name, argument)
     if its_own is not None and its_own != asked:
         raise ArgumentError(
             f"{name}: got {asked!r}, but the function {function.__name__} has an attribute {name} = {attribute!r}; leave one out"
@@ -95,6 +98,8 @@ def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], 
 
 def _sign(name: str, value: Any) -> int:
     """A direction as SciPy reads it: by its sign."""
+    if isinstance(value, str):
+        return _checks.direction(name, value)
     number = _checks.number(name, value)
     return (number > 0.0) - (number < 0.0)
 

@@ -45,6 +45,10 @@ class Frames(Collected):
                 f"events: no event stops a member of a world, got {stops[0]!r}; read world.events after a step, and write "
                 f"into world.v and world.y"
             )
+        if changing := [each for each in events if each.then is not None]:
+            raise UnsupportedError(
+                f"events: no event changes the state of a world by then=, got {changing[0]!r}; integrate(…, dt=…, steps=…) takes it"
+            )
         super().__init__(plan, events)
         self._blocks, self._steps, self._number = (v, y), steps, number
         self._told: dict[str, Occurrences] | None = None

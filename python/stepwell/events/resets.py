@@ -18,11 +18,11 @@ from .traced import NewState
 
 #: A member whose state was changed more often than so many times within one step is at rest.
 MOST_IN_A_STEP = 1000
-#: Times between changes of the state shrink geometrically if their ratios differ by no more than this; the limit is then where the
-#: geometric series of times and states ends, if that is within the step.
+#: Times between changes of the state shrink geometrically if their ratios differ by no more than this; the limit is then where
+#: the geometric series of times and states ends, if that is within the step.
 SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
-#: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved may
-#: be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
+#: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved
+#: may be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
 LEAST_LEFT = 2.0**-36
 
 
@@ -58,7 +58,7 @@ class Stretch(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What ends some stretches: the share of each, infinite if nothing does, whether the run ends there, and from where it goes on."""
+    """What ends some stretches: the share of each, infinite without that, whether the run ends there, and whence it goes on."""
 
     share: Array
     stops: Any
@@ -93,7 +93,8 @@ class Resets:
 
     def __init__(self, run: Collected) -> None:
         given = run.members.numbers(slice(None))
-        self._run = run
+        #: The direction of time.
+        self._run, self._way = run, 1.0 if run.plan.dt > 0.0 else -1.0
         self._new_states = {
             e: NewState(event, run.plan.system, given) for e, event in enumerate(run.events) if event.then is not None
         }
@@ -106,18 +107,26 @@ class Resets:
 
     def through(self, stretch: Stretch) -> Arrived:
         """Go through one step of some members, from whole steps of theirs."""
-        n, end, step = len(stretch.member), stretch.t + stretch.h, stretch.h
+        n, end, step, way = len(stretch.member), stretch.t + stretch.h, np.abs(stretch.h), self._way
         v, y, at = stretch.v_end.copy(), stretch.y_end.copy(), np.zeros_like(stretch.at)
         times, stops, rests, live = np.full(n, np.nan), np.zeros(n, dtype=bool), np.full(n, -1), np.arange(n)
         flight, ratio = np.full(n, np.nan), np.full(n, np.nan)
         for resets in range(MOST_IN_A_STEP + 1):
             ahead, returns = self._ahead(stretch, step[live])
             with np.errstate(all="ignore"):
-                last, flight = flight, np.where(((stretch.at != 0.0) & (ahead.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan)
+                last, flight = (
+                    flight,
+                    np.where(((stretch.at != 0.0) & (ahead.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan),
+                )
                 before, ratio = ratio, flight / last
                 rest_of_series = ratio / (1.0 - ratio)
                 limit = ahead.t + flight * rest_of_series
-                settled = (np.abs(ratio - before) <= SETTLED) & (ratio <= LARGEST_RATIO) & (limit < end[live]) & (returns < 0)
+                settled = (
+                    (np.abs(ratio - before) <= SETTLED)
+                    & (ratio <= LARGEST_RATIO)
+                    & (way * limit < way * end[live])
+                    & (returns < 0)
+                )
             if settled.any():
                 which = settled & (ahead.share < np.inf) & ~ahead.stops
                 returns = np.where(which, np.argmax(ahead.at != 0.0, axis=0), returns)
@@ -139,7 +148,7 @@ class Resets:
                 times[who], v[..., who], y[..., who] = t[which], state[0][..., which], state[1][..., which]
             rests[live[rest]], stops[live[stop]] = returns[rest], True
             at[:, live[rest]] = stretch.at[:, rest]
-            soon = stretch.h < LEAST_LEFT * step[live]
+            soon = np.abs(stretch.h) < LEAST_LEFT * step[live]
             at[:, live[arrives & soon]] = stretch.at[:, arrives & soon]
             if not goes_on.any():
                 break
@@ -150,7 +159,7 @@ class Resets:
     def _anew(self, member: Whole, step: Whole, end: Array, ahead: Ahead, which: Any) -> Stretch:
         """What is left of steps, from the new states on."""
         t, v, y = ahead.t[which], ahead.v[..., which], ahead.y[..., which]
-        h = np.maximum(end - t, 0.0)
+        h = self._way * np.maximum(self._way * (end - t), 0.0)
         return Stretch(member, step, t, h, v, y, *self._run.trials.step(member, t, h, v, y), ahead.at[:, which])
 
     def _ahead(self, stretch: Stretch, step: Array) -> tuple[Ahead, Whole]:
@@ -164,13 +173,13 @@ class Resets:
             g_end = quantity(stretch.t + stretch.h, stretch.v_end, stretch.y_end, numbers)
             head = zeros.astype(np.int64), rows, stretch.member, stretch.step, stretch.t, stretch.h
             whole = Changes(*head, zeros, ones, g, g_end, stretch.v, stretch.y, stretch.v_end, stretch.y_end)
-            looked = np.flatnonzero(~((stretch.at[e] != 0.0) & (stretch.h < LEAST_LEFT * step)))
+            looked = np.flatnonzero(~((stretch.at[e] != 0.0) & (np.abs(stretch.h) < LEAST_LEFT * step)))
             changes, stuck = run.within(e, whole.some(looked), stretch.at[e, looked])
             if e in self._new_states:
                 returns[looked[stuck]] = e
             occurs = run.located(e, changes)
             if e in self._new_states:  # in no time
-                again = (stretch.at[e, changes.place] != 0.0) & (occurs.t <= stretch.t[changes.place])
+                again = (stretch.at[e, changes.place] != 0.0) & (self._way * (occurs.t - stretch.t[changes.place]) <= 0.0)
                 returns[changes.place[again]] = e
             found.append((occurs, changes.place, np.sign(changes.g)))
             ends = self.end(e, occurs.member)

@@ -22,8 +22,8 @@ from ..reference.replayed import Operations
 from ..systems import System
 from .event import Event
 
-#: The share of a step whose change stands for the slope of a quantity that has no derivative: its roundings, over this, are half of
-#: the digits.
+#: The share of a step whose change stands for the slope of a quantity that has no derivative: its roundings, over this, are half
+#: of the digits.
 SHORT = 2.0**-26
 
 
@@ -34,7 +34,8 @@ def parameters_of(function: Any, name: str, system: System, given: dict[str, Any
     head, rest = own[: len(state)], own[len(state) :]
     expected = f"({', '.join(state)}, *, …)"
     if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, own))})")
+        why = f", since {system.kind_name} has velocities" if len(state) == 3 and len(head) == 2 else ""
+        raise ArgumentError(f"{name}: expected a function {expected}{why}, got ({', '.join(map(str, own))})")
     taken = []
     for each in rest:
         if each.name in given and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):

@@ -12,6 +12,7 @@ from ..reference import contact, series_pace, tableau
 from ..reference.adaptive import Attempted
 from ..reference.replayed import Operations
 from ..reference.series import coefficients
+from ..reference.signal import of_slot, over
 from ..reference.traced import Tracer
 from ..systems.own import OwnSystem
 from .members import Members
@@ -157,19 +158,19 @@ class AdaptiveTrials(Trials):
         self._is_traced = self._is_traced and not self._always_traced
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
-        return Attempted(plan.system.alone(1.0, plan.batch), plan.system.control).rates(h)
+        return Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control).rates(h)
 
     def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
-        return tracer.attempted().rates(h)
+        return tracer.attempted(backward=self._plan.backward).rates(h)
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        system = Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+        system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
         with np.errstate(all="ignore"):
             v, y = within(plan, system, t, h, v, y)
         return np.asarray(v), np.asarray(y)
 
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-        return within(plan, tracer.attempted(), t, h, v, y)
+        return within(plan, tracer.attempted(backward=plan.backward), t, h, v, y)
 
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -183,9 +184,13 @@ def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple
 def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
     """A step of a method from v and y: what it carries in place of v is made anew for this length."""
     steps, carries = plan.method.steps, plan.method.carry is not None
-    slot = steps.start(s, plan.choice, t, v, y) if carries else v
+    if not carries:
+        return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
+    with over(of_slot(t, h)):
+        slot = steps.start(s, plan.choice, t, v, y)
     slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
-    return (steps.finish(s, plan.choice, t + h, slot, y) if carries else slot), y
+    with over(of_slot(t + h, h)):
+        return steps.finish(s, plan.choice, t + h, slot, y), y
 
 
 def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:

@@ -50,7 +50,7 @@ class Event:
 
     def value(self, t: float, y: Array) -> float:
         """The value of the function."""
-        made = np.asarray(self._function(t, y, *self._args))
+        made = _checks.as_array("events", self._function(t, y, *self._args))
         if made.size != 1 or made.dtype.kind not in "biuf":
             raise DTypeError(f"events: expected a function that returns one real number, got {_checks.short(made)}")
         return float(made.reshape(-1)[0])

@@ -16,8 +16,8 @@ SPACING = 2.0**-52
 SHARE, MOST_TRIALS = 2.0**-48, 49
 #: Brackets shorter than this share of a step are not cut any further.
 LEAST_SHARE = 2.0**-1000
-#: By what multiple of its squared width, over the width at first, a trial is moved towards the middle of the bracket, so that both
-#: ends come nearer.
+#: By what multiple of its squared width, over the width at first, a trial is moved towards the middle of the bracket, so that
+#: both ends come nearer.
 TRUNCATION = 0.02
 
 #: A step in which g keeps its sign is looked into where g at one of its ends is no more than so many times the bend there: by how

@@ -290,11 +290,18 @@ def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any
     book = next((each.book for each in given if isinstance(each, Series)), None)
     if book is None:
         return of_numbers(*given)
-    key = name, *(id(each) if isinstance(each, Series) else each for each in given)
+    key = name, *map(_identity, given)
     if key not in book.functions:
         start = np.asarray(of_numbers(*map(_start, given)))[()]
         book.functions[key] = of_function(Mark(name, tuple(given), plain), start, book)
     return book.functions[key]
+
+
+def _identity(x: Any) -> Any:
+    """What tells an argument of a function from others: symbols cannot be hashed, and 0 and −0 are equal but not the same."""
+    if hasattr(x, "xor_bits"):
+        return "symbol", x.id
+    return repr(x) if isinstance(x, (int, float, complex, np.number)) else id(x)
 
 
 def has_rule(mark: Mark) -> bool:

@@ -1,8 +1,8 @@
 """Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 
 The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the
-length of a block of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
-step is the least of these for j = p − 1 and p and both blocks, times exp(−0.7/(p − 1)).
+size of a group of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
+step is the least of these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)).
 """
 
 from __future__ import annotations
@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from .adaptive import Attempted, Pace, length2, longer
-from .bits import add_bits, at_most, held, less, shift_up, where
+from .acceptance import Acceptance
+from .adaptive import ONSET, Attempted, Pace, largest, longer, over, sizes, stacked, total
+from .bits import add_bits, held, less, shift_up, where
 from .log import split
 from .series import coefficients
 from .types import Array
 
 #: The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 MAX_GROWTH = 1024.0
-#: The squared length of the last terms over the tolerated one, between bounds whose logarithms exist.
+#: The size of the last terms over the tolerated one, between bounds whose logarithms exist.
 BOUNDS = (1e-280, 1e280)
 #: The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
 MARGIN = 0.7 * 1.4426950408889634
@@ -49,17 +50,25 @@ def order_of(tolerance: float) -> int:
 
 
 def attempt(
-    order: int, system: Attempted, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
+    order: int,
+    system: Attempted,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    pace: Pace,
+    budget: Any,
+    v: Array,
+    y: Array,
 ) -> tuple[Pace, Array, Array]:
     """One step, or one extra step, which leaves the pace as it is."""
-    outlook = pace.outlook(budget)
+    outlook, groups = pace.outlook(budget), acceptance.groups
     terms = coefficients(system.s, order, pace.t, 1.0, v, y)
-    far = reach(order, pace, block_axes, v, y, terms)
-    step = where(outlook.is_extra, pace.extra, far)
+    far, bound = reach(order, pace, block_axes, acceptance, v, y, terms), pace.wall - pace.t
+    ends = less(bound, far)
+    step = where(outlook.is_extra, pace.extra, where(ends, bound, far))
     v1, y1 = (value(start, [term[i] for term in terms], step) for i, start in enumerate((v, y)))
-    new = [length2(block, axes) for block, axes in zip((v1, y1), block_axes, strict=True)]
+    new = sizes(v1, y1, block_axes, groups)
     v1, y1, work = system.project(v1, y1)
-    following, goes_on = decided(pace, far, new, outlook.is_extra, outlook.runs)
+    following, goes_on = decided(pace, where(ends, bound, far), ends, new, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
@@ -83,36 +92,39 @@ def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
     return end
 
 
-def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]) -> Any:
+def reach(
+    order: int,
+    pace: Pace,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    v: Array,
+    y: Array,
+    terms: Sequence[tuple[Array, Array]],
+) -> Any:
     """How far the series is as good as is tolerated.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
     """
-
-    def lengths(blocks: Sequence[Array]) -> list[Any]:
-        return [length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)]
-
-    present, first = lengths((v, y)), lengths(terms[0])
-    # Squares of what is tolerated: of the absolute part and of the relative one, added.
-    tolerated = []
-    # A block at zero counts as long as its rate would have made it in the last step.
-    for longest, now, rate in zip((pace.longest_v, pace.longest_y), present, first, strict=True):
-        counts = where(less(0.0, pace.lasts), longest, now)
-        square = longer(counts, rate * (pace.before * pace.before))
-        tolerated.append(pace.absolute * pace.absolute + (pace.relative * pace.relative) * square)
-    per = [1.0 / square for square in tolerated]
+    groups, counts = acceptance.groups, acceptance.counts(np.size(v), np.size(y))
+    present, first = sizes(v, y, block_axes, groups), sizes(*terms[0], block_axes, groups)
+    relative, absolute = pace.tolerances()
+    # A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    standing = []
+    for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
+        longest, now = pace.longest[block], present[block]
+        onset = ONSET * longer(largest(longest), largest(now)) if len(now) > 1 else 0.0
+        standing += [where(less(0.0, size), size, onset) if len(now) > 1 else size for size in longest]
+    counts_as = where(less(0.0, pace.lasts), stacked(standing), present)
+    bound = absolute + relative * longer(counts_as, first * pace.before)
 
     def logarithm(k: int) -> Any:
-        of_v, of_y = (
-            where(at_most(square, 0.0), 0.0, square * weight) for square, weight in zip(lengths(terms[k - 1]), per, strict=True)
-        )
-        return rough_log2(held(longer(of_v, of_y), *BOUNDS)) * (-0.5 / k)
+        return rough_log2(held(over(sizes(*terms[k - 1], block_axes, groups), bound), *BOUNDS)) * (-1.0 / k)
 
     one, other = logarithm(order - 1), logarithm(order)
     far = rough_exp2(where(less(one, other), one, other) - MARGIN / (order - 1))
     most = MAX_GROWTH * pace.before
-    return where(less(most, far), most, far)
+    return pace.shortened(where(less(most, far), most, far), pace.t)
 
 
 def rough_exp2(x: Any) -> Any:
@@ -134,20 +146,19 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
     return (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
 
 
-def decided(pace: Pace, far: Any, new: Sequence[Any], is_extra: Any, runs: Any) -> tuple[Pace, Any]:
-    """The pace after a step, and whether the state advances; ``new`` are squares of the new lengths."""
-    good = less(new[0] + new[1], np.inf)  # NaN is not
-    reached = pace.t + far
+def decided(pace: Pace, step: Any, ends: Any, new: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
+    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have."""
+    good = less(total(new), np.inf)  # NaN is not
+    reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good
     following = pace._replace(
         t=where(takes, reached, pace.t),
-        h=where(takes | holds, far, where(fails, 0.0, pace.h)),
+        h=where(takes | holds, step, where(fails, 0.0, pace.h)),
         extra=where(is_extra, 0.0, pace.extra),
         held=where(holds, 1.0, pace.held),
-        before=where(takes, far, pace.before),
-        longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
-        longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
+        longest=where(takes & less(pace.longest, new), new, pace.longest),
+        before=where(takes & ~ends, step, pace.before),
         accepted=pace.accepted + where(takes, 1.0, 0.0),
         rejected=pace.rejected + where(fails, 1.0, 0.0),
         extra_steps=pace.extra_steps + where(holds | is_extra, 1.0, 0.0),

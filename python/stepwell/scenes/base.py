@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Value, frozen
 from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
@@ -26,8 +26,10 @@ from ..systems.base import a_system
 if TYPE_CHECKING:
     from ..explorer import Explorer
 
-#: How many times of the horizon give the exact solution's scale.
-SCALE_SAMPLES = 1001
+#: So many times of the horizon give the exact solution's scale. Where a block differs by more than STEEP of its largest length
+#: from one to the next, a peak may hide between: so many more are taken there, and again between those, down to SHORTEST of the
+#: horizon and up to MAX_SAMPLES in all.
+SCALE_SAMPLES, STEEP, MORE_SAMPLES, SHORTEST, MAX_SAMPLES = 1001, 0.25, 15, 1e-12, 40_000
 
 #: n steps of horizon/n end at the horizon but for two roundings, each of 2⁻⁵³ of the time.
 TIME_ROUNDING = 2.0**-51
@@ -98,7 +100,7 @@ class Scene(Value):
             block = _checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
-            found[name] = block
+            found[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
@@ -123,7 +125,8 @@ class Scene(Value):
             dt: the step, in units of time; the scene's if None.
             steps: number of steps; if None, the least number that reaches the horizon.
             **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``. ``control`` is the
-                scene's own if it is not given; ``control=None`` leaves it out.
+                scene's own if it is not given; ``control=None`` leaves it out. With ``tolerance`` steps are adaptive, to ``at``,
+                or to the horizon; ``dt`` is then the first step to try.
 
         Returns:
             A ``Run`` with blocks of shape (saved, *block).
@@ -139,6 +142,9 @@ class Scene(Value):
             raise ArgumentError(
                 f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
+        if "tolerance" in options or "at" in options:
+            options = {"at": [self.horizon], **options}
+            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
@@ -243,7 +249,24 @@ class Scene(Value):
 
     @cached_property
     def _sampled(self) -> tuple[Array, Array]:
-        return self._solution(np.linspace(0.0, self.horizon, SCALE_SAMPLES))[0]
+        """The exact blocks at evenly spaced times, and at more where they change much from one to the next."""
+        t = np.linspace(0.0, self.horizon, SCALE_SAMPLES)
+        states = self._solution(t)[0]
+        between = np.arange(1, MORE_SAMPLES + 1) / (MORE_SAMPLES + 1)
+        while True:
+            steep = np.zeros(len(t) - 1, dtype=bool)
+            for block, shape in zip(states, self._shapes, strict=True):
+                steep |= _length(np.diff(block, axis=0), shape) > STEEP * _length(block, shape).max(initial=0.0)
+            steep &= np.diff(t) > SHORTEST * self.horizon
+            more = (t[:-1][steep, np.newaxis] + np.diff(t)[steep, np.newaxis] * between).ravel()
+            if not len(more) or len(t) + len(more) > MAX_SAMPLES:
+                return states
+            t = np.concatenate([t, more])
+            order = np.argsort(t)
+            t = t[order]
+            further = self._solution(more)[0]
+            v, y = (np.concatenate(both)[order] for both in zip(states, further, strict=True))
+            states = v, y
 
     @cached_property
     def _kinetic_scale(self) -> float:

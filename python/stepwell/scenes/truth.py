@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from bisect import bisect_right
 from dataclasses import replace
@@ -10,17 +11,25 @@ from typing import Any
 import numpy as np
 
 from .._checks import Array
-from ..errors import AccuracyWarning, ToleranceWarning
+from ..errors import AccuracyWarning, ArgumentError, ToleranceWarning
 from ..integration import integrate
+from ..reference.adaptive import Pace
 from ..result import Run
 from .base import Scene
 
-#: The method of the reference solution, its tolerance, and the tolerance of the run that checks it.
-METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE = "dop853", 1e-14, 1e-13
+#: The method of the reference solution, its tolerance, and how many times that the run which checks it has. Where the reference
+#: stops early, larger tolerances are tried: from rest no step is short enough for a tight one to meet the onset of a force.
+METHOD, TIGHT_TOLERANCES, CHECK_RATIO = "dop853", (1e-14, 1e-12, 1e-10), 10.0
 
 #: The two agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least error
 #: that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the run that checks it.
 MAX_DIFFERENCE = 1e-8
+
+#: Steps are held short, so that what acts for a moment is not stepped over: to a power of two of at most this share of the
+#: horizon, so that a horizon that is a little longer leaves the run as it is, and of the check to this part of it. A step looks
+#: at a dozen times within it, so both runs see what lasts for two steps of the reference. The two lengths are in no simple ratio,
+#: so the runs do not look at the same times: what only one of them sees is where they disagree, which ends what is known.
+LONGEST_STEP, PART_OF_CHECK = 1e-3, 1.0 / 1.618
 
 #: Times at which they are compared, and from how many of them the reference can be continued.
 SAMPLES, RESTARTS = 400, 20
@@ -29,13 +38,24 @@ SAMPLES, RESTARTS = 400, 20
 MAX_STEPS = 2_000_000
 
 
-class Tight:
-    """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls."""
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE) -> None:
-        self.scene, self.tolerance = replace(scene, control=None), tolerance
+
+class Tight:
+    """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls.
+
+    Args:
+        scene: what moves; its control is left out.
+        tolerance: of the run.
+        part: its longest step, as a part of that of the reference.
+    """
+
+    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCES[0], part: float = 1.0) -> None:
+        self.scene, self.tolerance, self.part = replace(scene, control=None), tolerance, part
+        start = self._run(np.zeros(1), {"v": scene.v, "y": scene.y, "tolerance": tolerance}).resume
+        start["carry"] = _held_short(start["carry"], part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon)))
         #: Arguments to continue the run, each with the time from which it continues.
-        self._on: list[tuple[float, dict[str, Any]]] = [(0.0, {"v": scene.v, "y": scene.y, "tolerance": tolerance})]
+        self._on: list[tuple[float, dict[str, Any]]] = [(0.0, start)]
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Both blocks at these times."""
@@ -64,13 +84,27 @@ class Tight:
             return integrate(self.scene.system, METHOD, at=at, max_steps=MAX_STEPS, **on)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Tight, (self.scene, self.tolerance)
+        return Tight, self._arguments
+
+    @property
+    def _arguments(self) -> tuple[Scene, float, float]:
+        return self.scene, self.tolerance, self.part
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Tight) and (self.scene, self.tolerance) == (other.scene, other.tolerance)
+        return isinstance(other, Tight) and self._arguments == other._arguments
 
     def __hash__(self) -> int:
-        return hash((self.scene, self.tolerance))
+        return hash(self._arguments)
+
+
+def _held_short(pace: Array, longest: float) -> Array:
+    """Where a run with a tolerance stands, its steps no longer than ``longest`` from there on."""
+    pace = pace.copy()
+    for name, bound in (("h", longest), ("interval", longest)):
+        place = Pace._fields.index(name)
+        pace[place] = np.minimum(pace[place], bound)
+    pace[Pace._fields.index("until")] = np.inf
+    return pace
 
 
 def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
@@ -84,16 +118,40 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
     Returns:
         A scene whose ``exact`` and ``until`` are set. A scene that has an exact solution is returned as it is. The true motion is
         that without a control.
+
+    Raises:
+        ArgumentError: if it has no exact solution, and adaptive steps do not go with its system.
     """
     if scene.exact is not None:
         return scene
+    if scene.system.contacts or scene.system.rubbing is not None:
+        what = "surfaces" if scene.system.contacts else "friction that sticks"
+        raise ArgumentError(
+            f"exact: needed by {scene.name}, whose system has {what}, got None: the reference solution of other scenes is a run "
+            f"with adaptive steps, which do not go with {what}; give the solution as a function of times"
+        )
     times = np.linspace(0.0, scene.horizon, SAMPLES + 1)
-    tight = Tight(scene)
-    known = np.ones(len(times), dtype=bool)
-    for a, b in zip(tight.followed(times), Tight(scene, CHECK_TOLERANCE).followed(times), strict=True):
+    exact, until = None, -1.0
+    for tolerance in TIGHT_TOLERANCES:
+        tight = Tight(scene, tolerance)
+        states = tight.followed(times)
+        known = _agreeing(states, Tight(scene, CHECK_RATIO * tolerance, PART_OF_CHECK).followed(times), agrees)
+        first = len(times) if known.all() else int(np.argmin(known))
+        if (last := float(times[max(first - 1, 0)])) > until:
+            exact, until = tight, last
+        if np.isfinite(states[1][-1]).all():
+            break
+    return replace(scene, exact=exact, until=until)
+
+
+def _agreeing(run: tuple[Array, Array], check: tuple[Array, Array], agrees: float) -> Mask:
+    """At which times the states of two runs differ by no more than this share of the blocks' largest lengths up to then."""
+    known = np.ones(len(run[1]), dtype=bool)
+    for a, b in zip(run, check, strict=True):
         axes = tuple(range(1, a.ndim))
         with np.errstate(all="ignore"):
             apart, length = (np.sqrt((x * x).sum(axis=axes)) for x in (a - b, a))
-            known &= apart <= agrees * np.maximum.accumulate(length)
-    first = len(times) if known.all() else int(np.argmin(known))
-    return replace(scene, exact=tight, until=float(times[max(first - 1, 0)]))
+            # Up to the next time, for what sets in at one of them has no length there but roundings of that time.
+            longest = np.fmax.accumulate(np.append(length, length[-1]))[1:]
+            known &= apart <= agrees * longest
+    return known

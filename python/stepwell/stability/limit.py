@@ -11,24 +11,36 @@ computed in more digits (``exact``), on a ladder of wider rungs.
 
 from __future__ import annotations
 
+import warnings
+from functools import partial
+from math import prod
 from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, engine
+from .._brief import share
 from .._checks import Array, Shape
+from .._value import changed, complete
 from ..compatible import fits_together
-from ..errors import UnsupportedError
+from ..derivatives import traced
+from ..errors import AccuracyWarning, UnsupportedError
+from ..events.members import Members
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..systems import LinearSystem, Springs, System
 from ..systems.base import a_system
-from . import maps
+from ..systems.own import OwnSystem
+from . import exact, maps
 from .analysis import given_state, state
+from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
-from .limit_search import Search
+from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
 from .parts import parts
 from .small_motions import lifted, linearised
+
+#: A state is at rest if its rates are below so many roundings of the products that they are sums of.
+RESTS = 32.0 * EPS
 
 __all__ = ["Mode", "StabilityLimit", "StabilityLimits", "stability_limit"]
 
@@ -46,9 +58,10 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
     others the accuracy depends on the condition of the mode that becomes unstable, some 1e-9 of the step at worst. Multiple or
     nearly multiple eigenvalues are computed in as many digits as needed. The result holds for the matrix as given: where n
     eigenvalues meet, a change of its last digits moves them by the n-th root of that. With more than 32 states that cannot be
-    decomposed, the limit may stay undecided; see ``decided``. Damping of less than a millionth of critical damping counts as
-    none. Where a method grows in a window of steps and is stable beyond it, the window is found for two states, however narrow;
-    for others, a window narrower than 2 % of the step may be missed, or 17 % where many digits are needed.
+    decomposed, or about a state that moves by equations which are not linear, the limit may stay undecided; see ``decided``.
+    Damping of less than a millionth of critical damping counts as none. Where a method grows in a window of steps and is stable
+    beyond it, the window is found for two states, however narrow; for others, a window narrower than 2 % of the step may be
+    missed, or 17 % where many digits are needed.
 
     Args:
         system: a linear system; parameters may be arrays. Its inputs do not matter: their contribution to the samples is bounded.
@@ -60,12 +73,15 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         y: in place of ``at``, its coordinates.
 
     Returns:
-        A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). Its
-        ``decided`` is False where rounding hides the limit between it and ``grows``, in units of time.
+        A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). It is NaN, and
+        its ``decided`` False, where rounding hides the limit between ``stable`` and ``grows``, in units of time.
 
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system, or the system is not linear and no state is given.
+
+    Warns:
+        AccuracyWarning: if a limit is not decided.
 
     Example:
         >>> sw.stability_limit(sw.LinearSystem([[-1, 0, 0], [1, -1, 0], [0, 1, -1]]), "rk4")
@@ -80,31 +96,137 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         bound = ", or ask its safe_step for a bound" if isinstance(system, Springs) else ""
         raise UnsupportedError(f"at: {system!r} is not linear; give at=(v, y) for the limit of small disturbances there{bound}")
     v, y = (None, None) if at is None else state("at", system, at)
-    if isinstance(system, Springs) and system.control is None and v is not None and y is not None:
-        return _of_springs(system, how, v, y)
-    search = Search(system, how, v, y, t) if not system.linear else Search(system, how, None, None, 0.0)
-    if system.linear and len(search.rates) > 2:
-        limits, grows, modes = _by_parts(search)
-    else:
-        limits, grows = search.limits()
-        modes = search.modes(grows)[0]
-    if v is not None and y is not None:
-        members = maps.together(system, np.asarray(1.0), v, y)
-        limits, grows, modes = (np.array(np.broadcast_to(a, members)) for a in (limits, grows, modes))
+    found = limit_of(system, how, v, y, t)
+    if not np.all(found.decided):
+        _warn(system, how, found)
+    return found
+
+
+def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
+    """``stability_limit`` of arguments that were checked, without a warning where it is not decided."""
+    members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
+    if v is not None and y is not None and not system.linear:
+        if isinstance(system, Springs) and system.control is None:
+            return _of_springs(system, method, v, y)
+        if (motions := _linear_part(system, v, y, t)) is not None:
+            return _reshaped(system, limit_of(motions, method))
+    limits, grows, modes = _of_all(system, method, v, y, t, members)
+    spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
+    limits, grows, modes = spread
     if not limits.shape:
         return StabilityLimit(float(limits), modes[()], float(grows))
     return limits_of(limits, modes, grows)
 
 
+#: Numbers that the limit of a member takes beside the shape of its mode.
+NUMBERS_OF_A_LIMIT = 250
+
+
+def _of_all(
+    system: System, method: Method, v: Array | None, y: Array | None, t: float, members: Shape
+) -> tuple[Array, Array, Any]:
+    """The limits of all members, the smallest steps known to grow, and the modes; so many members at once as memory allows."""
+    if system.linear or v is None or y is None:
+        system, v, y, t, members = system.without_inputs(), None, None, 0.0, system.batch
+    n, count = sum(maps.size(system)), prod(members)
+    at_once = members_at_once(n)
+    beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(count, at_once)
+    _checks.fits("the limits", NUMBERS_OF_A_LIMIT + 4 * n, members, "ask for fewer, or of fewer states", beside=beside)
+    if count <= at_once:
+        return _of_some(Search(system, method, v, y, t))
+    every = Members(engine.Plan(system, method, members, 1.0))
+    limits, grows, modes = np.empty(count), np.empty(count), np.empty(count, dtype=object)
+    blocks = None
+    if v is not None and y is not None:
+        both = ((v, system.v_shape), (y, system.y_shape))
+        blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
+    for k in range(0, count, at_once):
+        some = np.arange(k, min(k + at_once, count))
+        own = every.plan(some).system
+        if blocks is None:
+            complete(own, without_inputs=partial(changed, own))  # it has none
+        else:
+            v, y = (block[..., some] for block in blocks)
+        limits[some], grows[some], modes[some] = _of_some(Search(own, method, v, y, t))
+    return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
+
+
+def _of_some(search: Search) -> tuple[Array, Array, Any]:
+    """The same of the members of a search."""
+    if search.v is None and len(search.rates) > 2:
+        return _by_parts(search)
+    limits, grows = search.limits()
+    return limits, grows, search.modes(grows)[0]
+
+
+def _linear_part(system: System, v: Array, y: Array, t: float) -> LinearSystem | None:
+    """A linear system whose steps are those of small disturbances of a state of own equations, or None.
+
+    There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
+    drives them, and where nothing moves. Its eigenvalues are those of a step of a matrix, which are found however they meet.
+    """
+    if not isinstance(system, OwnSystem) or system.control is not None or system.rubbing is not None or system.contacts:
+        return None
+    of = traced.reading(system)
+    if not of.linear and of.time:
+        return None
+    matrix, rates = traced.matrix(system, "rates", None, maps.together(system, np.asarray(1.0), v, y), v, y, t)
+    if not of.linear:
+        members = rates.shape[1:]
+        numbers = np.zeros((0, *members))
+        for block, shape in ((v, system.v_shape), (y, system.y_shape)):
+            own = block.shape[len(shape) :]
+            aligned = block.reshape(prod(shape), *(1,) * (len(members) - len(own)), *own)
+            numbers = np.concatenate([numbers, np.broadcast_to(aligned, (prod(shape), *members))])
+        rounding = RESTS * np.einsum("ij...,j...->i...", np.abs(matrix), np.abs(numbers))
+        if not (np.abs(rates) <= rounding).all():
+            return None
+    return LinearSystem(matrix, velocities=maps.size(system)[0])
+
+
+def _reshaped(system: System, found: Any) -> Any:
+    """The limit of a linear system as that of one whose blocks have these shapes."""
+    if isinstance(found, StabilityLimit):
+        return StabilityLimit(found.stable, _shaped(system, found.mode), found.grows)
+    modes = np.empty(found.shape, dtype=object)
+    for index in np.ndindex(found.shape):
+        modes[index] = _shaped(system, found.modes[index])
+    return limits_of(found.stable, modes, found.grows)
+
+
+def _shaped(system: System, mode: Mode | None) -> Mode | None:
+    """A mode whose blocks have the shapes of the system's."""
+    return None if mode is None else mode._replace(v=mode.v.reshape(system.v_shape), y=mode.y.reshape(system.y_shape))
+
+
+def _warn(system: System, method: Method, found: Any) -> None:
+    """Warn of limits that are not decided, which are NaN."""
+    doubtful = np.atleast_1d(~np.asarray(found.decided))
+    stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (found.stable, found.grows))
+    one = isinstance(found, StabilityLimit)
+    which = "" if one else f" of {share(int(doubtful.sum()), found.shape, found.size)}"
+    hint = (
+        f"systems of more than {exact.MAX_ROWS} states that cannot be decomposed are not computed in more digits"
+        if system.linear
+        else "if it is linear, or at rest there, give it as LinearSystem(sw.jacobian(…).matrix, velocities=…)"
+    )
+    warnings.warn(
+        f"the limit{which} of {system!r} by {method.name} is NaN: it is between dt = {stable:.6g} and {grows:.6g}, where "
+        f"rounding hides what grows, for eigenvalues nearly meet; {hint}",
+        AccuracyWarning,
+        stacklevel=3,
+    )
+
+
 def _of_springs(springs: Springs, method: Method, v: Array, y: Array) -> Any:
     """The limit of small motions about a state."""
-    found = stability_limit(linearised(springs, v, y), method)
+    found = limit_of(linearised(springs, v, y), method)
     if isinstance(found, StabilityLimit):
-        return StabilityLimit(float(found), lifted(springs, found.mode), found.grows)
+        return StabilityLimit(found.stable, lifted(springs, found.mode), found.grows)
     modes = np.empty(found.shape, dtype=object)
     for index in np.ndindex(found.shape):
         modes[index] = lifted(springs, found.modes[index])
-    return limits_of(np.asarray(found), modes, found.grows)
+    return limits_of(found.stable, modes, found.grows)
 
 
 def _by_parts(search: Search) -> tuple[Array, Array, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,35 +37,38 @@ class Mode(NamedTuple):
 class StabilityLimit(float):
     """A stability limit: the largest stable step, in units of time, 0 for never and infinity for always.
 
-    It is a number. Where rounding hides what happens between two steps, it is the smaller of them: below it nothing grows.
+    It is a number; NaN where rounding hides what happens between the two steps ``stable`` and ``grows``.
 
     Attributes:
         mode: what begins to grow there; None if nothing does.
-        grows: the smallest step that is known to grow: the limit itself if it is ``decided``.
+        stable: the largest step that is known to be stable: the limit itself if it is ``decided``.
+        grows: the smallest step that is known to grow, likewise.
     """
 
     mode: Mode | None
+    stable: float
     grows: float
 
-    def __new__(cls, dt: float, mode: Mode | None, grows: float | None = None) -> StabilityLimit:
+    def __new__(cls, stable: float, mode: Mode | None, grows: float | None = None) -> StabilityLimit:
         """The number, with the mode."""
-        limit = super().__new__(cls, dt)
+        limit = super().__new__(cls, stable if grows is None or grows == stable else math.nan)
         limit.mode = mode
-        limit.grows = float(dt) if grows is None else grows
+        limit.stable = float(stable)
+        limit.grows = limit.stable if grows is None else grows
         return limit
 
     def __getnewargs__(self) -> tuple[Any, ...]:
         """What pickle and copy make it of."""
-        return float(self), self.mode, self.grows
+        return self.stable, self.mode, self.grows
 
     @property
     def decided(self) -> bool:
         """Whether the limit is known. It is not where so many eigenvalues nearly meet that rounding hides what grows."""
-        return self.grows == float(self)
+        return self.grows == self.stable
 
     def __repr__(self) -> str:
         """A number, or between which two it is."""
-        return f"{float(self)!r}" if self.decided else f"<between {float(self)!r} and {self.grows!r}, not decided>"
+        return f"{self.stable!r}" if self.decided else f"<between {self.stable!r} and {self.grows!r}, not decided>"
 
     __str__ = __repr__
 
@@ -77,38 +81,42 @@ class StabilityLimit(float):
 class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
     """Stability limits of a batch: an array of numbers.
 
+    They are NaN where they are not decided.
+
     Attributes:
         modes: what begins to grow, an array of the same shape of ``Mode`` or None; None of what is computed from limits.
-        grows: the smallest steps that are known to grow: the limits themselves where they are decided.
+        stable: the largest steps that are known to be stable: the limits themselves where they are decided.
+        grows: the smallest steps that are known to grow, likewise.
     """
 
     modes: Any = None
+    stable: Any = None
     grows: Any = None
 
     def __array_finalize__(self, other: Any) -> None:
         """What is computed from limits is no longer a limit, and has no modes."""
-        self.modes = self.grows = None
+        self.modes = self.stable = self.grows = None
 
     @property
     def decided(self) -> Any:
         """Of each whether it is known, as ``StabilityLimit.decided``."""
-        return np.asarray(self.grows == np.asarray(self))
+        return np.asarray(self.grows == self.stable)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What pickle and copy make it of."""
-        return limits_of, (np.array(self), self.modes, self.grows)
+        return limits_of, (self.stable, self.modes, self.grows)
 
     def __copy__(self) -> StabilityLimits:
         """Another with the same modes."""
-        return limits_of(np.array(self), self.modes, self.grows)
+        return limits_of(self.stable, self.modes, self.grows)
 
     def __deepcopy__(self, memo: Any) -> StabilityLimits:
         """Another with copies of them."""
-        return limits_of(np.array(self), copy.deepcopy(self.modes, memo), copy.deepcopy(self.grows, memo))
+        return limits_of(self.stable.copy(), copy.deepcopy(self.modes, memo), copy.deepcopy(self.grows, memo))
 
 
-def limits_of(dt: Array, modes: Any, grows: Any) -> StabilityLimits:
-    """Limits of these steps and modes."""
-    found = dt.view(StabilityLimits)
-    found.modes, found.grows = modes, grows
+def limits_of(stable: Array, modes: Any, grows: Any) -> StabilityLimits:
+    """Limits between these steps, of these modes."""
+    found = np.where(stable == grows, stable, np.nan).view(StabilityLimits)
+    found.modes, found.stable, found.grows = modes, stable, grows
     return found

@@ -12,6 +12,7 @@ use crate::{
     systems::equations::values_of,
     tape::{Id, Op},
     trace::around,
+    window,
 };
 
 /// A quantity may be at zero and back within a step where it is no further from zero than so many times its change in this one: `REACH`
@@ -43,7 +44,10 @@ pub fn next(
     let Some(watched) = &p.given.watched else { return Vec::new() };
     let v = match method.finish(choice) {
         None => v.clone(),
-        Some(program) => program.run(around(kind, p).as_ref(), t, p.h, v, y).into_iter().next().unwrap_or_else(|| v.clone()),
+        Some(program) => {
+            let made = || program.run(around(kind, p).as_ref(), t, p.h, v, y).into_iter().next();
+            window::over(p.given, || window::of_slot(t, p.h), made).unwrap_or_else(|| v.clone())
+        }
     };
     let now = values_of(watched, p, t, &v, y);
     let state = |i: usize| Symbol::new(Op::State((first + i) as u32));

@@ -141,11 +141,18 @@ impl Equations {
     }
 
     /// How many operations the rates, quantities and gradients have.
-    fn operations(&self) -> usize {
+    pub fn operations(&self) -> usize {
         if self.functions.is_empty() {
             return self.ops.len();
         }
         self.needed(&self.roots().collect::<Vec<_>>()).into_iter().filter(|needed| *needed).count()
+    }
+
+    /// The size of the blocks, or an error if the operations do not belong to what is given.
+    pub fn fit(&self, given: &Given) -> Result<Shape, Error> {
+        let shape = self.shape();
+        self.check(given, shape.v + shape.y)?;
+        Ok(shape)
     }
 
     fn shape(&self) -> Shape {
@@ -250,8 +257,7 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     let Some(equations) = &given.equations else {
         return Err(Error::Shape { what: "equations", expected: 1, got: 0 });
     };
-    equations.check(given, equations.shape().v + equations.shape().y)?;
-    Ok(equations.shape())
+    equations.fit(given)
 }
 
 /// A number on which every operation is defined.
@@ -319,6 +325,20 @@ pub fn values_of(
     let (of_v, of_y) = (Vec::new(), Vec::new());
     let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: equations.clone(), of_v, of_y };
     own.values(&equations.needed(&roots), &roots, t, v, y).iter().copied().collect()
+}
+
+/// The state after a step that is given as operations: its rates are the next numbers of both blocks.
+pub fn next_state(
+    step: &std::sync::Arc<Equations>,
+    p: &Parameters<Symbol>,
+    t: Symbol,
+    v: &Block<Symbol>,
+    y: &Block<Symbol>,
+) -> Block<Symbol> {
+    let roots: Vec<Id> = step.dv.iter().chain(step.dy.iter().flatten()).copied().collect();
+    let (of_v, of_y) = (Vec::new(), Vec::new());
+    let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: step.clone(), of_v, of_y };
+    own.values(&step.needed(&roots), &roots, t, v, y)
 }
 
 impl<N: Operand> Own<N> {
