@@ -51,8 +51,8 @@ HARD: dict[str, Callable[[Any], Any]] = {
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_no_function_takes_more_trials_than_bisection_and_one(g: Callable[[Any], Any]) -> None:
     """Bisection of 1 down to 2⁻⁴⁸ takes 48, and from there to 2⁻⁵²·0.3 another 6. The first round may be one trial behind it, and
-    a later one two, since it reckons in powers of two. Ends of brackets are floating-point numbers, so that half of three spacings
-    is two of them, which takes one more. What is returned is at or past the zero, by no more than the roundings of 0.3.
+    a later one two, since it reckons in powers of two. Ends of brackets are floating-point numbers: half of three spacings is two
+    of them, which takes one more. What is returned is at or past the zero, by no more than the roundings of 0.3.
     """
     (share,), trials = found(g)
     assert trials <= (48 + 1) + (6 + 2) + 1

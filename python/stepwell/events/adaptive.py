@@ -10,8 +10,8 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.types import Whole
 from ..errors import UnsupportedError
+from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
 from .collected import Collected
@@ -36,8 +36,8 @@ class AdaptiveRun:
     def __init__(self, events: Sequence[Event]) -> None:
         if changing := [each for each in events if each.then is not None]:
             raise UnsupportedError(
-                f"events: with steps chosen by a tolerance no event changes the state, got {changing[0]!r}; give dt= and steps=, or "
-                f"stop at it by terminal=True and begin a new run from the state there"
+                f"events: with steps chosen by a tolerance no event changes the state, got {changing[0]!r}; give dt= and steps=, "
+                f"or stop at it by terminal=True and begin a new run from the state there"
             )
         self._events = events
         self._driver: _Driver | None = None

@@ -47,7 +47,8 @@ class Frames(Collected):
             )
         if changing := [each for each in events if each.then is not None]:
             raise UnsupportedError(
-                f"events: no event changes the state of a world by then=, got {changing[0]!r}; integrate(…, dt=…, steps=…) takes it"
+                f"events: no event changes the state of a world by then=, got {changing[0]!r}; "
+                f"integrate(…, dt=…, steps=…) takes it"
             )
         super().__init__(plan, events)
         self._blocks, self._steps, self._number = (v, y), steps, number

@@ -24,6 +24,9 @@ SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
 #: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved
 #: may be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
 LEAST_LEFT = 2.0**-36
+#: A member is at an event still, after this changed its state, if g is no more than so many times what it was there, or than the
+#: share ``LEAST_LEFT`` of what it was at the ends of the step; else its state is elsewhere, as of a neuron that is set back.
+AT = 8.0
 
 
 class Stretch(NamedTuple):
@@ -58,7 +61,10 @@ class Stretch(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What ends some stretches: the share of each, infinite without that, whether the run ends there, and whence it goes on."""
+    """What ends some stretches: the share of each, infinite without that, whether the run ends there, and whence it goes on.
+
+    ``event`` is the number of the event that changed the state, −1 without one.
+    """
 
     share: Array
     stops: Any
@@ -66,6 +72,7 @@ class Ahead(NamedTuple):
     v: Array
     y: Array
     at: Array
+    event: Whole
 
 
 class Arrived(NamedTuple):
@@ -129,14 +136,14 @@ class Resets:
                 )
             if settled.any():
                 which = settled & (ahead.share < np.inf) & ~ahead.stops
-                returns = np.where(which, np.argmax(ahead.at != 0.0, axis=0), returns)
+                returns = np.where(which, ahead.event, returns)
                 v_limit, y_limit = (
                     np.where(which, now + (now - earlier) * rest_of_series, earlier)
                     for now, earlier in ((ahead.v, stretch.v), (ahead.y, stretch.y))
                 )
                 stretch = stretch._replace(t=np.where(which, limit, stretch.t), v=v_limit, y=y_limit)
             if resets == MOST_IN_A_STEP:
-                returns = np.where(ahead.share < np.inf, np.argmax(stretch.at != 0.0, axis=0), returns)
+                returns = np.where((ahead.share < np.inf) & ~ahead.stops, ahead.event, returns)
             rest, stop = returns >= 0, (returns < 0) & ahead.stops
             goes_on, arrives = (returns < 0) & (ahead.share < np.inf) & ~stop, (returns < 0) & ~(ahead.share < np.inf)
             for which, t, state in (
@@ -166,7 +173,7 @@ class Resets:
         """What ends stretches first, and of those that return to an event within roundings, which; that is taken note of."""
         run, n = self._run, len(stretch.member)
         share, returns, rows = np.full(n, np.inf), np.full(n, -1), np.arange(n)
-        numbers, found = run.members.numbers(stretch.member), []
+        numbers, found, sizes = run.members.numbers(stretch.member), [], []
         ones, zeros = np.ones(n), np.zeros(n)
         for e, quantity in enumerate(run.quantities):
             g = quantity(stretch.t, stretch.v, stretch.y, numbers)
@@ -182,6 +189,7 @@ class Resets:
                 again = (stretch.at[e, changes.place] != 0.0) & (self._way * (occurs.t - stretch.t[changes.place]) <= 0.0)
                 returns[changes.place[again]] = e
             found.append((occurs, changes.place, np.sign(changes.g)))
+            sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
             ends = self.end(e, occurs.member)
             np.minimum.at(share, changes.place[ends], occurs.share[ends])
         share[returns >= 0] = -np.inf  # nothing happens before
@@ -190,18 +198,21 @@ class Resets:
             here = self.end(e, occurs.member) & (occurs.share == share[place])
             t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
             stops[place[here]] |= e not in self._new_states
-        at = np.zeros_like(stretch.at)
+        at, event = np.zeros_like(stretch.at), np.full(n, -1)
         for e, (occurs, place, side) in enumerate(found):
             run.note(e, occurs.some(occurs.share <= share[place]))
             if e in self._new_states:
                 here = (occurs.share == share[place]) & ~stops[place]
                 who = place[here]
-                at[e, who] = side[here]
                 if len(who):
-                    of_these = run.members.numbers(stretch.member[who])
+                    of_these, quantity = run.members.numbers(stretch.member[who]), run.quantities[e]
+                    there = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
                     v[..., who], y[..., who] = self._new_states[e](t[who], v[..., who], y[..., who], of_these)
+                    now = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
+                    at[e, who] = np.where(now <= np.maximum(AT * there, LEAST_LEFT * sizes[e][who]), side[here], 0.0)
+                    event[who] = e
         share[returns >= 0] = np.inf
-        return Ahead(share, stops, t, v, y, at), returns
+        return Ahead(share, stops, t, v, y, at, event), returns
 
 
 def warn_of_rest(names: Sequence[str], rests: Whole, times: Array, batch: Shape) -> None:
