@@ -131,6 +131,16 @@ def test_a_system_without_velocities_is_set_back() -> None:
     np.testing.assert_allclose(run.y[-1], 0.5, rtol=0, atol=35 * 10 * U)
 
 
+def test_a_ball_that_begins_at_the_ground_lies_there_or_leaves_it() -> None:
+    """At rest it stays; upwards it flies for 2v/g and bounces."""
+    with pytest.warns(sw.EventWarning, match="came to rest at event ground, at t = 0"):
+        lies = sw.integrate(ball(), "rk4", v=0.0, y=0.0, dt=0.01, steps=100, events=ground(0.8))
+    assert (lies.y == 0.0).all()
+    assert lies.stopped_at == 0.0
+    flies = sw.integrate(ball(), "rk4", v=3.0, y=0.0, dt=0.01, steps=100, events=ground(0.8))
+    np.testing.assert_allclose(flies.events["ground"].t[0], 2.0 * 3.0 / GRAVITY, rtol=0, atol=62 * U)
+
+
 def test_no_warning_where_nothing_comes_to_rest() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -246,6 +246,13 @@ class _Resetting(_Driver):
         self.resets = Resets(self)
         self.rests = np.full(plan.members, -1)
 
+    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+        plan = self.plan
+        if not carried:
+            states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
+            self.resets.begin(np.array(plan.t0 + plan.first * plan.dt), *states)
+        return super().run(v, y, before, carried)
+
     def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
         plan, piece, some = self.plan, FIRST_STEPS, self.members.plan(index)
         while done < plan.steps and len(index):

@@ -24,6 +24,8 @@ SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
 #: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved
 #: may be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
 LEAST_LEFT = 2.0**-36
+#: A member that returns to an event within this share of its step does so in no time, also where the time is zero.
+NO_TIME = 2.0**-100
 #: A member is at an event still, after this changed its state, if g is no more than so many times what it was there, or than the
 #: share ``LEAST_LEFT`` of what it was at the ends of the step; else its state is elsewhere, as of a neuron that is set back.
 AT = 8.0
@@ -108,6 +110,13 @@ class Resets:
         #: At which of them members are, from which side, since they changed the state at the end of a step.
         self.at = np.zeros((len(run.events), run.plan.members))
 
+    def begin(self, t: Array, v: Array, y: Array) -> None:
+        """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground."""
+        numbers = self._run.members.numbers(slice(None))
+        for e in self._new_states:
+            begins_there = self._run.quantities[e](t, v, y, numbers) == 0.0
+            self.at[e] = np.where(begins_there, -float(self._run.events[e].direction), 0.0)
+
     def end(self, e: int, member: Whole) -> Any:
         """Which of these occurrences end a stretch."""
         return np.ones(len(member), dtype=bool) if e in self._new_states else self._run.ends(e, member)
@@ -186,7 +195,9 @@ class Resets:
                 returns[looked[stuck]] = e
             occurs = run.located(e, changes)
             if e in self._new_states:  # in no time
-                again = (stretch.at[e, changes.place] != 0.0) & (self._way * (occurs.t - stretch.t[changes.place]) <= 0.0)
+                again = (stretch.at[e, changes.place] != 0.0) & (
+                    self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
+                )
                 returns[changes.place[again]] = e
             found.append((occurs, changes.place, np.sign(changes.g)))
             sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
