@@ -251,6 +251,13 @@ def test_a_zero_is_found_to_four_roundings(g: Callable[[float], float], a: float
     assert len(calls) < 150
 
 
+@pytest.mark.parametrize("zero", [1e-13, 3e-30, 1e-200])
+def test_a_zero_is_found_to_the_roundings_of_a_tiny_time(zero: float) -> None:
+    """Of a step from 0, to four roundings of the zero; of a step around 0, to four of the time since its start."""
+    assert abs(root(lambda t: t / zero * t - zero, 0.0, 1.0, -zero, 1.0 / zero) / zero - 1.0) <= 2 * ROOT_TOLERANCE
+    assert abs(root(lambda t: t - zero, -zero, 1.0, -2.0 * zero, 1.0 - zero) / zero - 1.0) <= 2 * ROOT_TOLERANCE
+
+
 def test_a_zero_at_an_end() -> None:
     assert root(lambda x: x, 0.0, 1.0, 0.0, 1.0) == 0.0
     assert root(lambda x: x - 1, 0.0, 1.0, -1.0, 0.0) == 1.0

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
+from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, EventWarning, StepwellError, ToleranceWarning
 
 if TYPE_CHECKING:
     from . import (
@@ -77,6 +77,7 @@ __all__ = [
     "DivergenceWarning",
     "EnergyControl",
     "Event",
+    "EventWarning",
     "Explanation",
     "Explorer",
     "ExportedStep",

@@ -111,6 +111,21 @@ class ControlWarning(UserWarning):
     """
 
 
+class EventWarning(UserWarning):
+    """Some members came to rest at an event whose changes of the state follow each other within no time.
+
+    Example:
+        >>> @sw.system
+        ... def ball(t, v, y): return -9.81
+        >>> ground = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="ground")
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.EventWarning)
+        ...     run = sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.01, steps=300, events=ground)
+        >>> bool(run.status == sw.Status.REST), run.stopped_at.round(6)  # √(2/9.81)·(1 + 0.5)/(1 − 0.5)
+        (True, array(1.354571))
+    """
+
+
 class AccuracyWarning(UserWarning):
     """A run stayed finite, but its numbers are known to be meaningless.
 

@@ -48,6 +48,9 @@ class Status(IntEnum):
     NOT_FINITE = 4
     #: A terminal event stopped it; ``Run.stopped_at`` says when.
     EVENT = 5
+    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest; ``Run.stopped_at`` says
+    #: when.
+    REST = 6
 
 
 @by_value
@@ -274,7 +277,7 @@ class Run(Value):
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
-        if (stopped := int(np.count_nonzero(self.status == Status.EVENT))) > 0:
+        if (stopped := int(np.count_nonzero(self.status >= Status.EVENT))) > 0:
             raise UnsupportedError(
                 f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
                 f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "

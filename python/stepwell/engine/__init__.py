@@ -43,7 +43,7 @@ from .adaptive import (
     paces,
     pacing_of_core,
 )
-from .direct import advance
+from .direct import advance, to_slot
 from .plan import Arrays, Outcome, Plan, Watched, model, pushes
 
 __all__ = [
@@ -85,6 +85,7 @@ __all__ = [
     "paces",
     "pacing_of_core",
     "pushes",
+    "to_slot",
 ]
 
 if hasattr(os, "register_at_fork"):

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses
+from ..errors import UnsupportedError
 from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
@@ -34,13 +34,18 @@ class AdaptiveRun:
     """
 
     def __init__(self, events: Sequence[Event]) -> None:
+        if changing := [each for each in events if each.then is not None]:
+            raise UnsupportedError(
+                f"events: with steps chosen by a tolerance no event changes the state, got {changing[0]!r}; give dt= and steps=, "
+                f"or stop at it by terminal=True and begin a new run from the state there"
+            )
         self._events = events
         self._driver: _Driver | None = None
 
     def adapt(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array) -> engine.Adapted:
         """Make it."""
         numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
-        rows = sum(numbers * (1 if event.terminal else min(event.most, pacing.budget)) for event in self._events)
+        rows = sum(numbers * min(event.most, int(event.terminal) or pacing.budget) for event in self._events)
         _checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
         self._driver = driver = _Driver(plan, self._events, pacing)
         driver.run(paces, v, y)
@@ -64,9 +69,8 @@ class _Driver(Collected):
 
     def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
         super().__init__(plan, events, AdaptiveTrials)
-        #: The time at which each member is at the end, and the direction of time.
+        #: The time at which each member is at the end.
         self.pacing, self.end = pacing, np.broadcast_to(pacing.at[-1], plan.batch).reshape(-1)
-        self.sign = -1.0 if plan.backward else 1.0
         self.numbers = engine.pace_numbers(plan)
         self.jumps = pacing.jumps
         if self.jumps is not None and self.jumps.ndim > 1:
@@ -121,27 +125,31 @@ class _Driver(Collected):
         """Find the events within these steps; which of the members stop."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         given, h = self.members.numbers(index), out.lengths(now)
-        g = [quantity(self.sign * out.t, v, y, given) for quantity in self.quantities]
-        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
-        if not np.any([each.any() for each in changes]):
+        g = [self.quantity(e, out.t, v, y, given) for e in range(len(self.events))]
+        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
+        if not np.any([each.any() for each in may]):
             return np.zeros(len(index), dtype=bool)
-        taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(out.t[1:] > out.t[:-1], axis=0)]) + before[0]
+        moves = out.t[1:] > out.t[:-1]
+        taken = np.concatenate([np.zeros((1, len(index))), np.cumsum(moves, axis=0)]) + before[0]
 
-        def known(e: int, row: Whole, member: Whole) -> Changes:
-            begins, ends = ([each[..., row + later, member] for each in states] for later in (0, 1))
-            step, places = taken[row, member].astype(np.int64), (row, member)
-            return Changes(index[member], step, out.t[places], h[places], g[e][places], g[e][row + 1, member], *begins, *ends)
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            step, places = taken[row, place].astype(np.int64), (row, place)
+            low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][places], g[e][row + 1, place])
+            return Changes(row, place, index[place], step, out.t[places], h[places], low, high, *values, *begins, *ends)
 
+        changes = [self.changes(e, each & moves, known) for e, each in enumerate(may)]
         # Of steps that go beyond the end, or began before this run, only a part is in it.
         partial = out.t[1:] > self.end[index]
         if goes_on:
             partial |= out.t[:-1] < self.since[index]
         for e, each in enumerate(changes):
-            row, member = np.nonzero(each & partial)
-            if len(row):
-                t = self.located(e, known(e, row, member)).t
-                each[row, member] = (t <= self.end[index[member]]) & (t > self.since[index[member]])
-        stops = self.take(index, len(h), changes, known)
+            beyond = np.flatnonzero(partial[each.row, each.place])
+            if len(beyond):
+                t, who = self.located(e, each.some(beyond)).t, each.member[beyond]
+                inside = (t <= self.end[who]) & (t > self.since[who])
+                changes[e] = each.some(np.delete(np.arange(len(each.row)), beyond[~inside]))
+        stops = self.take(index, len(h), changes)
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         which, whose = stops.which, index[stops.which]

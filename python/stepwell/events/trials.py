@@ -46,6 +46,8 @@ class Trials:
         self._is_traced = not isinstance(plan.system, OwnSystem)
         self._by_core = plan.backend == "rust"
         self._plans: dict[int, engine.Plan] = {}
+        self._rates: tuple[Operations, list[Array]] | None = None
+        self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, of another time and length for each."""
@@ -62,6 +64,49 @@ class Trials:
             made = self._operations(state, numbers)
         n = len(made) - y[..., 0].size
         return _block(made[:n], v), _block(made[n:], y)
+
+    def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """How much v and y of these members would change in a step of the length if they went on as they do here."""
+        if not self._rates_traced:
+            self._rates, self._rates_traced = self._traced_rates(), True
+        if self._rates is None:
+            s = self._scaled(self._members.plan(index), h)
+            with np.errstate(all="ignore"):
+                dv, dy = s.dv(t, v, y), s.dy(t, v, y)
+            return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)
+        operations, numbers = self._rates
+        state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        with np.errstate(all="ignore"):
+            changes = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
+        n = len(changes) - y[..., 0].size
+        return _block(changes[:n], v), _block(changes[n:], y)
+
+    def _traced_rates(self) -> tuple[Operations, list[Array]] | None:
+        """Rates of an own system as operations, likewise."""
+        plan = self._members.plan(np.arange(self._plan.members))
+        if not isinstance(plan.system, OwnSystem):
+            return None
+        tape = _core.Tape()
+        tracer = Tracer(plan.system, tape, plan.force)
+        t, h = tape.state(0), tape.state(1)
+        leaves = (tape.state(i) for i in range(2, 1 << 30))
+        v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
+        s = self._scaled_symbols(tracer, h)
+        if tracer.tables:
+            return None
+        wide = (np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape))
+        operations = Operations(*tape.operations(tracer.flat(*wide)))
+        if len(operations.lines) > MOST_OPERATIONS:
+            return None
+        return operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        """The system of these members, scaled to steps of another length for each."""
+        return plan.system.scaled(h, plan.batch, plan.force)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        """The same with symbols."""
+        return tracer.scaled(h)
 
     def _one_by_one(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """The same by the core."""
@@ -111,6 +156,12 @@ class AdaptiveTrials(Trials):
         self._by_core = False  # which makes no steps of a given length of these
         self._always_traced = plan.method.has_series
         self._is_traced = self._is_traced and not self._always_traced
+
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        return Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control).rates(h)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        return tracer.attempted(backward=self._plan.backward).rates(h)
 
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
