@@ -181,7 +181,7 @@ def tumbling() -> Figure:
     from matplotlib.figure import Figure
     from stepwell.charts.style import COLOURS, FONT, GREY
 
-    thrown = sw.Rods([1.0, 2.0], [(0, 1)], 1.0, gravity=9.81, floor=sw.Floor(0.5, 0.3), dim=2)
+    thrown = sw.Rods([1.0, 2.0], [(0, 1)], 1.0, gravity=9.81, floor=sw.Floor(restitution=0.5, friction=0.3), dim=2)
     start: dict[str, Any] = {"v": [[3.6, 1.0], [2.4, 1.8]], "y": [[0.0, 0.8], [0.8, 1.4]]}
     control = sw.Projection("length")
     run = sw.integrate(thrown, "rk4", **start, dt=1 / 240, steps=600, every=8, control=control)

@@ -22,7 +22,7 @@ def main() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", sw.DivergenceWarning)
             run = sw.integrate(sw.Oscillator(ANGLES), method, v=0.0, y=1.0, dt=1.0, steps=STEPS, every=1)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             energy = np.where(run.status == sw.Status.OK, run.energy[-LAST:].mean(axis=0), np.inf)
         period = round(2 * math.pi / ANGLES[0])
         error = abs(run.y[period, 0] - math.cos(ANGLES[0] * period))

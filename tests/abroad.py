@@ -75,6 +75,15 @@ class Journey:
         return [[float(each) for each in np.ravel(block)] for block in wide]
 
     @property
+    def force(self) -> list[float]:
+        """The force from outside, if there is one."""
+        return [float(each) for each in np.ravel(self.options.get("force", []))]
+
+    def takes_force(self, source: str, begin: str) -> bool:
+        """Whether a function of the exported code that begins so has a force for an argument."""
+        return "force" in source[source.index(begin) :].partition("\n")[0]
+
+    @property
     def carries(self) -> bool:
         return sw.method(self.method).carry is not None
 
@@ -121,18 +130,21 @@ def _c(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> lis
     text += "static void tell_one(double x) { uint64_t b; memcpy(&b, &x, 8); "
     text += 'printf("%llx ", (unsigned long long)b); }\n'
     text += "#define tell(x, n) for (int i = 0; i < n; i++) tell_one((x)[i]);\n"
-    for i, each in enumerate(journeys):
+    for i, (each, source) in enumerate(zip(journeys, sources, strict=True)):
         p, (v, y) = f"step_{i}", each.blocks
+        force = {of: ", f" * each.takes_force(source, f"void {p}_{of}(") for of in ("start", "step")}
+        force["finish"] = ", f" * (each.carries and each.takes_force(source, f"void {p}_finish("))
         number = "float" if each.single else "double"
         slot = sw.method(each.method).carry or "v"
         arrays = [(name, a) for name, a in (("v", v), ("y", y)) if a]
         text += f"static void run_{i}(void) {{\n    {p} m;\n    {p}_state s;\n"
         text += "".join(f"    const {number} {n}[] = {{{_hex(a)}}};\n" for n, a in arrays)
+        text += f"    const {number} f[] = {{{_hex(each.force)}}};\n" * bool(each.force)
         text += f"    {p}_defaults(&m);\n" + "".join(f"    m.{n} = {x.hex()};\n" for n, x in each.changed.items())
-        text += f"    {p}_prepare(&m);\n    {p}_start(&m, &s{''.join(f', {n}' for n, _ in arrays)});\n"
-        text += f"    for (int k = 0; k < {each.steps}; k++) {p}_step(&m, &s);\n"
+        text += f"    {p}_prepare(&m);\n    {p}_start(&m, &s{''.join(f', {n}' for n, _ in arrays)}{force['start']});\n"
+        text += f"    for (int k = 0; k < {each.steps}; k++) {p}_step(&m, &s{force['step']});\n"
         if each.carries:
-            text += f"    {number} out[{len(v)}];\n    {p}_finish(&m, &s, out);\n    tell(out, {len(v)});\n"
+            text += f"    {number} out[{len(v)}];\n    {p}_finish(&m, &s{force['finish']}, out);\n    tell(out, {len(v)});\n"
         elif v:
             text += f"    tell(s.{slot}, {len(v)});\n"
         text += f"    tell(s.y, {len(y)});\n" if y else ""
@@ -153,10 +165,11 @@ def _javascript(journeys: Sequence[Journey], sources: Sequence[str], folder: Pat
         begin += f'import {{ Step{i} }} from "./step_{i}.mjs";\n'
         v, y = (f"[{', '.join(map(repr, block))}]" for block in each.blocks)
         given = ", ".join(block for block, numbers in zip((v, y), each.blocks, strict=True) if numbers)
+        force = f", {each.force!r}" * bool(each.force)  # more arguments than a function has are left out
         changed = "".join(f"m.{name} = {value!r}; " for name, value in each.changed.items())
-        text += f"{{ const m = new {camel(f'step_{i}')}(); {changed}m.prepare(); const s = m.start({given});\n"
-        text += f"  for (let k = 0; k < {each.steps}; k++) m.step(s);\n"
-        told = ["m.finish(s)" if each.carries else "s.v ?? []", "s.y ?? []"] + ["[m.work(s)]"] * each.works
+        text += f"{{ const m = new {camel(f'step_{i}')}(); {changed}m.prepare(); const s = m.start({given}{force});\n"
+        text += f"  for (let k = 0; k < {each.steps}; k++) m.step(s{force});\n"
+        told = [f"m.finish(s{force})" if each.carries else "s.v ?? []", "s.y ?? []"] + ["[m.work(s)]"] * each.works
         text += f"  console.log([{', '.join(f'...({part})' for part in told)}].map(word).join(' ')); }}\n"
     (folder / "all.mjs").write_text(begin + text, encoding="utf-8")
     return executed(["node", "all.mjs"], folder).splitlines()
@@ -172,9 +185,13 @@ def _rust(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -> 
         given = ", ".join(f"[{', '.join(_rust_number(x, each.single) for x in block)}]" for block in arrays)
         text += f"fn run_{i}() {{\n    let mut m = step_{i}::Step{i}::new();\n"
         text += "".join(f"    m.{name} = {value!r};\n" for name, value in each.changed.items())
-        text += f"    m.prepare();\n    let mut s = m.start({given});\n    for _ in 0..{each.steps} {{ m.step(&mut s); }}\n"
+        push = f"[{', '.join(_rust_number(x, each.single) for x in each.force)}]"
+        text += f"    let f = {push};\n" * bool(each.force)
+        force = {of: ", &f" * each.takes_force(source, f"pub fn {of}(") for of in ("start", "step")}
+        text += f"    m.prepare();\n    let mut s = m.start({given}{force['start']});\n"
+        text += f"    for _ in 0..{each.steps} {{ m.step(&mut s{force['step']}); }}\n"
         if each.carries:
-            text += "    tell(&m.finish(&s));\n"
+            text += f"    tell(&m.finish(&s{', &f' * each.takes_force(source, 'pub fn finish(')}));\n"
         elif each.blocks[0]:
             text += "    tell(&s.v);\n"
         text += "    tell(&s.y);\n" if each.blocks[1] else ""
@@ -200,10 +217,14 @@ def _python(journeys: Sequence[Journey], sources: Sequence[str], folder: Path) -
             source = source.replace("import math\n", "")
         exec(compile(source, f"step_{i}.py", "exec"), space)
         m = space[f"Step{i}"](**each.changed)
-        s = m.start(*(block for block in each.blocks if block))
+        of = {
+            name: [each.force] * each.takes_force(source, f"def {name}(")
+            for name in ("start", "step", "finish")[: 2 + each.carries]
+        }
+        s = m.start(*(block for block in each.blocks if block), *of["start"])
         for _ in range(each.steps):
-            m.step(s)
-        v = m.finish(s) if each.carries else getattr(s, "v", [])
+            m.step(s, *of["step"])
+        v = m.finish(s, *of["finish"]) if each.carries else getattr(s, "v", [])
         lines.append(" ".join(f"{bits(x):x}" for x in [*v, *getattr(s, "y", []), *([m.work(s)] if each.works else [])]))
     return lines
 

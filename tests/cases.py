@@ -107,10 +107,13 @@ SYSTEMS: dict[str, Make] = {
     "pendulum in space, length projection": lambda r, b: sw.Pendulum3D(_omega(r, b)).under(sw.Projection("length"), (b,)),
     "pendulum in space, at a wall and a ball": lambda r, b: sw.Pendulum3D(
         r.uniform(0.7, 1.5, b),
-        floor=[sw.Floor(r.uniform(0.3, 1.0, b), 0.2, normal=(1, 0, 0), offset=0.8), sw.Sphere((0, 0, -1), 0.3, friction=0.3)],
+        floor=[
+            sw.Floor(restitution=r.uniform(0.3, 1.0, b), friction=0.2, normal=(1, 0, 0), offset=0.8),
+            sw.Sphere((0, 0, -1), 0.3, friction=0.3),
+        ],
     ).under(sw.Projection("length"), (b,)),
     "pendulum in space, over a slope": lambda r, b: sw.Pendulum3D(
-        1.0, 2.0, floor=sw.Floor(0.5, normal=(0.2, 0.1, 1), offset=-0.7)
+        1.0, 2.0, floor=sw.Floor(restitution=0.5, normal=(0.2, 0.1, 1), offset=-0.7)
     ),
     "restricted three bodies": lambda r, b: sw.RestrictedThreeBody(r.uniform(0.01, 0.99, b)),
     "Arenstorf's moon": lambda r, b: sw.RestrictedThreeBody(),
@@ -124,7 +127,7 @@ SYSTEMS: dict[str, Make] = {
         r,
         2,
         gravity=(0.0, -1.0),
-        floor=[sw.Floor(r.uniform(0.0, 1.0, b), offset=-0.3), sw.Floor(offset=0.2, way="spring", omega=2.0)],
+        floor=[sw.Floor(restitution=r.uniform(0.0, 1.0, b), offset=-0.3), sw.Floor(offset=0.2, way="spring", omega=2.0)],
     ),
     "springs: on a line": lambda r, b: sw.Springs(
         [(0, 1), (1, 2), (3, 2)], stiffness=r.uniform(0.5, 2.0, (3, b)), rest=0.5, fixed=[0, 3], dim=1
@@ -166,11 +169,18 @@ SYSTEMS: dict[str, Make] = {
     "a pair above a spring": lambda r, b: sw.NBody([1.0, 0.5], softening=0.3, floor=sw.Floor(way="spring", omega=_omega(r, b))),
     "particles": lambda r, b: sw.Particles([1.0, 2.0], gravity=r.normal(size=(3, b))),
     "particles, drag": lambda r, b: sw.Particles(r.uniform(0.5, 2.0, (2, b)), drag=r.uniform(0.0, 0.5, b), dim=2),
-    "particles, a floor": lambda r, b: sw.Particles(gravity=r.uniform(0.5, 2.0), floor=sw.Floor(r.uniform(0.0, 1.0, b)), dim=2),
-    "particles, drag, a rough slope": lambda r, b: sw.Particles(
-        [1.0, 2.0], drag=0.1, gravity=2.0, floor=sw.Floor(0.7, 0.2, normal=r.normal(size=(3, b)), offset=-0.5)
+    "particles, a floor": lambda r, b: sw.Particles(
+        gravity=r.uniform(0.5, 2.0), floor=sw.Floor(restitution=r.uniform(0.0, 1.0, b)), dim=2
     ),
-    "particles, a floor that turns them": lambda r, b: sw.Particles(floor=sw.Floor(0.5, 0.1, way="restitution"), dim=1),
+    "particles, drag, a rough slope": lambda r, b: sw.Particles(
+        [1.0, 2.0],
+        drag=0.1,
+        gravity=2.0,
+        floor=sw.Floor(restitution=0.7, friction=0.2, normal=r.normal(size=(3, b)), offset=-0.5),
+    ),
+    "particles, a floor that turns them": lambda r, b: sw.Particles(
+        floor=sw.Floor(restitution=0.5, friction=0.1, way="restitution"), dim=1
+    ),
     "particles, round a ball": lambda r, b: sw.Particles(floor=sw.Sphere((0.0, 0.1), r.uniform(0.3, 0.6, b), friction=0.3)),
     "chain of one": lambda r, b: sw.Chain(1, stiffness=r.uniform(0.5, 2.0, (2, b))),
     "chain of five": lambda r, b: sw.Chain(5, stiffness=r.uniform(0.0, 2.0, (6, b)), mass=r.uniform(0.5, 2.0, 5)),
@@ -195,14 +205,19 @@ SYSTEMS: dict[str, Make] = {
         [1.0, 1.5], [(0, (-1.0, 0.0)), (0, 1), (1, (1.5, 0.5))], [1.0, 1.2, 0.8], gravity=r.uniform(0.5, 2.0, b)
     ).under(sw.Projection("length"), (b,)),
     "rods, a dumb-bell on a rough floor, length projection": lambda r, b: sw.Rods(
-        r.uniform(0.5, 2.0, (2, b)), [(0, 1)], 1.0, gravity=3.0, floor=sw.Floor(r.uniform(0.0, 1.0, b), 0.4, offset=-0.3), dim=3
+        r.uniform(0.5, 2.0, (2, b)),
+        [(0, 1)],
+        1.0,
+        gravity=3.0,
+        floor=sw.Floor(restitution=r.uniform(0.0, 1.0, b), friction=0.4, offset=-0.3),
+        dim=3,
     ).under(sw.Projection("length"), (b,)),
     "rods, two hanging over a floor, length control": lambda r, b: sw.Rods(
         [1.0, 2.0],
         [((0.0, 0.5), 0), (0, 1)],
         1.0,
         gravity=r.uniform(1.0, 3.0, b),
-        floor=[sw.Floor(0.5, 0.3), sw.Floor(normal=(1, 0))],
+        floor=[sw.Floor(restitution=0.5, friction=0.3), sw.Floor(normal=(1, 0))],
     ).under(sw.LengthControl(0.4), (b,)),
     "rods, two apart in a bowl": lambda r, b: sw.Rods(
         [1.0, 2.0, 0.5, 1.0], [(0, 1), (3, 2)], 1.0, gravity=2.0, floor=sw.Sphere((0.1, 0.0), r.uniform(1.0, 1.5, b), inside=True)

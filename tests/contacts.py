@@ -43,7 +43,7 @@ def energies(run: sw.Run, kick: Any, lag: float = 0.0) -> Any:
 
 def no_energy_added(method: str, backend: str = "rust", restitution: float = 1.0, gravity: bool = True) -> None:
     """Not in any step in which a point met the floor; nor, but for the method's own invariant, in all of them."""
-    run, kick = impacts(method, sw.Floor(restitution), gravity, backend)
+    run, kick = impacts(method, sw.Floor(restitution=restitution), gravity, backend)
     energy = energies(run, kick)
     met = run.v[1:, 0, 0] - (run.v[:-1, 0, 0] - kick) > ROUNDING
     assert met.any(axis=0).mean() > 0.9
@@ -57,7 +57,7 @@ def no_energy_added(method: str, backend: str = "rust", restitution: float = 1.0
 
 def squares(method: str, backend: str = "rust", restitution: float = 0.8) -> None:
     """Exactly e² of the energy of impact is left, by each of the methods on the parabola, unless the point rests."""
-    run, kick = impacts(method, sw.Floor(restitution), True, backend, steps=1)
+    run, kick = impacts(method, sw.Floor(restitution=restitution), True, backend, steps=1)
     before, after = energies(run, kick)
     met = run.v[1, 0, 0] - (run.v[0, 0, 0] - kick) > ROUNDING
     flies = met & (restitution * np.sqrt(2.0 * before) > kick + ROUNDING)
@@ -112,7 +112,7 @@ def slides(method: str, backend: str = "rust") -> None:
 def sticks(method: str, backend: str = "rust") -> None:
     """On a slope whose tangent is below μ a point stays where it is; above, it slides down with g·(sin α − μ·cos α)."""
     mu, down = np.array([0.0, 0.3, 0.7]), np.array([np.cos(0.5), -np.sin(0.5)])
-    floor = sw.Floor(0.0, mu, normal=(np.sin(0.5), np.cos(0.5)))
+    floor = sw.Floor(restitution=0.0, friction=mu, normal=(np.sin(0.5), np.cos(0.5)))
     ball = sw.Particles(gravity=G, floor=floor)
     run = sw.integrate(ball, method, v=np.zeros((1, 2, 3)), y=0.0, dt=0.01, steps=200, every=1, backend=backend)
     along, speed = (np.einsum("c,tcb->tb", down, block[:, 0]) for block in (run.y, run.v))
@@ -150,7 +150,7 @@ def passes(method: str, backend: str = "rust") -> None:
     run = sw.integrate(bullet, method, v=[[5.0, 0.0]], y=[[-1.0, 0.0]], dt=0.5, steps=1, backend=backend)
     np.testing.assert_allclose(run.v[-1], [[-5.0, 0.0]], rtol=0, atol=5.0 * ROUNDING)
     np.testing.assert_allclose(run.y[-1], [[-0.1 - (2.5 - 0.9), 0.0]], rtol=0, atol=5.0 * ROUNDING)
-    for floor in (sw.Floor(0.5), sw.Sphere((0.0, -10.0), 10.0, restitution=0.5)):
+    for floor in (sw.Floor(restitution=0.5), sw.Sphere((0.0, -10.0), 10.0, restitution=0.5)):
         out = sw.Particles(gravity=0.0, floor=floor)
         run = sw.integrate(out, method, v=[[0.0, 1.0]], y=[[0.0, -0.5]], dt=0.1, steps=3, backend=backend)
         np.testing.assert_allclose(run.v[-1], [[0.0, 1.0]], rtol=0, atol=16.0 * ROUNDING)
@@ -197,7 +197,7 @@ def corners(method: str, backend: str = "rust", seed: int = 4) -> None:
 
     for trial in range(6):
         e, mu = float(rng.uniform(0.3, 1.0)), [None, 0.3][trial % 2]
-        planes = [sw.Floor(e, mu, normal=normal(), offset=-1.0) for _ in range(2)]
+        planes = [sw.Floor(restitution=e, friction=mu, normal=normal(), offset=-1.0) for _ in range(2)]
         spheres = [sw.Sphere((0.0, 0.0), r, inside=r > 0.9, restitution=e, friction=mu) for r in (1.0, 0.5)]
         floor: Any = [planes, spheres[:1], spheres[1:], [planes[0], spheres[1]], [planes[0], spheres[0]], planes[:1]][trial]
         g = 10.0 * rng.normal(size=2)

@@ -39,7 +39,7 @@ CHANGED: dict[str, tuple[str, dict[str, float], Any]] = {
     "restitution": (
         "bouncing_ball",
         {"restitution": 0.5, "gravity": 4.0},
-        lambda s: replace(s, system=sw.Particles(gravity=4.0, floor=sw.Floor(0.5), dim=2)),
+        lambda s: replace(s, system=sw.Particles(gravity=4.0, floor=sw.Floor(restitution=0.5), dim=2)),
     ),
     "inertia": ("dzhanibekov", {"J1": 0.5, "J3": 2.0}, lambda s: replace(s, system=sw.RigidBody([0.5, 2.0, 2.0]))),
     "friction": (

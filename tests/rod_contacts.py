@@ -43,10 +43,10 @@ def drops_as_a_ball(method: str, backend: str = "rust") -> None:
     height = np.linspace(0.3, 0.45, 12)
     for angle, masses in ((0.0, (1.0, 2.0)), (0.5 * np.pi, (1.0, 2.0))):
         y = tilted(np.full((4, 12), angle), height)
-        bell = dumb_bell(masses, floor=sw.Floor(e))
+        bell = dumb_bell(masses, floor=sw.Floor(restitution=e))
         given: dict[str, Any] = {"dt": 1 / 60, "steps": 40, "every": 1, "backend": backend}
         run = sw.integrate(bell, method, v=0.0, y=y, **given, control=RESETTING)
-        ball = sw.Particles(gravity=G, floor=sw.Floor(e), dim=2)
+        ball = sw.Particles(gravity=G, floor=sw.Floor(restitution=e), dim=2)
         one = sw.integrate(ball, method, v=0.0, y=y[:1], **given)
         # cos(½π) is not 0 but 6e-17, so the lying one turns by that.
         bound = len(run.t) * ROUNDING * 10.0
@@ -63,7 +63,7 @@ def strikes(method: str, backend: str = "rust") -> None:
     h, angle, phase = 1e-7, np.linspace(-1.4, 1.4, 15), np.linspace(0.05, 1.0, 6)[:, np.newaxis]
     for (m, other), e, mu, along in itertools.product([(1.0, 1.0), (0.5, 2.0)], [1.0, 0.5, 0.0], [None, 0.2, 2.0], [0.0, -0.7]):
         u = 1.3
-        bell = dumb_bell((m, other), gravity=0.0, floor=sw.Floor(e, mu))
+        bell = dumb_bell((m, other), gravity=0.0, floor=sw.Floor(restitution=e, friction=mu))
         v0 = np.array([[along, -u], [along, -u]])
         y = tilted(np.broadcast_to(angle, (6, 15)), phase * h * u)
         run = sw.integrate(bell, method, v=v0, y=y, dt=h, steps=1, backend=backend, control=RESETTING)
@@ -121,7 +121,7 @@ def impulses_by_enumeration(yields: Any, gains: Any) -> Any:
 def strikes_together(method: str, backend: str = "rust") -> None:
     """Points that hit surfaces at once, on rods that couple them: against equations solved by dense matrices, without gravity."""
     h, rng = 1e-8, np.random.default_rng(5)
-    floor, wall = sw.Floor(0.6), sw.Floor(0.6, normal=(1.0, 0.0))
+    floor, wall = sw.Floor(restitution=0.6), sw.Floor(restitution=0.6, normal=(1.0, 0.0))
     corner = np.array([[0.0, 0.8], [0.6, 0.0]])
     places = {
         "ladder": ([(0, 1)], corner, [floor, wall], [(1, [0.0, 1.0]), (0, [1.0, 0.0])]),
@@ -178,7 +178,7 @@ def returns_from_a_wall(method: str, backend: str = "rust") -> None:
     """A pendulum that meets a wall below its anchor at the speed u leaves with e·u, so it rises to e² of its height."""
     e = np.array([1.0, 0.7, 0.3, 0.0])
     h, start = 0.004, np.array([np.sin(1.0), 0.0, -np.cos(1.0)])
-    pendulum = sw.Pendulum3D(1.0, G, floor=sw.Floor(e, normal=(1.0, 0.0, 0.0)))
+    pendulum = sw.Pendulum3D(1.0, G, floor=sw.Floor(restitution=e, normal=(1.0, 0.0, 0.0)))
     v = np.zeros((3, 4))
     run = sw.integrate(
         pendulum, method, v=v, y=start[:, np.newaxis] + v, dt=h, steps=350, every=1, backend=backend, control=RESETTING
@@ -215,7 +215,7 @@ def adds_no_energy(method: str, backend: str = "rust", control: Any = RESETTING,
     v[1] = v[0] + turning * across
     y = tilted(angle, phase * h * (u + 0.5 * h * gravity))
     given: dict[str, Any] = {"dt": h, "backend": backend, "control": control}
-    floor = sw.Floor(e, friction)
+    floor = sw.Floor(restitution=e, friction=friction)
     run = sw.integrate(dumb_bell(masses, gravity, floor=floor), method, v=v, y=y, steps=3, every=1, **given)
     met = 0
     for k in range(3):
@@ -239,8 +239,10 @@ def topples(method: str, backend: str = "rust") -> None:
     """
     h, steps = 1 / 240, 140
     given: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": steps, "every": 1, "backend": backend}
-    smooth = sw.integrate(dumb_bell(floor=sw.Floor(0.0)), method, **given, control=RESETTING)
-    rough = sw.integrate(dumb_bell((20.0, 1.0), floor=sw.Floor(0.0, 5.0)), method, **given, control=RESETTING)
+    smooth = sw.integrate(dumb_bell(floor=sw.Floor(restitution=0.0)), method, **given, control=RESETTING)
+    rough = sw.integrate(
+        dumb_bell((20.0, 1.0), floor=sw.Floor(restitution=0.0, friction=5.0)), method, **given, control=RESETTING
+    )
     leaves = method in ("standard_euler", "damped_euler")
     first = h * np.sqrt(2.0 * G)
     for run, slides in ((smooth, True), (rough, False)):
@@ -267,7 +269,7 @@ def slides_to_rest(method: str, backend: str = "rust") -> None:
     v[:, 0] = v0
     y = tilted(np.full(3, 0.5 * np.pi))
     y[:, 1] = 0.0
-    bell = dumb_bell((1.0, 2.0), floor=sw.Floor(0.3, mu))
+    bell = dumb_bell((1.0, 2.0), floor=sw.Floor(restitution=0.3, friction=mu))
     run = sw.integrate(bell, method, v=v, y=y, dt=h, steps=150, every=1, backend=backend, control=RESETTING)
     way = run.y[-1, 0, 0]
     assert np.abs(way - v0 * v0 / (2.0 * mu * G)).max() <= 0.5 * (mu * G * h * h).max() + h * h * G  # and the lag of a method
@@ -278,7 +280,7 @@ def slides_to_rest(method: str, backend: str = "rust") -> None:
 def comes_to_rest(method: str, backend: str = "rust") -> None:
     """From a drop at an angle, lying and then at rest: velocities of 0, and not a bit of the places changes."""
     angle = np.array([0.2, 0.9, 1.4, -0.6])
-    bell = dumb_bell((1.0, 2.0), floor=sw.Floor(np.array([0.0, 0.5, 0.3, 0.2]), 0.4))
+    bell = dumb_bell((1.0, 2.0), floor=sw.Floor(restitution=np.array([0.0, 0.5, 0.3, 0.2]), friction=0.4))
     run = sw.integrate(
         bell, method, v=0.0, y=tilted(angle, 0.2), dt=1 / 120, steps=360, every=1, backend=backend, control=RESETTING
     )

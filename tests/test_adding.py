@@ -93,6 +93,8 @@ def test_the_suite_tests_the_method(tree: Path) -> None:
     """Order, stability, matrix form, world, bits: by iterating over the catalogue. Graphs are of all methods at once."""
     assert suite(tree, "midpoint", "orders", "stability", "world", "matrix") > 80
     assert suite(tree, "midpoint and reference", "bits") > 4
+    assert suite(tree, "midpoint", "package", "quaternion_norm", "stability_series", "friction", "truth") > 25
+    assert suite(tree, "the_title_of_the_figures", "looks") == 1
     assert suite(tree, "test_a_step", "graphs") > 60
 
 

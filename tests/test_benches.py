@@ -6,8 +6,10 @@ import functools
 import re
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benches.compare import machine, peers, report, runner, workloads  # noqa: E402
+from benches.compare.chosen import solar  # noqa: E402
 from benches.compare.own import first_call, tolerance  # noqa: E402
 from benches.compare.own.equations import EQUATIONS, Equation  # noqa: E402
 from benches.compare.peers import (  # noqa: E402
@@ -225,3 +228,25 @@ def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
         "## W1: old\n\n| 3 |\n\n## W2: kept\n\n| 2 |\n\n## W3: new\n\n| 4 |\n"
     )
     assert report.renewed(told, now, "W1,W3") == told
+
+
+def test_who_does_not_end_is_ended_and_told() -> None:
+    """A hundred million years take hours; a process of its own has some seconds, most of which its imports may need."""
+    begin = time.perf_counter()
+    found = solar.measured("stepwell taylor", (10.0, 1e8), 10.0)
+    assert time.perf_counter() - begin < 20.0
+    assert found is not None
+    assert len(found) <= 1
+    _, head, lines = solar.table((1.0, 1e8), 5.0)
+    row = next(line for line in lines if line[0] == "stepwell taylor")
+    assert row[-2:] == ["—", "not in 5 s"]
+    assert len(row) == len(head)
+
+
+def test_who_is_not_installed_has_no_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what fails is no missing row."""
+    monkeypatch.setattr(solar, "contestants", lambda: {"heyoka": None, "nobody": None})
+    if find_spec("heyoka") is None:
+        assert solar.measured("heyoka", (1.0,), 60.0) is None
+    with pytest.raises(RuntimeError, match="nobody"):
+        solar.measured("nobody", (1.0,), 60.0)

@@ -62,7 +62,7 @@ def ratio(one: Any, other: Any, floor: float) -> float:
     return best[0] / best[1]
 
 
-@pytest.mark.skipif(sw.isa() == "baseline", reason="everything is interpreted")
+@pytest.mark.skipif(sw.isa() == "interpret", reason="everything is interpreted")
 @pytest.mark.parametrize("name", CASES)
 def test_machine_code_is_what_runs(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     level = sw.isa()
@@ -74,7 +74,7 @@ def test_machine_code_is_what_runs(monkeypatch: pytest.MonkeyPatch, name: str) -
     assert got >= floor, f"machine code ({level}) is {got:.1f} times as fast as the interpreter, expected {floor}"
 
 
-@pytest.mark.skipif(sw.isa() == "baseline", reason="everything is interpreted")
+@pytest.mark.skipif(sw.isa() == "interpret", reason="everything is interpreted")
 def test_chosen_steps_are_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
     def attempts(kernels: str) -> float:
         monkeypatch.setenv("STEPWELL_KERNELS", kernels)

@@ -222,7 +222,8 @@ def test_methods_are_told_apart_without_colour():
     looks = [style.look(method) for method in METHODS]
     assert len({look["marker"] for look in looks}) == len(METHODS)
     assert {look["color"] for look in looks} == set(style.FAMILIES.values())
-    assert len({str(look["linestyle"]) for look in looks}) == len({method.order for method in METHODS})
+    orders = {method.order for method in METHODS if method.order in {1, 2, 3, 4, 5, 8}}  # others are drawn solid
+    assert len({str(look["linestyle"]) for look in looks}) == len(orders)
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda s: s.name)

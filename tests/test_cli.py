@@ -621,3 +621,30 @@ def test_a_long_message_is_wrapped_between_words(capsys, monkeypatch):
     assert len(lines) > 3
     assert max(map(len, lines)) <= 60
     assert " ".join(lines) == whole.strip()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("advise", "oscillator", "--frame", "1e-12"),
+        ("advise", "oscillator", "--frame", "1e-12", "-o", "advice.json"),
+        ("run", "plummer:n=100000000000", "--method", "rk4", "--steps", "1"),
+        ("run", "chain:n=100000000000", "--method", "rk4", "--steps", "1"),
+    ],
+)
+def test_what_memory_has_no_room_for_ends_with_2(words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "2000")
+    code, out, err = told(capsys, *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("stepwell: ")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_memory_that_runs_out_is_told_in_words(capsys, monkeypatch):
+    def full(args):
+        raise MemoryError
+
+    monkeypatch.setattr(cli.methods, "command", full)
+    assert told(capsys, "methods") == (2, "", "stepwell: there is not enough memory for this\n")

@@ -124,8 +124,8 @@ def test_mirroring_adds_energy() -> None:
 
 def test_turning_alone_lets_a_ball_sink() -> None:
     """With e < 1 the ways "restitution" and "flip" know no rest: a point that turns below the floor falls on."""
-    assert dropped(sw.Floor(0.5, way="restitution"), "leapfrog").y[-1, 0, 1] < -0.01
-    assert dropped(sw.Floor(0.5), "leapfrog").y[-1, 0, 1] == 0.0
+    assert dropped(sw.Floor(restitution=0.5, way="restitution"), "leapfrog").y[-1, 0, 1] < -0.01
+    assert dropped(sw.Floor(restitution=0.5), "leapfrog").y[-1, 0, 1] == 0.0
 
 
 @pytest.mark.parametrize("method", ["leapfrog", "rk4"])
@@ -161,7 +161,7 @@ def test_members_do_not_touch_each_other(method: str) -> None:
     e, offset = rng.uniform(0.3, 1.0, 9), rng.uniform(-0.5, 0.0, 9)
 
     def run(pick: Any, **options: Any) -> sw.Run:
-        floor = [sw.Floor(e[pick], offset=offset[pick]), sw.Floor(normal=(1.0, 0.2), offset=-2.0)]
+        floor = [sw.Floor(restitution=e[pick], offset=offset[pick]), sw.Floor(normal=(1.0, 0.2), offset=-2.0)]
         ball = sw.Particles([1.0, 2.0], floor=floor)
         return sw.integrate(ball, method, v=v[..., pick], y=y[..., pick], dt=0.02, steps=200, every=1, **options)
 
@@ -178,7 +178,7 @@ def test_a_large_system_a_world_and_a_run_in_pieces(method: str, n: int) -> None
     rng = np.random.default_rng(n)
     v, y = rng.normal(size=(n, 2)), rng.normal(size=(n, 2))
     floor = [
-        sw.Floor(0.9, 0.1, offset=-1.0),
+        sw.Floor(restitution=0.9, friction=0.1, offset=-1.0),
         sw.Sphere((0.0, 0.0), 3.0, inside=True),
         sw.Floor(offset=-0.9, way="spring", omega=9.0),
     ]
@@ -208,15 +208,20 @@ def test_many_particles_are_stepped_as_few() -> None:
     rng = np.random.default_rng(4)
     v, y = rng.normal(size=(1500, 2)), rng.uniform(0.0, 1.0, (1500, 2))
     for method in ("leapfrog", "rk4"):
-        many = sw.integrate(sw.Particles(floor=sw.Floor(0.7, 0.2)), method, v=v, y=y, dt=0.02, steps=60)
+        many = sw.integrate(sw.Particles(floor=sw.Floor(restitution=0.7, friction=0.2)), method, v=v, y=y, dt=0.02, steps=60)
         few = sw.integrate(
-            sw.Particles(floor=sw.Floor(0.7, 0.2)), method, v=v.T[np.newaxis], y=y.T[np.newaxis], dt=0.02, steps=60
+            sw.Particles(floor=sw.Floor(restitution=0.7, friction=0.2)),
+            method,
+            v=v.T[np.newaxis],
+            y=y.T[np.newaxis],
+            dt=0.02,
+            steps=60,
         )
         assert np.array_equal(many.y[-1], few.y[-1, 0].T)
 
 
 def test_a_point_that_is_not_finite_stays_so() -> None:
-    floor = [sw.Floor(0.5, 0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)]
+    floor = [sw.Floor(restitution=0.5, friction=0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)]
     for start in ([[np.inf, 1.0]], [[0.0, -1e308]]):
         with pytest.warns(sw.DivergenceWarning):
             run = sw.integrate(
@@ -237,7 +242,7 @@ def test_what_does_not_go_together_is_refused() -> None:
     with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
         sw.integrate(sw.NBody(floor=sw.Floor()), "rk4", v=0.0, y=np.eye(3)[:, :2], dt=0.1, steps=1, control=sw.Projection())
     with pytest.raises(ArgumentError, match=r"restitution: expected numbers of 0 to 1, got 1.5"):
-        sw.Floor(1.5)
+        sw.Floor(restitution=1.5)
     with pytest.raises(ArgumentError, match="omega: expected the frequency of the spring, got None"):
         sw.Floor(way="spring")
     with pytest.raises(ArgumentError, match='omega: goes with way="spring" only'):
@@ -245,7 +250,7 @@ def test_what_does_not_go_together_is_refused() -> None:
     with pytest.raises(ArgumentError, match="friction: goes with ways other than"):
         sw.Floor(friction=0.1, way="spring", omega=1.0)
     with pytest.raises(ArgumentError, match="restitution: goes with"):
-        sw.Floor(0.5, way="flip")
+        sw.Floor(restitution=0.5, way="flip")
     with pytest.raises(ArgumentError, match="normal: expected a vector with a direction"):
         sw.Floor(normal=(0.0, 0.0))
     with pytest.raises(ShapeError, match=r"floor 1 3: expected vectors of 2 components"):

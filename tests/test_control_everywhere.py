@@ -13,6 +13,7 @@ import stepwell as sw
 from cases import assert_same
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.reference import adaptive
+from stepwell.reference.acceptance import Acceptance
 
 ABLE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]  # a series is not pushed within a step
 CONTROLS: dict[str, Any] = {
@@ -143,7 +144,7 @@ def test_a_constraint_of_its_own_is_kept_by_the_same_projection() -> None:
     tried = 0
     while pace.t < 9.0:
         before = y
-        pace, v, y = adaptive.attempt(merson, system, 5, (1, 1), pace, 1000, v, y)
+        pace, v, y = adaptive.attempt(merson, system, 5, (1, 1), Acceptance(), pace, 1000, v, y)
         tried += 1
         assert np.hypot(*y) == pytest.approx(1.0, abs=1e-15)
         assert v @ y == pytest.approx(0.0, abs=1e-15)
@@ -241,3 +242,46 @@ def test_what_is_refused_names_what_to_do() -> None:
     assert np.ptp(run.energy) < 1e-9
     with pytest.raises(ArgumentError, match="control"):
         sw.integrate(own.pendulum(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0], control=sw.Projection("momentum"))
+
+
+# ---- at rest
+
+
+def _one_place(n: int) -> tuple[sw.NBody, dict[str, Any]]:
+    return sw.NBody(np.ones(n), force="newton", softening=0.1), {"v": np.zeros((n, 2)), "y": np.ones((n, 2))}
+
+
+AT_REST: dict[str, tuple[Any, dict[str, Any], str]] = {
+    "own pendulum": (own.pendulum(), {"v": 0.0, "y": 0.0}, "energy"),
+    "aircraft": (sw.Aircraft(), {"v": np.zeros(3), "y": np.zeros(3)}, "energy"),
+    "springs": (sw.Springs([(0, 1)], rest=1.0), {"v": np.zeros((2, 2)), "y": np.array([[0.0, 0.0], [1.0, 0.0]])}, "nacozy"),
+    "bodies, scaled": (*_one_place(3), "scaling"),
+    "bodies": (*_one_place(3), "nacozy"),
+    "bodies, row by row, scaled": (*_one_place(40), "scaling"),
+    "bodies, row by row": (*_one_place(40), "nacozy"),
+}
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+@pytest.mark.parametrize("case", AT_REST)
+def test_a_projection_leaves_a_state_at_rest_as_it_is(case: str, fixed: bool) -> None:
+    """No velocity to scale and no gradient to go along: 0/0. Nothing is added, also where the target is out of reach."""
+    system, start, way = AT_REST[case]
+    ask: dict[str, Any] = {"dt": 0.1, "steps": 20} if fixed else {"tolerance": 1e-5, "at": [1.0, 2.0]}
+    reach = float(np.asarray(sw.integrate(system, "rk4", **start, dt=0.1, steps=1, control=sw.Projection(way)).energy)[-1])
+    for target in (None, reach + 1.0):
+        control = sw.Projection(way, target=target)
+        for backend in ("rust", "numpy"):
+            run = sw.integrate(system, "rk4" if fixed else "merson", **start, **ask, control=control, backend=backend)
+            assert not np.any(run.status)
+            np.testing.assert_array_equal(run.y[-1], start["y"])
+            np.testing.assert_array_equal(run.v[-1], start["v"])
+            assert run.work == 0.0
+
+
+def test_members_at_rest_leave_the_others_as_they_are() -> None:
+    options: dict[str, Any] = {"dt": 0.1, "steps": 50, "control": sw.Projection("energy")}
+    alone = sw.integrate(own.pendulum(), "false_heun", v=0.0, y=1.0, **options)
+    both = sw.integrate(own.pendulum(), "false_heun", v=0.0, y=[0.0, 1.0], **options)
+    assert both.y[-1, 0] == 0.0
+    assert both.y[-1, 1] == alone.y[-1]

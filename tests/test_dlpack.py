@@ -45,9 +45,12 @@ def test_they_are_taken_as_numpys() -> None:
     assert single.y == pytest.approx(plain.y, abs=2.0**-23)
 
 
-def test_parameters_are_not_copied() -> None:
+def test_parameters_are_copied() -> None:
+    """Their owner may go on to write into them."""
     omega = np.linspace(0.5, 2.0, 50)
-    assert np.shares_memory(sw.Oscillator(Tensor(omega)).omega, omega)
+    system = sw.Oscillator(Tensor(omega))
+    omega[:] = np.nan
+    np.testing.assert_array_equal(system.omega, np.linspace(0.5, 2.0, 50))
 
 
 def test_a_world_steps_them_in_place() -> None:
@@ -126,3 +129,67 @@ def test_pytorch_in_and_out() -> None:
     assert torch.equal(y, torch.from_dlpack(run.y)[-1])
     with pytest.raises(DTypeError, match="without gradients"):
         sw.Oscillator(omega.requires_grad_())
+
+
+class WithGradient(Tensor):
+    """One that a gradient is computed through: neither DLPack nor NumPy may read it, and its parts are like it."""
+
+    def __dlpack__(self, **options: Any) -> Any:
+        raise BufferError("Can't export tensors that require gradient, use tensor.detach()")
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+
+    def __len__(self) -> int:
+        return len(self.array)
+
+    def __getitem__(self, index: Any) -> WithGradient:
+        return WithGradient(self.array[index])
+
+    def __float__(self) -> float:
+        return float(self.array)
+
+
+ONE = WithGradient(np.array(0.5))
+SEVERAL = WithGradient(np.array([0.5, 1.0]))
+
+
+#: A list of tolerances is not here: it is refused before it is looked at, since it might mean a pair or members.
+@pytest.mark.parametrize("value", [ONE, SEVERAL, (ONE, ONE), [SEVERAL]], ids=["0 axes", "1 axis", "two", "a row"])
+@pytest.mark.parametrize("argument", ["v", "y", "dt", "t0", "force", "carry", "at", "omega"])
+def test_those_with_a_gradient_are_refused(argument: str, value: Any) -> None:
+    with pytest.raises(DTypeError, match=rf"^{argument}.*: expected .*without gradients.*\.detach\(\)"):
+        _run(**{argument: value})
+
+
+@pytest.mark.parametrize("value", [ONE, SEVERAL, (ONE, ONE)], ids=["0 axes", "1 axis", "two"])
+def test_tolerances_with_a_gradient_are_refused(value: Any) -> None:
+    with pytest.raises(DTypeError, match=r"^tolerance.*: expected .*without gradients"):
+        _run(tolerance=value)
+
+
+def _run(omega: Any = 1.0, **options: Any) -> None:
+    """With fixed or adaptive steps, as the options need."""
+    paced = "at" in options or "tolerance" in options
+    method = "dop853" if paced else "verlet" if "carry" in options else "rk4"
+    given: dict[str, Any] = {"tolerance": 1e-6, "at": [1.0]} if paced else {"dt": 0.1, "steps": 3}
+    sw.integrate(sw.Oscillator(omega), method, **{"v": 0.0, "y": 1.0} | given | options)
+
+
+@pytest.mark.parametrize(
+    ("argument", "use"),
+    [
+        ("axes: omega", lambda: sw.sweep(sw.Oscillator, {"omega": ("omega", [ONE])}, "rk4", v=0.0, y=1.0, dt=0.1, steps=2)),
+        ("force", lambda: sw.World(sw.Oscillator(), "rk4", v=np.zeros(2), y=np.ones(2), dt=0.1, force=SEVERAL)),
+        ("pairs", lambda: sw.Springs([ONE, ONE], rest=1.0)),
+        ("fixed", lambda: sw.Springs([(0, 1)], rest=1.0, fixed=ONE)),
+        ("y0", lambda: sw.solve_ivp(lambda t, y: -y, (0.0, 1.0), [ONE])),
+        (
+            "coords",
+            lambda: sw.integrate(sw.Oscillator([1.0]), "rk4", v=0.0, y=1.0, dt=0.1, steps=1).to_xarray(coords={"x": [ONE]}),
+        ),
+    ],
+)
+def test_so_they_are_elsewhere(argument: str, use: Any) -> None:
+    with pytest.raises(ArgumentError, match=argument):
+        use()

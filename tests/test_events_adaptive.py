@@ -91,7 +91,7 @@ def test_a_trial_is_the_state_that_is_saved_within_a_step(method: str, name: str
     system = SYSTEMS[name](rng, 4)
     v, y = 0.3 * rng.normal(size=(*system.v_shape, 4)), rng.normal(size=(*system.y_shape, 4))
     plan = engine.Plan(system, how, (4,), 1.0, order=10 if how.has_series else 0)
-    paces = engine.paces(plan, None, np.array(1e-6), None)
+    paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-6), None))
     out = attempts.attempted(plan, np.inf, 12, 1000, True, paces, v, y)
     trials, who = AdaptiveTrials(plan, Members(plan)), np.arange(4)
     h = out.lengths(plan)[10]
@@ -323,7 +323,7 @@ def test_progress_and_values(tmp_path: Path) -> None:
     told: list[float] = []
     plan = engine.Plan(sw.Pendulum(), sw.method("merson"), (), 1.0, progress=told.append)
     run = adaptive.AdaptiveRun([sw.Event(crossing)])
-    paces = engine.paces(plan, None, np.array(1e-9), None)
+    paces = engine.paces(plan, None, engine.Tolerances(np.array(1e-9), None))
     run.adapt(plan, engine.Pacing(np.array([100.0]), 10**6, True), paces, np.array(0.0), np.array(1.0))
     assert told == sorted(told)
     assert len(told) > 3

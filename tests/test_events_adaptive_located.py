@@ -121,7 +121,7 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
             self.far = self.end
 
         def _look(self, *given: Any) -> Any:
-            self.end = np.inf
+            self.end = np.full_like(self.far, np.inf)
             try:
                 return super()._look(*given)
             finally:

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.events import collected, driver
+from stepwell.events import collected
 from stepwell.events.trials import Trials
 from stepwell.reference import events
 
@@ -25,10 +25,11 @@ def found(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
     def trial(which: Any, share: Any) -> Any:
         nonlocal trials
         trials += 1
+        assert trials < 10_000  # of a search that does not end
         return g(share), share[np.newaxis], -share[np.newaxis]
 
     ends = np.zeros(n), np.ones(n)
-    share, v, y = events.located(trial, g(ends[0]), g(ends[1]), *(np.ones((1, n)), -np.ones((1, n))), np.full(n, events.SHARE))
+    share, v, y = events.located(trial, *ends, g(ends[0]), g(ends[1]), np.ones((1, n)), -np.ones((1, n)))
     np.testing.assert_array_equal(v[0], share)  # the state is that of the share
     np.testing.assert_array_equal(y[0], -share)
     return share, trials
@@ -49,11 +50,27 @@ HARD: dict[str, Callable[[Any], Any]] = {
 @pytest.mark.parametrize("g", HARD.values(), ids=HARD)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_no_function_takes_more_trials_than_bisection_and_one(g: Callable[[Any], Any]) -> None:
-    """Bisection of 1 down to 2⁻⁴⁸ takes 48. What is returned is at or past the zero, by no more than the width."""
+    """Bisection of 1 down to 2⁻⁴⁸ takes 48, and from there to 2⁻⁵²·0.3 another 6. The first round may be one trial behind it, and
+    a later one two, since it reckons in powers of two. Ends of brackets are floating-point numbers: half of three spacings is two
+    of them, which takes one more. What is returned is at or past the zero, by no more than the roundings of 0.3.
+    """
     (share,), trials = found(g)
-    assert trials <= 49
+    assert trials <= (48 + 1) + (6 + 2) + 1
     # (s − 0.3)⁹ is 0 in floating point where it underflows, |s − 0.3| < 10⁻³⁶: not beside 0.3, whose neighbours are 5·10⁻¹⁷ away.
-    assert 0.3 - U <= share <= 0.3 + events.SHARE + U
+    assert 0.3 - U <= share <= 0.3 * (1.0 + events.SPACING) + U
+
+
+@pytest.mark.parametrize("root", [1e-3, 1e-9, 1e-20, 1e-100, 1e-250])
+def test_a_change_near_the_start_of_a_step_is_located_to_its_own_roundings(root: float) -> None:
+    """However short a part of the step it is: a bracket that is a share of the whole step would have no digit of it. Bisection
+    takes log₂(1/root) + 52 trials, and two more in each round of 48 halvings.
+    """
+    (share,), trials = found(lambda s: s - root)
+    assert root <= share <= root * (1.0 + 2.0 * events.SPACING)
+    (share,), all_trials = found(lambda s: np.where(s < root, -1.0, 1.0))
+    assert root <= share <= root * (1.0 + 2.0 * events.SPACING)
+    halvings = np.log2(1.0 / root) + 53
+    assert trials <= all_trials <= halvings + 2 * np.ceil(halvings / 48)
 
 
 def test_smooth_functions_take_few_trials_and_members_do_not_matter() -> None:
@@ -70,11 +87,10 @@ def test_smooth_functions_take_few_trials_and_members_do_not_matter() -> None:
         trials += len(which)
         return g(share, roots[which]), share[np.newaxis], share[np.newaxis]
 
-    one = np.ones((1, len(roots)))
-    width = np.full(len(roots), events.SHARE)
-    share = events.located(trial, g(np.zeros(97)), g(np.ones(97)), one, one, width)[0]
+    one, ends = np.ones((1, len(roots))), (np.zeros(97), np.ones(97))
+    share = events.located(trial, *ends, g(ends[0]), g(ends[1]), one, one)[0]
     assert trials <= 10 * len(roots)
-    assert (np.abs(share - roots) <= events.SHARE + 2 * U).all()
+    assert (np.abs(share - roots) <= 2.0 * events.SPACING * roots).all()
     for i in (0, 50, 96):
         (alone,), _ = found(lambda s, i=i: g(s, roots[i]))
         assert alone == share[i]
@@ -107,7 +123,7 @@ def test_the_place_is_that_of_a_step_of_the_method_from_the_start_of_its_step(me
         share = mpmath.findroot(lambda s: (step(mpmath.mpc(0, -s * mpmath.mpf(h))) * z).real, (0.0, 1.0), solver="anderson")
         t = k * mpmath.mpf(h) + share * mpmath.mpf(h)
         there = step(mpmath.mpc(0, -share * mpmath.mpf(h))) * z
-        bound = 67 * U * (k + 1) + events.SHARE * h + 4 * U * float(t)
+        bound = 67 * U * (k + 1) + events.SPACING * h + 4 * U * float(t)
         assert abs(float(mpmath.mpf(float(place.t[0])) - t)) <= bound
         assert abs(place.v[0] - float(there.imag)) <= bound
     assert -2 * bound <= place.y[0] <= 2 * bound
@@ -202,19 +218,132 @@ def test_bounces() -> None:
     assert error_of_bounces("rk4", dt=0.01, steps=400) < 1000 * 4 * U
 
 
+# ---- more than one in a step
+
+
+@sw.system(order=1)
+def integrated(t: Any, y: Any, *, a: float = 0.0, b: float = 0.0, c: float = 0.0) -> Any:
+    """ẏ = p'(t) for the polynomial p with these roots, so that y = p(t)."""
+    return (t - a) * (t - b) + (t - a) * (t - c) + (t - b) * (t - c)
+
+
+def there(t: Any, y: Any) -> Any:
+    return y
+
+
+def roots_by(method: str, roots: Any, begin: float, **steps: Any) -> Any:
+    """Where y is zero, from a time before."""
+    y = float(np.prod(begin - np.array(roots)))
+    run = sw.integrate(integrated(a=roots[0], b=roots[1], c=roots[2]), method, y=y, t0=begin, events=there, **steps)
+    return run.events["there"].t
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.error_order is not None])
+def test_two_changes_of_sign_in_an_adaptive_step_are_found(method: str, tolerance: float) -> None:
+    """A method of third order or more makes no error in a cubic, so that its steps grow as long as they may: of twelve cubics the
+    changes of sign come in pairs in one step, at any place of it.
+
+    Bound: y is off by the roundings of a hundred numbers up to 8.4³ < 600, and moves by 0.02² a unit of time or more at its
+    zeros, which are 0.02 apart or more.
+    """
+    random = np.random.default_rng(5)
+    for _ in range(12):
+        roots = np.cumsum(0.02 + 0.1 * random.random(3))
+        found = roots_by(method, roots, -8.0, tolerance=tolerance, at=[8.0])
+        np.testing.assert_allclose(found, roots, rtol=0, atol=100 * 600 * U / 0.02**2)
+
+
+@pytest.mark.parametrize("method", [m.name for m in sw.methods() if m.order >= 3 and not m.needs_acceleration])
+@pytest.mark.parametrize("dt", [0.7, 3.0, 6.0, 12.0])
+def test_two_changes_of_sign_in_a_step_of_fixed_length_are_found(method: str, dt: float) -> None:
+    """ẏ = 3t² + 12t − 4 from y(−8) = −120 on; with steps of 6 and 12 a zero is at an end of a step, or all are in one."""
+    found = roots_by(method, [-6.0, -2.0, 2.0], -8.0, dt=dt, steps=int(np.ceil(12.0 / dt)))
+    np.testing.assert_allclose(found, [-6.0, -2.0, 2.0], rtol=0, atol=1e-12)
+
+
+def test_the_core_notices_a_step_there_and_back() -> None:
+    """Of a hundred members, each of which is below zero for a hundredth of a step: found as by looking at every state.
+
+    y = (t − a)² − b² has its zeros at a ± b; Heun's method makes no error in it.
+    """
+
+    @sw.system(order=1)
+    def valley(t: Any, y: Any, *, a: float = 0.0) -> Any:
+        return 2.0 * (t - a)
+
+    a, b = np.linspace(3.0, 8.0, 100), 5e-4
+    run = sw.integrate(valley(a=a), "standard_heun", y=a * a - b * b, dt=0.1, steps=100, events=there)
+    assert (run.events["there"].count == 2).all()
+    # y is off by the roundings of a hundred numbers up to 64, and moves at 2b = 1e-3.
+    bound = 100 * 64 * U / 1e-3
+    np.testing.assert_allclose(run.events["there"].t.reshape(-1, 2), np.stack([a - b, a + b], -1), rtol=0, atol=bound)
+
+
+def test_a_touch_without_a_change_of_sign_is_no_event() -> None:
+    """y = (t − 1)² + c for c = 10⁻⁶ and 0, seen by steps of 0.3; of the second only roundings could be found, and none of another
+    size.
+    """
+    above = sw.integrate(parabola(), "rk4", y=1.0 + 1e-6, dt=0.3, steps=8, events=there)
+    assert above.events["there"].count == 0
+    touches = sw.integrate(parabola(), "rk4", y=1.0, dt=0.3, steps=8, events=there).events["there"]
+    assert (np.abs(touches.y) < 10 * U).all()
+    assert (np.abs(touches.t - 1.0) < 10 * U**0.5).all()
+
+
+@sw.system(order=1)
+def parabola(t: Any, y: Any) -> Any:
+    return 2.0 * (t - 1.0)
+
+
+def test_mistake_a_step_whose_ends_have_one_sign_is_not_looked_into(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "bends", lambda parts: np.zeros(len(parts.of), dtype=bool))
+    with pytest.raises(AssertionError):
+        test_two_changes_of_sign_in_an_adaptive_step_are_found("merson", 1e-3)
+    with pytest.raises(AssertionError):
+        test_the_core_notices_a_step_there_and_back()
+
+
+# ---- whatever the units are
+
+
+@pytest.mark.parametrize("steps", [{"dt": 1.0, "steps": 3}, {"dt": 1e-3, "steps": 3000}, {"tolerance": 1e-9, "at": [3.0]}])
+@pytest.mark.parametrize("unit", [1e-100, 1e-13, 1.0, 1e9])
+@pytest.mark.parametrize("length", [1.0, 1e-20, 1e-100])
+def test_a_way_from_rest_takes_its_time_in_any_unit(unit: float, steps: dict[str, Any], length: float) -> None:
+    """y = t²/2 in some unit of time is at a length after √(2·length), also where that is a tiny share of the first step.
+
+    RK4 and Merson are exact for a parabola from rest: y is off by some ten roundings of itself in the step of the event, and by
+    the roundings of the steps before it, of numbers up to y: at most 3·k of them after k steps. Half of that counts for the time.
+    """
+
+    @sw.system
+    def from_rest(t: Any, v: Any, y: Any, *, a: float = 1.0) -> Any:
+        return a
+
+    ask = {name: (np.array(each) * unit if name in ("dt", "at") else each) for name, each in steps.items()}
+    there = sw.Event(lambda t, v, y: y - length, terminal=True, name="there")
+    system = from_rest(a=1.0 / unit / unit)
+    method = "rk4" if "dt" in ask else "merson"
+    run = sw.integrate(system, method, v=0.0, y=0.0, events=there, **ask)
+    right = (2.0 * length) ** 0.5 * unit
+    k = right / ask["dt"] if "dt" in ask else 1000.0
+    assert abs(float(run.stopped_at) / right - 1.0) < (20.0 + 3.0 * k) * U
+
+
 # ---- mistakes
 
 
-def straight(trial: Any, before: Any, after: Any, v: Any, y: Any, width: Any) -> Any:
+def straight(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y: Any) -> Any:
     """Mistake: by a straight line between both ends of the step."""
     share = before / (before - after)
     return (share, *trial(np.arange(len(before)), share)[1:])
 
 
-def low_end(trial: Any, before: Any, after: Any, v: Any, y: Any, width: Any) -> Any:
+def low_end(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y: Any) -> Any:
     """Mistake: the end of the bracket that is before the event."""
-    share, *_ = events.located(trial, before, after, v, y, width)
-    share = share - 2.0 * events.SHARE
+    share, *_ = events.located(trial, low, high, before, after, v, y)
+    share = share * (1.0 - 2.0 * events.SPACING)
     return (share, *trial(np.arange(len(before)), share)[1:])
 
 
@@ -253,7 +382,12 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
 def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     from test_events import test_a_state_at_zero_counts_once_and_not_at_the_start as check
 
-    monkeypatch.setattr(driver, "crosses", lambda a, b, _: ((a <= 0) & (b >= 0)) | ((a >= 0) & (b <= 0)))
+    def twice(look: Any, parts: Any) -> Any:
+        found, stuck = events.parted(look, parts)
+        begins = parts.some(parts.g_low == 0.0)
+        return events.joined([begins._replace(high=begins.low, g_low=-np.sign(begins.slope_low)), found]), stuck
+
+    monkeypatch.setattr(collected, "parted", twice)
     with pytest.raises(AssertionError):
         check()
 
@@ -261,8 +395,8 @@ def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.
 def test_mistake_a_secant_without_a_bound_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Regula falsi alone: one end of the bracket stays where it is."""
 
-    def secant(low: Any, high: Any, g_low: Any, g_high: Any, width: Any, done: int) -> Any:
-        return np.clip((g_high * low - g_low * high) / (g_high - g_low), low + 0.5 * width, high - 0.5 * width)
+    def secant(low: Any, high: Any, g_low: Any, g_high: Any, within: Any, unit: Any, left: Any) -> Any:
+        return np.clip((g_high * low - g_low * high) / (g_high - g_low), low + 0.5 * within, high - 0.5 * within)
 
     monkeypatch.setattr(events, "_next", secant)
     with pytest.raises(AssertionError):

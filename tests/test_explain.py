@@ -80,8 +80,14 @@ def test_who_has_what_in_common() -> None:
     driven = sw.Oscillator([1.0, 2.0], 0.1, a=sw.Sampled([1.0, 2.0], 0.5), form="physical")
     explained = sw.explain(driven, "damped_euler")
     assert [section.when for section in explained.sections if section.lines] == ["member", "step", "member step"]
-    assert lines(explained)[-3:] == ["in each step, for each member", "y' = y + h·v", "v' = v + (c2·y' − c1·v + h·a[s3])"]
-    assert "s1 = floor((t − a.start)/a.interval + 1e-06)" in lines(explained)
+    assert lines(explained)[-3:] == [
+        "in each step, for each member",
+        "y' = y + h·v",
+        "v' = v + (c2·y' − c1·v + h·(a[s12] + s9·(a[s6] − a[s12])))",
+    ]
+    # The sample at the start of the step, that at its end, and for how much of it the latter has been there.
+    assert "s10 = floor(1.0000000000000568·((t + s1 − a.start)/a.interval))" in lines(explained)
+    assert "s7  = (s3 − (a.start + a.interval·s6))/(s2 − s1)" in lines(explained)
 
 
 def test_bodies() -> None:
@@ -384,25 +390,27 @@ def test_every_listing_of_an_attempt_is_one(name: str, fused: bool, some: int | 
             "before": row(0.9, 0.6, 1.0),
             "most": row(5.0, 1.0, 5.0),
         }
-        | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0), "longest_v": row(0.1, 1.0, 0.0)}
+        | {"interval": row(9.0, 9.0, 0.1), "until": row(9.0, 9.0, 9.0)}
+        | {"most_step": row(9.0, 0.2, 9.0), "wall": row(9.0, 9.0, T + 0.01)}
     )
+    groups = engine.groups_of(engine.Plan(system, ABLE[0], (MEMBERS,), H))
+    pace = pace._replace(longest=np.array([row(0.1, 1.0, 0.0), row(0.3, 0.0, 0.2)][-groups:]), own=np.empty((0, MEMBERS)))
     for method in drawn(ABLE, some and some // 4, name, fused):
         plan = engine.Plan(system, method, (MEMBERS,), H, fused=fused)
         if _core.in_parts(engine.model(plan._replace(fused=False)), MEMBERS, attempts=True):
             continue  # it is not one tape
         explained = sw.explain(system, method, attempt=True, fused=fused)
         known, tables = leaves(plan)
-        rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace]
+        rows = [*v.reshape(-1, MEMBERS), *y.reshape(-1, MEMBERS), *pace.numbers]
         known |= dict(zip(listing.states(plan, True), rows, strict=True)) | {"max_steps": 9.0}
         after = state(explained, plan, evaluate(explained, known, tables))
         if fused:
             following, v1, y1 = evaluated_attempt(plan, 9)(pace, 9, v, y)
         else:
             s = adaptive.Attempted(system.scaled(1.0, system.batch))
-            axes = len(system.v_shape), len(system.y_shape)
             with np.errstate(all="ignore"):
-                following, v1, y1 = engine.attempts(method, s, axes)(pace, 9.0, v, y)
-        assert_computes(after, v1, y1, *following)
+                following, v1, y1 = engine.attempts(plan, s)(pace, 9.0, v, y)
+        assert_computes(after, v1, y1, *following.numbers)
         assert_counted(explained)
 
 
@@ -544,7 +552,7 @@ def test_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_interpreted_if_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STEPWELL_KERNELS", "interpret")
     explained = sw.explain(sw.Oscillator(), "false_euler")
-    assert (explained.level, explained.code) == ("baseline", None)
+    assert (explained.level, explained.code) == ("interpret", None)
     assert explained.interpreted_because is not None
     wanted = "STEPWELL_KERNELS" if len(sw.isa_levels()) > 1 else "this CPU"
     assert wanted in explained.interpreted_because

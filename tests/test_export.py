@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
 import sys
 import warnings
 from dataclasses import replace
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from abroad import C_FLAGS, RUST_FLAGS, Journey, executed, missing, run, same
+from abroad import C_FLAGS, PATIENCE, RUST_FLAGS, Journey, executed, missing, run, same
 from cases import SYSTEMS, number
 from stepwell import _core
 from stepwell.exports.functions import FUNCTIONS, argument
@@ -163,6 +164,152 @@ def test_every_bit_of_fused_steps(language: str, tmp_path: Path) -> None:
     plain = [Journey(e.system, e.method, e.v, e.y, 20, member=MEMBER, options=e.options | {"fused": False}) for e in every]
     assert sum(a.expected != b.expected for a, b in zip(every, plain, strict=True)) > len(every) // 2
     assert_same(every, run(language, every, tmp_path))
+
+
+# ---- what is computed only if something holds
+
+BALL: dict[str, Any] = {"v": [[0.5, 0.0]], "y": [[0.0, 1.0]], "dt": 1 / 60, "name": "ball"}
+
+
+def step_of(source: str) -> str:
+    """The step in the text of an export in C."""
+    return source[source.index("\nvoid ball_step(") :].partition("\n}\n")[0]
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "rk4", "false_euler"])
+@pytest.mark.parametrize("surface", [sw.Floor(restitution=0.8), sw.Floor(friction=0.3), sw.Sphere((0.0, -1.0), 1.0)])
+def test_a_contact_is_computed_where_a_point_meets_the_surface(method: str, surface: Any) -> None:
+    """In flight a step divides by nothing and takes no root; of a sphere it asks how far it is, and where the way would enter."""
+    step = step_of(sw.export(sw.Particles(floor=surface), method, "c", **BALL).source)
+    always = [line for line in step.splitlines() if re.match(r" {4}\S", line) and not line.lstrip().startswith("//")]
+    is_sphere = isinstance(surface, sw.Sphere)
+    assert sum(" / " in line for line in always) == is_sphere
+    assert sum("sqrt" in line for line in always) == 2 * is_sphere
+    assert step.count("sqrt") >= 1  # in a branch
+    assert "    if (" in step
+    assert "bits" not in sw.export(sw.Particles(floor=surface), method, "javascript", **BALL).source  # BigInts are slow
+
+
+def executed_lines(space: dict[str, Any], steps: int) -> list[int]:
+    """How many lines of Python each step runs."""
+    m = space["Ball"]()
+    s, counts = m.start([0.5, 0.0], [0.0, 1.0]), []
+
+    def trace(frame: Any, event: str, _: Any) -> Any:
+        counts[-1] += event == "line" and frame.f_code.co_name == "step"
+        return trace
+
+    for _ in range(steps):
+        counts.append(0)
+        sys.settrace(trace)
+        try:
+            m.step(s)
+        finally:
+            sys.settrace(None)
+    return counts
+
+
+def test_a_ball_in_flight_costs_little_more_than_without_a_floor() -> None:
+    """Beside its own lines the distance from the floor, whether it is met, and what v and y are if not."""
+    free: dict[str, Any] = {}
+    floored: dict[str, Any] = {}
+    exec(sw.export(sw.Particles(), "leapfrog", "python", **BALL).source, free)
+    exec(sw.export(sw.Particles(floor=sw.Floor()), "leapfrog", "python", **BALL).source, floored)
+    (alone,) = set(executed_lines(free, 60))
+    counts = executed_lines(floored, 60)
+    assert min(counts) <= alone + 12
+    assert counts.count(min(counts)) > 50  # the ball falls for 0.45 s, and then again for twice that
+    assert max(counts) > 2 * alone
+
+
+def random_rates(seed: int) -> Any:
+    """Rates with choices within choices, by conditions of several, that share values."""
+
+    def rates(t: Any, v: Any, y: Any) -> Any:
+        rng = np.random.default_rng(seed)
+        values, truths = [v, y, v * y, y * 0.5 + 0.25], [v < y, y < 0.3]
+        for _ in range(25):
+            a, b, c = (values[rng.integers(len(values))] for _ in range(3))
+            p, q = (truths[rng.integers(len(truths))] for _ in range(2))
+            match rng.integers(8):
+                case 0 | 1:
+                    values.append(np.sqrt(a * a + b * b + 0.125) / (1.0 + c * c))
+                case 2:
+                    values.append(np.where(p, a, b))
+                case 3:
+                    values.append(np.where(p & q, a / (1.0 + b * b), c))
+                case 4:
+                    values.append(np.where(p | q, np.abs(a), np.sin(b) * c))
+                case 5:
+                    truths.append(a < b)
+                case 6:
+                    truths.append(p & ~q)
+                case _:
+                    truths.append(p | (a <= c))
+        return sum(values[-4:]) * 0.25 - y
+
+    return sw.system(rates)()
+
+
+@languages
+def test_every_bit_of_choices_within_choices(language: str, tmp_path: Path) -> None:
+    every = [Journey(random_rates(seed), "rk4", 0.3, 0.7, steps=20) for seed in range(60 if language == "python" else 12)]
+    sources = [each.export(language, f"step_{i}").source for i, each in enumerate(every)]
+    assert sum(bool(re.search(r"^ +if ", source, re.MULTILINE)) for source in sources) > len(every) // 2
+    assert_same(every, run(language, every, tmp_path, sources))
+
+
+# ---- a force from outside
+
+
+@languages
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+def test_every_bit_of_steps_with_a_force(language: str, tmp_path: Path) -> None:
+    """By every method, of systems with and without surfaces, friction and fixed points, in both precisions."""
+    names = ["damped", "pendulum, damped", "particles, a floor", "springs: on a floor", "particles, round a ball", "chain of one"]
+    names += ["three bodies"]
+    every = []
+    for i, method in enumerate(METHODS):
+        name = next(each for each in names[i % len(names) :] + names if fits(SYSTEMS[each](np.random.default_rng(1), 1), method))
+        system = SYSTEMS[name](np.random.default_rng(i), 1)
+        rng = np.random.default_rng(i)
+        v, y, force = (0.5 * rng.normal(size=(*shape, 1)) for shape in (system.v_shape, system.y_shape, system.v_shape))
+        for start in method.starts or (None,):
+            given = {"force": force} | ({"start": start} if start else {})
+            with_it, without = (
+                Journey(system, method.name, v, y, 9, member=0, options=given | {"force": f * force}) for f in (1, 0)
+            )
+            assert with_it.expected != without.expected
+            every.append(with_it)
+    for name in ("leapfrog", "rk4"):
+        given = {"force": np.array([[0.25, -0.5]]), "dtype": "float32"}
+        every.append(Journey(sw.Particles(floor=sw.Floor()), name, np.zeros((1, 2)), np.ones((1, 2)), 9, options=given))
+    assert_same(every, run(language, every, tmp_path))
+
+
+def test_a_force_may_be_another_in_every_step() -> None:
+    """As that of World, whose array is read before each step."""
+    ball = sw.Particles(gravity=9.81, floor=sw.Floor(restitution=0.5))
+    space: dict[str, Any] = {}
+    exec(sw.export(ball, "leapfrog", "python", v=[[0.0, 0.0]], y=[[0.0, 1.0]], dt=0.05, force=True, name="ball").source, space)
+    v, y, force = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros((1, 2))
+    world = sw.World(ball, "leapfrog", v=v, y=y, dt=0.05, force=force)
+    m = space["Ball"]()
+    s = m.start([0.0, 0.0], [0.0, 1.0], [1.0, 2.0])  # as World starts: by the force of the first step
+    for k in range(60):
+        force[...] = [[math.cos(k), 2.0 + 0.1 * k]]
+        world.step()
+        m.step(s, force.ravel().tolist())
+        assert (s.y, m.finish(s, force.ravel().tolist())) == (y.ravel().tolist(), v.ravel().tolist()), k
+
+
+@languages
+def test_the_example_with_a_force_runs(language: str, tmp_path: Path) -> None:
+    given: dict[str, Any] = {"v": [[0.25, 0.5]], "y": [[1.0, 2.0]], "dt": 1 / 60, "force": [[0.5, 9.0]]}
+    for method in ("leapfrog", "rk4"):
+        run = sw.integrate(sw.Particles(), method, steps=STEPS, **given)
+        step = sw.export(sw.Particles(), method, language, name=f"push_{method}", **given)
+        assert shown(step, tmp_path) == run.y[-1, 0, 0]
 
 
 # ---- what is done with bits
@@ -454,12 +601,64 @@ def test_a_wrong_operation_is_noticed_in_every_language(language: str, tmp_path:
         assert not all(map(same, found, each.expected))
 
 
+#: Options that compute other numbers, and what the file says of them.
+OTHER_NUMBERS = {
+    "-ffast-math": "compile without -ffast-math",
+    "-Ofast": "compile without -ffast-math, -Ofast",
+    "-funsafe-math-optimizations": "compile without -fassociative-math and -funsafe-math-optimizations",
+    "-fassociative-math -fno-signed-zeros -fno-trapping-math": "compile without -fassociative-math",
+    "-freciprocal-math": "compile without -freciprocal-math",
+    "-fno-signed-zeros": "compile without -fno-signed-zeros",
+    "-ffinite-math-only": "compile without -ffinite-math-only",
+    "-fsingle-precision-constant": "needs_no_fsingle_precision_constant",
+    "-mfpmath=387": "compile with -msse2 -mfpmath=sse",
+    "-mfpmath=sse,387": "compile with -msse2 -mfpmath=sse",
+}
+
+
+def compiled(folder: Path, *flags: str) -> str:
+    """What the compiler complains of in ``step.c``; "unknown" if it has no such option."""
+    command = ["cc", *flags, "-S", "step.c", "-o", "step.s"]
+    told = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=PATIENCE).stderr
+    return "unknown" if re.search(r"(unrecognized|unknown|unsupported) .*|bad value|not valid for", told) else told
+
+
 @pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
-def test_flags_that_make_other_numbers_are_refused(tmp_path: Path) -> None:
-    sw.export(sw.Oscillator(), "rk4", "c", name="step").save(tmp_path / "step.c")
-    executed(["cc", "-O2", "-ffp-contract=off", "-c", "step.c"], tmp_path)
-    with pytest.raises(AssertionError, match="compile without -ffast-math"):
-        executed(["cc", "-O2", "-ffast-math", "-c", "step.c"], tmp_path)
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_flags_that_make_other_numbers_are_refused_by_name(dtype: str, tmp_path: Path) -> None:
+    sw.export(sw.Oscillator(), "rk4", "c", name="step", dtype=dtype).save(tmp_path / "step.c")  # type: ignore[arg-type]
+    assert not compiled(tmp_path)
+    for flags, said in OTHER_NUMBERS.items():
+        assert (told := compiled(tmp_path, *flags.split())) == "unknown" or said in told, flags
+
+
+@pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_every_way_of_evaluation_that_keeps_the_precision_is_taken(dtype: str, tmp_path: Path) -> None:
+    """FLT_EVAL_METHOD of C23: N widens what is narrower than _FloatN, to it; GCC says 16 where a CPU has _Float16."""
+    source = sw.export(sw.Oscillator(), "rk4", "c", name="step", dtype=dtype).source  # type: ignore[arg-type]
+    (tmp_path / "step.c").write_text(source, encoding="utf-8")
+    assert compiled(tmp_path, "-march=sapphirerapids") in ("", "unknown")
+    for method, taken in ((-1, ()), (0, ("float64", "float32")), (1, ("float64",)), (2, ()), (16, ("float64", "float32"))):
+        own = source.replace(
+            "#include <string.h>", f"#include <string.h>\n#undef FLT_EVAL_METHOD\n#define FLT_EVAL_METHOD {method}"
+        )
+        (tmp_path / "step.c").write_text(own, encoding="utf-8")
+        assert ("compile with -msse2" not in compiled(tmp_path)) == (dtype in taken), method
+
+
+@pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
+def test_no_product_is_fused_whatever_the_flags_say(tmp_path: Path) -> None:
+    """Compilers fuse products and sums by default where a CPU can; what stands behind the file is fused as the flags say."""
+    source = sw.export(sw.Oscillator(1.0, 0.1, form="physical"), "rk4", "c", name="step").source
+    (tmp_path / "step.c").write_text(source + "double fused(double x) { return x * x + 1.0; }\n", encoding="utf-8")
+    for contract in ([], ["-ffp-contract=fast"]):
+        if compiled(tmp_path, "-O2", "-mfma", *contract) == "unknown":
+            pytest.skip("this CPU has no such instruction")
+        step, user = (tmp_path / "step.s").read_text(encoding="utf-8").split("\nfused:")
+        assert "vmulsd" in step
+        assert "vfm" not in step
+        assert "vfm" in user
 
 
 def test_python_without_a_fused_multiply_add_says_so() -> None:
@@ -576,6 +775,42 @@ def test_a_text_in_a_comment_ends_nothing() -> None:
         assert not any(line.endswith("\\") for line in source.splitlines())
 
 
+# ---- loops
+
+
+def net(n: int) -> tuple[sw.Springs, Any]:
+    """n by n particles in space, hung from two corners, with springs along the sides and diagonals of its meshes."""
+    at = np.array([[i, j, 0.0] for i in range(n) for j in range(n)], float)
+    pairs = [(n * i + j, n * (i + a) + j + b) for a, b in ((1, 0), (0, 1), (1, 1)) for i in range(n - a) for j in range(n - b)]
+    return sw.Springs(pairs, stiffness=50.0, damping=0.1, gravity=[0.0, 0.0, -9.81], layout=at, fixed=[0, n - 1]), at
+
+
+@languages
+def test_every_bit_of_long_steps(language: str, tmp_path: Path) -> None:
+    """Springs, chains, particles that meet surfaces and bodies, with more operations than are written one by one."""
+    rng = np.random.default_rng(3)
+    springs, at = net(20)
+    floors = [sw.Floor(0.1, friction=0.3), sw.Sphere((0.0, 0.5), 0.4)]
+    particles, places = sw.Particles(np.ones(150), floor=floors), rng.normal(size=(150, 2))
+    bodies, apart = sw.NBody(np.ones(60), force="newton", softening=0.1), rng.normal(size=(60, 2))
+    every = [
+        Journey(springs, "false_euler", 0.1 * rng.normal(size=at.shape), at, 5, options={"force": rng.normal(size=at.shape)}),
+        Journey(sw.Chain(700), "rk4", rng.normal(size=700), rng.normal(size=700), 5),
+        Journey(particles, "false_heun", rng.normal(size=places.shape), places, 9),
+        Journey(bodies, "verlet", rng.normal(size=apart.shape), apart, 3, dt=0.01),
+        Journey(bodies, "false_euler", 0.0 * apart, apart, 3, dt=0.01, options={"control": sw.EnergyControl(0.3)}),
+    ]
+    sources = [each.export(language, f"step_{i}") for i, each in enumerate(every)]
+    assert all(each.operations > 20_000 for each in sources)
+    assert_same(every, run(language, every, tmp_path, [each.source for each in sources]))
+
+
+@sw.system(shape=(800,))
+def many_exponentials(t: Any, v: Any, y: Any) -> Any:
+    """ÿ = −eʸ, with operations on bits, for which there are no loops."""
+    return -np.exp(y)
+
+
 # ---- errors
 
 
@@ -613,7 +848,11 @@ def test_what_cannot_be_exported_says_so(tmp_path: Path) -> None:
             sw.errors.UnsupportedError,
             r"has about \d+ operations, and at most",
         ),
-        (lambda: sw.export(sw.Chain(1500), "rk4", "c"), sw.errors.UnsupportedError, r"has \d+ operations, and at most 20000"),
+        (
+            lambda: sw.export(many_exponentials(), "rk4", "c"),
+            sw.errors.UnsupportedError,
+            r"and at most 20000 are written out one by one",
+        ),
         (
             lambda: sw.export(sw.Chain(1000), "rk4", "c", fused=True),
             sw.errors.ArgumentError,

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import stepwell as sw
 import symbols
 from stepwell import _core
+from stepwell.errors import TraceError
 from stepwell.reference import functions as fn
 from stepwell.reference.fused import MEANING, Evaluated, fused
 from stepwell.reference.tape import Operation
@@ -131,3 +133,70 @@ def test_fused_they_are_as_accurate(name: str) -> None:
     with np.errstate(all="ignore"):
         (found,) = evaluated(given, 0.0, 1.0)
     assert errors(found, name, given).max() < 1.0
+
+
+def test_interp_is_numpys() -> None:
+    """Between any places, of the time and of the state, and with what is given for outside."""
+    places, values = np.array([0.0, 0.3, 0.5, 1.2, 2.0]), np.array([1.0, -2.0, 0.5, 3.0, 0.0])
+    at = np.linspace(-1.0, 3.0, 401)
+    for outside in ({}, {"left": 7.0}, {"right": 9.0}, {"left": -1.0, "right": 1.0}):
+
+        @sw.system(order=1)
+        def table(t: Any, y: Any) -> Any:
+            return np.interp(t, places, values, **outside)  # noqa: B023  # it is run in this turn of the loop
+
+        system = table().sized(None, np.empty(()))
+        for t in at:
+            found = system.alone(1.0, ()).rates(t, np.empty(0), np.empty(()))[1]
+            # A slope, a time since, a product and a sum, of values up to 3 and slopes up to 13.
+            assert abs(found - np.interp(t, places, values, **outside)) < 40 * 2.0**-52
+
+
+def test_interp_means_the_same_as_a_linear_sampled() -> None:
+    values = np.array([1.0, -2.0, 0.5, 3.0, 0.0])
+
+    @sw.system
+    def by_table(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+        return np.interp(t, 0.25 * np.arange(5), values) - y
+
+    @sw.system
+    def by_input(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+        return push - y
+
+    start: dict[str, Any] = {"v": 0.0, "y": np.ones(3), "dt": 0.05, "steps": 30, "every": 3}
+    lines = sw.Sampled(values, 0.25, interpolation="linear")
+    runs = [sw.integrate(each, "rk4", **start) for each in (by_table(), by_input(push=lines))]
+    assert runs[0].y == pytest.approx(runs[1].y, abs=1e-14)
+    other = sw.integrate(by_table(), "rk4", **start, backend="numpy")
+    np.testing.assert_array_equal(runs[0].y, other.y)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda t: np.interp(t, np.arange(1000.0), np.zeros(1000)), r"1000 points is too long .* sw\.Sampled"),
+        (lambda t: np.interp(t, [0.0, 1.0], [1.0, 2.0, 3.0]), r"one length along one axis, got shapes \(2,\) and \(3,\)"),
+        (lambda t: np.interp(t, [1.0, 0.0], [1.0, 2.0]), "places xp that ascend"),
+        (lambda t: np.interp(t, [0.0, 1.0], [1.0, 2.0], period=1.0), "write np.mod"),
+        (lambda t: np.interp(t, np.array([0.0, 1.0]) * t, [1.0, 2.0]), "numbers that are known as the places xp"),
+    ],
+)
+def test_what_interp_refuses(call: Any, message: str) -> None:
+    @sw.system
+    def own(t: Any, v: Any, y: Any) -> Any:
+        return call(t)
+
+    with pytest.raises(TraceError, match=message):
+        sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+
+
+def test_a_spline_of_another_package_is_told_from_ones_own_mistakes() -> None:
+    interpolate = pytest.importorskip("scipy.interpolate")
+    spline = interpolate.CubicSpline([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])
+
+    @sw.system
+    def own(t: Any, v: Any, y: Any) -> Any:
+        return spline(t) - y
+
+    with pytest.raises(TraceError, match=r"asked by scipy, .* sw\.Sampled\(values, interval, interpolation="):
+        sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)

@@ -192,7 +192,7 @@ def assert_equal(one: Any, other: Any) -> None:
     assert np.array_equal(np.signbit(one.y), np.signbit(other.y))
 
 
-KERNELS = ["interpret", *(level for level in _core.isa_levels() if level != "baseline")]
+KERNELS = ["interpret", *(level for level in _core.isa_levels() if level != "interpret")]
 RUN = ["free", "pendulum, sinusoid a, damped", "sampled x and a, physical", "three bodies, newton", "chain of five"]
 
 

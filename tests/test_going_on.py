@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from cases import SYSTEMS
+from stepwell._going_on import identity
+from stepwell._value import changed
 from stepwell.errors import ArgumentError
 
 METHODS = [m.name for m in sw.methods()]
@@ -106,3 +109,158 @@ def test_a_bad_step_beyond_the_run() -> None:
             sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=10, start_step=5, first_bad_step=wrong)
     for right in (-1, 0, 5):
         sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=10, start_step=5, first_bad_step=right)
+
+
+# ---- with another system
+
+CHOOSE = [m.name for m in sw.methods() if m.error_order is not None]
+
+
+@sw.system
+def spring(t: Any, v: Any, y: Any, *, k: Any = 1.0, other: Any = 4.0) -> Any:
+    return -k * y
+
+
+@sw.system
+def other_spring(t: Any, v: Any, y: Any, *, k: Any = 1.0, other: Any = 4.0) -> Any:
+    return -other * y
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", CHOOSE)
+@pytest.mark.parametrize("members", [(), (3,)])
+def test_another_system_acts_from_the_saved_state_on(method: str, members: tuple[int, ...], backend: Any) -> None:
+    """It acted from the start of a step that the old one had made beyond it: ÿ = −y to t = 5, then −4y, was wrong by 9 %.
+
+    It is the run that begins with the saved state, so its bits are equal, and so is that of an equation of another spelling.
+    """
+    y = np.linspace(1.0, 2.0, 3) if members else 1.0
+    first = sw.integrate(spring(), method, v=0.0, y=y, tolerance=1e-9, at=[2.5, 5.0], backend=backend)
+    anew = {"v": first.v[-1], "y": first.y[-1], "t0": 5.0, "tolerance": 1e-9, "at": [6.0, 10.0], "backend": backend}
+    for system in (spring(k=4.0), other_spring(), spring(k=np.full(members, 4.0))):
+        rest = sw.integrate(system, method, at=[6.0, 10.0], backend=backend, **first.resume)
+        fresh = sw.integrate(system, method, **anew)
+        np.testing.assert_array_equal((rest.v, rest.y), (fresh.v, fresh.y))
+        exact = y * (np.cos(5.0) * np.cos(10.0) - np.sin(5.0) / 2.0 * np.sin(10.0))
+        # Each of some hundred steps errs by 1e-9 of a length of at most 2·√5, and nothing grows.
+        np.testing.assert_allclose(rest.y[-1], exact, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", CHOOSE)
+def test_the_same_system_goes_on_however_it_is_spelled(method: str) -> None:
+    """One number for all members or one for each, made anew or unpickled: the pieces are one run."""
+    start: dict[str, Any] = {"v": np.array([0.0, 0.1, 0.2]), "y": 1.0, "tolerance": 1e-7}
+    whole = sw.integrate(spring(), method, at=[1.0, 2.0], **start)
+    first = sw.integrate(spring(), method, at=[1.0], **start)
+    for system in (spring(k=np.ones(3)), spring(), first.system, pickle.loads(pickle.dumps(spring()))):
+        np.testing.assert_array_equal(sw.integrate(system, method, at=[2.0], **first.resume).y[-1], whole.y[-1])
+
+
+@pytest.mark.parametrize("method", CHOOSE)
+def test_a_state_of_ones_own_counts(method: str) -> None:
+    """A kick between two pieces was ignored by y and v of the carry, or acted before the saved time."""
+    first = sw.integrate(spring(), method, v=0.0, y=1.0, tolerance=1e-9, at=[5.0])
+    kicked = first.v[-1] + 1.0
+    rest = sw.integrate(spring(), method, at=[6.0], **(first.resume | {"v": kicked}))
+    fresh = sw.integrate(spring(), method, v=kicked, y=first.y[-1], t0=5.0, tolerance=1e-9, at=[6.0])
+    np.testing.assert_array_equal((rest.v, rest.y), (fresh.v, fresh.y))
+
+
+@pytest.mark.parametrize("method", CHOOSE)
+def test_members_that_stopped_go_on_from_where_they_stopped(method: str) -> None:
+    """With the same system to the bit, with another from the state at the time at which each ran out of steps."""
+    rate = np.array([1.0, 40.0])
+    start: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6}
+    slow = sw.integrate(spring(), method, at=[5.0], **start).paces
+    assert slow is not None
+    with pytest.warns(sw.ToleranceWarning):
+        first = sw.integrate(spring(k=rate**2), method, at=[5.0], max_steps=int(slow.accepted + slow.rejected) + 1, **start)
+    assert first.paces is not None
+    assert first.status.tolist() == [0, sw.Status.BUDGET]
+    whole = sw.integrate(spring(k=rate**2), method, at=[5.0, 6.0], **start)
+    rest = sw.integrate(spring(k=rate**2), method, at=[6.0], **first.resume)
+    np.testing.assert_array_equal(rest.y[-1], whole.y[-1])
+    slower = sw.integrate(spring(k=4.0), method, at=[6.0], **first.resume)
+    assert first.stand is not None
+    at = float(first.paces.t[1])
+    alone = {"v": first.stand.v[1], "y": first.stand.y[1], "t0": at, "tolerance": 1e-6}
+    np.testing.assert_array_equal(slower.y[-1, 1], sw.integrate(spring(k=4.0), method, at=[6.0], **alone).y[-1])
+
+
+def test_a_control_of_another_gain_begins_anew() -> None:
+    scene = sw.scenes.figure_eight()
+    first = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, tolerance=1e-6, at=[1.0], control=sw.EnergyControl(0.1))
+    target = first.resume["control"].target
+    rest = sw.integrate(scene.system, "dop853", at=[2.0], **(first.resume | {"control": sw.EnergyControl(5.0, target=target)}))
+    anew = {"v": first.v[-1], "y": first.y[-1], "t0": 1.0, "tolerance": 1e-6}
+    fresh = sw.integrate(scene.system, "dop853", at=[2.0], control=sw.EnergyControl(5.0, target=target), **anew)
+    np.testing.assert_array_equal(rest.y, fresh.y)
+
+
+@pytest.mark.parametrize("method", ["verlet", "leapfrog"])
+@pytest.mark.parametrize("world", [False, True])
+def test_a_carry_of_fixed_steps_is_of_its_system_too(method: str, world: bool) -> None:
+    """v half a step back by the force of before was taken half a step on by the new one: an error of first order in h."""
+    errors = []
+    for steps in (500, 1000, 2000):
+        h = 5.0 / steps
+        first = sw.integrate(spring(), method, v=0.0, y=1.0, dt=h, steps=steps)
+        anew = {"v": first.v[-1], "y": first.y[-1], "dt": h, "t0": 0.0, "start_step": steps}
+        fresh = sw.integrate(spring(k=4.0), method, steps=steps, **anew)
+        if world:
+            state = {name: np.array(each) if name in ("v", "y") else each for name, each in first.resume.items()}
+            half = sw.World(spring(), method, dt=h, **state)
+            loop = sw.World(spring(k=4.0), method, dt=h, **half.resume)
+            loop.step(steps)
+            ended = float(loop.y)
+        else:
+            ended = float(sw.integrate(spring(k=4.0), method, steps=steps, **first.resume).y[-1])
+        assert ended == fresh.y[-1]
+        errors.append(abs(ended - (np.cos(5.0) * np.cos(10.0) - np.sin(5.0) / 2.0 * np.sin(10.0))))
+    # The methods are of second order: half the step, a quarter of the error, to within what the fourth order adds.
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.01)
+
+
+@pytest.mark.parametrize("method", ["verlet", "leapfrog"])
+def test_a_kick_between_pieces_of_fixed_steps_counts(method: str) -> None:
+    first = sw.integrate(spring(), method, v=0.0, y=1.0, dt=0.1, steps=10)
+    rest = sw.integrate(spring(), method, steps=10, **(first.resume | {"v": first.v[-1] + 1.0}))
+    fresh = sw.integrate(spring(), method, v=first.v[-1] + 1.0, y=first.y[-1], dt=0.1, start_step=10, steps=10)
+    np.testing.assert_array_equal(rest.y, fresh.y)
+
+
+@pytest.mark.parametrize("wrong", [5, "abc", "g" * 64, np.zeros(3), ["0"]], ids=repr)
+def test_what_is_no_digest(wrong: Any) -> None:
+    fixed = sw.integrate(spring(), "verlet", v=0.0, y=1.0, dt=0.1, steps=1).resume
+    chosen = sw.integrate(spring(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]).resume
+    for method, resume, more in (("verlet", fixed, {"steps": 1}), ("merson", chosen, {"at": [2.0]})):
+        with pytest.raises(ArgumentError, match=r"carried_for: expected the digest in run\.resume, got "):
+            sw.integrate(spring(), method, **(resume | {"carried_for": wrong}), **more)
+
+
+@pytest.mark.parametrize("name", list(SYSTEMS))
+def test_a_system_is_known_by_all_of_its_numbers(name: str) -> None:
+    """The same made twice is the same; with another number in any of its parameters it is another."""
+    make = SYSTEMS[name]
+    system, again = (make(np.random.default_rng(1), 3) for _ in range(2))
+    drawn = np.random.default_rng(2)
+    state = [drawn.normal(size=(*shape, 3)) for shape in (system.v_shape, system.y_shape)]
+    system, again = (each.sized(*state) for each in (system, again))
+    state = [drawn.normal(size=(*shape, 3)) for shape in (system.v_shape, system.y_shape)]
+    known = identity(system, (3,), *state)
+    assert identity(again, (3,), *state) == known
+    numbers = [(name, value) for name, value in vars(system).items() if isinstance(value, np.ndarray) and value.dtype == float]
+    numbers += [(name, value) for name, value in getattr(system, "parameters_given", {}).items() if isinstance(value, np.ndarray)]
+    for name, value in numbers:
+        changes = np.nextafter(value, np.inf)
+        other = changed(system, **{name: changes})
+        if hasattr(system, "parameters_given") and name in system.parameters_given:
+            other = changed(system, parameters_given={**system.parameters_given, name: changes})
+        sent = [each.tobytes() for _, each in other.parameters((3,)) if isinstance(each, np.ndarray)]
+        if sent != [each.tobytes() for _, each in system.parameters((3,)) if isinstance(each, np.ndarray)]:
+            assert identity(other, (3,), *state) != known
+    for block in range(2):
+        if state[block].size:
+            moved = [each.copy() for each in state]
+            moved[block].flat[-1] = 1e-300
+            assert identity(system, (3,), *moved) != known

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
+from stepwell.errors import ArgumentError, ShapeError, TooLargeError, UnknownNameError, UnsupportedError
 
 gymnasium = pytest.importorskip("gymnasium")
 
@@ -291,3 +291,9 @@ def test_gymnasium_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.delattr(sw, "gym", raising=False)
     with pytest.raises(UnsupportedError, match=r"needs gymnasium, which is not installed; pip install 'stepwell\[gym\]'"):
         _ = sw.gym
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_more_of_them_than_memory_has_room_for_are_refused(name: str) -> None:
+    with pytest.raises(TooLargeError, match=r"num_envs: states and observations of 100000000000 members need .* take fewer"):
+        many(name, 10**11)

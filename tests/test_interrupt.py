@@ -26,6 +26,10 @@ RUNS = {
     "events with a tolerance": "sw.integrate(sw.Pendulum(np.ones(10**4)), 'merson', v=0.0, y=1.0, tolerance=1e-11, at=[10.0**4], "
     "events=sw.Event(lambda t, v, y: y, most=9))",
     "many digits": "sw.stability_limit(sw.LinearSystem(np.eye(30, k=1) - np.eye(30) + np.diag([1e-9], -29)), 'false_heun')",
+    "exponents": "sw.lyapunov(sw.Pendulum(np.ones(3000)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**7, every=10**4)",
+    "matrices of many rows": "sw.stability_limit(sw.Chain(400), 'rk4')",
+    "a jacobian of many operations": "sw.jacobian(sw.system(lambda t, v, y: sum(1.0 / (k + y * y) for k in range(1, 600)))(), "
+    "v=0.0, y=np.ones(10**6))",
     "the reference": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, backend='numpy')",
 }
 
@@ -55,9 +59,9 @@ def test_ctrl_c(what: str) -> None:
         after = sw.integrate(sw.Oscillator(1.0), 'false_euler', v=0.0, y=1.0, dt=0.3, steps=7)
         print(min(waits), after.y[-1].hex())
     """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60, env=dict(os.environ)
-    )
+    # One thread for LAPACK: several wait for each other in a loop, for a minute where the cores are busy.
+    env = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60, env=env)
     assert done.returncode == 0, done.stderr
     wait, after = done.stdout.splitlines()[-1].split()
     # The best of three, so that a busy machine does not fail the test; a run that never looks would wait for minutes.
@@ -137,3 +141,54 @@ def test_ctrl_c_within_a_step(what: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.1
+
+
+#: Sweeps, whose chunks are computed by threads that no signal reaches; each chunk would take minutes.
+SWEEPS = {
+    "with a tolerance": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'dop853', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
+    "with a tolerance, bodies": "bodies, {'G': np.linspace(1, 2, 40)}, 'dop853', v=0.0, y=y, tolerance=1e-12, at=[1e6]",
+    "of a Taylor series": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'taylor', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
+    "of a function": "sw.Pendulum, {'omega': np.linspace(1, 2, 999)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, outcomes=f",
+    "in threads of the caller's": "sw.Pendulum, {'omega': np.linspace(1, 2, 99)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, "
+    "engine=pool",
+    "of histories": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**6, every=100",
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("what", SWEEPS)
+def test_ctrl_c_in_a_sweep(what: str) -> None:
+    """Its threads end within half a second, and afterwards nothing stops a run of the thread that was asked."""
+    code = f"""
+        import functools, os, signal, threading, time
+        from concurrent.futures import ThreadPoolExecutor
+        import numpy as np, stepwell as sw
+        y = np.random.default_rng(1).random((40, 2))
+        bodies = functools.partial(sw.NBody, np.ones(40), softening=0.1)
+        def f(run):
+            return run.y[-1]
+        pool = ThreadPoolExecutor(2)
+        # A warm-up, so that nothing is imported for the first time while the clock runs.
+        sw.sweep(sw.Oscillator, {{"omega": [1.0]}}, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        sent, waits = [], []
+        def interrupt():
+            time.sleep(0.5)
+            sent.append(time.perf_counter())
+            os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(3):
+            threading.Thread(target=interrupt).start()
+            try:
+                sw.sweep({SWEEPS[what]})
+            except KeyboardInterrupt:
+                waits.append(time.perf_counter() - sent[-1])
+            else:
+                raise SystemExit("not interrupted")
+        assert not [each for each in threading.enumerate() if each.name.startswith("sweep")]
+        sw.sweep(sw.Oscillator, {{"omega": [1.0]}}, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        print(min(waits))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=100, env=dict(os.environ)
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.5

@@ -163,7 +163,7 @@ def test_what_cannot_be() -> None:
     def plain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
         return -k * y
 
-    with pytest.raises(ArgumentError, match=r"plain: wrong: the system has no parameter 'm'. Known: k"):
+    with pytest.raises(ArgumentError, match=r"plain: wrong: expected .* \(t, v, y, \*, …\) whose .* got 'm'. Known: k"):
 
         @plain.invariant
         def wrong(v: Any, y: Any, *, m: Any) -> Any:
@@ -181,6 +181,49 @@ def test_what_cannot_be() -> None:
 
     with pytest.raises(ArgumentError, match=r"plain: vector: expected one number of a state, got an array of shape \(2,\)"):
         sw.integrate(plain(), "rk4", **given, record="vector")
+
+
+def test_an_invariant_may_take_the_time_before_the_state() -> None:
+    """As rates do; but no quantity that depends on it is constant."""
+    for order in (1, 2):
+        rates: Any = (lambda t, y, *, k=2.0: np.array([-k * y[1], y[0]])) if order == 1 else (lambda t, v, y, *, k=2.0: -k * y)
+        kind = sw.system(order=order)(rates)
+        if order == 1:
+
+            @kind.invariant
+            def energy(t: Any, y: Any, *, k: Any) -> Any:
+                return 0.5 * y[0] ** 2 + 0.5 * k * y[1] ** 2
+
+            @kind.invariant
+            def plain(y: Any, k: Any) -> Any:
+                return 0.5 * y[0] ** 2 + 0.5 * k * y[1] ** 2
+        else:
+
+            @kind.invariant
+            def energy(t: Any, v: Any, y: Any, k: Any) -> Any:
+                return 0.5 * v**2 + 0.5 * k * y**2
+
+            @kind.invariant
+            def plain(v: Any, y: Any, *, k: Any) -> Any:
+                return 0.5 * v**2 + 0.5 * k * y**2
+
+        start: dict[str, Any] = {"y": np.ones(2)} if order == 1 else {"v": 0.0, "y": 1.0}
+        run = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, every=1, record=["energy", "plain"])
+        np.testing.assert_array_equal(run.recorded["energy"], run.recorded["plain"])
+        kept = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, control=sw.Projection("energy"))
+        assert kept.energy[-1] == pytest.approx(run.energy[0], rel=1e-9)  # one correction of an error of 1e-6, squared
+        assert both(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, record="energy")
+
+    @sw.system
+    def driven(t: Any, v: Any, y: Any) -> Any:
+        return np.cos(t) - y
+
+    @driven.invariant
+    def moving(t: Any, v: Any, y: Any) -> Any:
+        return v - np.sin(t)
+
+    with pytest.raises(ArgumentError, match=r"driven: moving: .* one that depends on the time t"):
+        sw.integrate(driven, "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="moving")
 
 
 def test_a_parameter_that_changes_makes_no_invariant() -> None:

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benches import compile as compiling
 
 MEMBERS = 300
-COMPILED = pytest.mark.skipif(sw.isa() == "baseline", reason="everything is interpreted")
+COMPILED = pytest.mark.skipif(sw.isa() == "interpret", reason="everything is interpreted")
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux about the process")
 
 #: Runs of several kinds, long enough to be compiled.
@@ -229,4 +229,4 @@ def test_a_step_is_traced_and_compiled_in_time(name: str, monkeypatch: pytest.Mo
     for row in rows:
         assert row.trace + row.compile < 0.020, row
         assert row.computed <= row.written, row
-        assert (row.bytes > 0) == (sw.isa() != "baseline"), row
+        assert (row.bytes > 0) == (sw.isa() != "interpret"), row

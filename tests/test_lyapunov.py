@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.dynamics import Lyapunov
+from stepwell.dynamics import Lyapunov, exponents
+from stepwell.errors import UnsupportedError
 from stepwell.systems import System
 
 EPS = np.finfo(float).eps
@@ -47,6 +48,65 @@ def test_the_states_are_those_of_integrate(method: str) -> None:
     np.testing.assert_array_equal(found.y, run.y[-1])
     np.testing.assert_array_equal(found.v, run.v[-1] if run.carry is None else run.carry)
     assert found.exponents.shape == (1, 3, 2)
+
+
+@pytest.mark.parametrize("method", ["false_euler", "verlet", "rk4", "taylor"])
+def test_vectors_on_one_tape_and_each_beside_a_copy_of_the_state_are_the_same(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the bit: short steps go one way, long ones the other."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])[:, :, np.newaxis] * np.linspace(1.0, 1.1, 5)
+    given: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.05, "steps": 43, "transient": 12, "exponents": 4}
+    bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.3)
+    together = sw.lyapunov(bodies, method, **given)
+    monkeypatch.setattr(exponents, "MAX_TOGETHER", 0)
+    apart = sw.lyapunov(bodies, method, **given)
+    for name in ("exponents", "history", "v", "y"):
+        np.testing.assert_array_equal(getattr(apart, name), getattr(together, name))
+
+
+@pytest.mark.parametrize("most", [20_000, 0])
+@pytest.mark.parametrize("method", ["rk4", "verlet"])
+def test_threads_share_members_and_change_nothing(method: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exponents, "MAX_TOGETHER", most)
+    omega, y = np.linspace(1.0, 2.0, 4), np.linspace(0.5, 2.0, 3)[:, np.newaxis]
+    pendulums = sw.Pendulum(omega, a=sw.Sinusoid(np.linspace(0.1, 0.5, 4), 0.7))
+    given: dict[str, Any] = {"v": 0.1, "y": y, "dt": 0.05, "steps": 95, "transient": 25, "exponents": "all"}
+    one = sw.lyapunov(pendulums, method, **given, threads=1)
+    for threads in (2, 5, 100, None):
+        several = sw.lyapunov(pendulums, method, **given, threads=threads)
+        for name in ("exponents", "history", "v", "y"):
+            np.testing.assert_array_equal(getattr(several, name), getattr(one, name))
+
+
+def test_disturbances_obey_the_variational_equations() -> None:
+    """The derivative of a step of rk4 is a step by rk4 of the variational equations, here written by hand."""
+
+    @sw.system(order=1)
+    def varied(t: Any, w: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
+        x, y, z, a, b, c = w
+        rates = [sigma * (y - x), x * (rho - z) - y, x * y - beta * z]
+        return [*rates, sigma * (b - a), a * (rho - z) - x * c - b, a * y + x * b - beta * c]
+
+    y, steps, every, dt = near_the_attractor(8), 200, 10, 0.01
+    found = sw.lyapunov(Lorenz(), "rk4", y=y, dt=dt, steps=steps, every=every)
+    start = np.cos(1.7 * np.arange(1.0, 4.0))
+    w = np.concatenate([y, np.broadcast_to((start / np.linalg.norm(start))[:, np.newaxis], y.shape)])
+    growth = np.zeros(8)
+    for _ in range(steps // every):
+        w = sw.integrate(varied(), "rk4", y=w, dt=dt, steps=every).y[-1]
+        length = np.sqrt((w[3:] ** 2).sum(axis=0))
+        growth, w[3:] = growth + np.log(length), w[3:] / length
+    # Both sum the same numbers in other orders: some 150 roundings a step, amplified by e^(2·T) at most along so short a piece of
+    # the motion, T = 2. A change of the state changes the rates of disturbances by |y| ~ 30 times as much, relatively.
+    bound = 150 * steps * np.exp(4.0) * 30 * EPS
+    np.testing.assert_allclose(found.exponents[0], growth / (steps * dt), rtol=0, atol=bound)
+
+
+def test_a_step_that_is_too_long_is_refused_before_it_is_differentiated() -> None:
+    y = np.random.default_rng(1).random((500, 2))
+    with pytest.raises(UnsupportedError, match=r"100,000 operations at most.* about 11,000,000, of NBody"):
+        sw.lyapunov(sw.NBody(np.ones(500)), "rk4", v=0.0, y=y, dt=0.1, steps=1)
 
 
 def test_a_member_has_the_same_exponents_alone() -> None:
@@ -147,6 +207,103 @@ def test_a_member_that_diverges_has_none_and_is_named() -> None:
 def _pairs() -> Any:
     """Two bodies apart, and two in one place, whose force is infinite."""
     return np.array([[[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 0.0]]])
+
+
+PACED: dict[str, Any] = {"tolerance": 1e-9, "at": np.arange(1.0, 41.0), "transient": 20, "exponents": "all"}
+
+
+@pytest.mark.parametrize("method", ["merson", "dop853", "fehlberg_5", "taylor"])
+def test_with_a_tolerance_they_are_the_rates_of_a_linear_system(method: str) -> None:
+    matrix = np.array([[-1.0, 0.3, 0.1], [0.2, -2.0, 0.4], [0.1, 0.5, 0.5]])
+    found = sw.lyapunov(sw.LinearSystem(matrix, velocities=1), method, v=np.zeros(1), y=np.ones(2), **PACED)
+    rates = np.sort(np.linalg.eigvals(matrix).real)[::-1]
+    # A step errs by the tolerance of what has been longest, at most e^0.5 in an interval, at whose end the smallest vector is
+    # e^(−2.5) of that. Some hundred steps an interval by the method of lowest order.
+    np.testing.assert_allclose(found.exponents, rates, rtol=0, atol=100 * 1e-9 * np.exp(0.5 + 2.5))
+    assert found.t.tolist() == np.arange(21.0, 41.0).tolist()
+    assert found.history.shape == (20, 3)
+    assert found.dt is None
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> None:
+    """ẏ = 50·cos(50·t)·size − y: its disturbances, e^(−t), would do with long steps, and are given lengths like that of y."""
+
+    @sw.system(order=1)
+    def swept(t: Any, y: Any, *, size: Any = 1.0) -> Any:
+        return 50.0 * size * np.cos(50.0 * t) - y
+
+    t = np.arange(1.0, 6.0)
+    found = sw.lyapunov(swept(size=size), "merson", y=size, tolerance=1e-9, at=t)
+    swing = (2500.0 * np.sin(50.0 * 5.0) + 50.0 * np.cos(50.0 * 5.0)) / 2501.0
+    right = size * ((1.0 - 50.0 / 2501.0) * np.exp(-5.0) + swing)
+    # Errors of some thousand steps in each of five units of time, of which what e^(−t) leaves is one unit's.
+    np.testing.assert_allclose(found.y, right, rtol=0, atol=2000 * 1e-9 * size)
+    np.testing.assert_allclose(found.exponents, [-1.0], rtol=0, atol=2000 * 1e-9)
+
+
+@pytest.mark.parametrize("k", [2, "all"])
+def test_with_a_tolerance_bodies_have_those_of_short_steps(k: Any) -> None:
+    """Twelve disturbances make an attempt too long for one tape, two do not. Steps of 0.002 by rk4 are right to h⁴ ~ 10⁻¹¹."""
+    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
+    bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
+    at = np.arange(1.0, 11.0)
+    found = sw.lyapunov(bodies, "dop853", v=0.0, y=y, tolerance=1e-11, at=at, exponents=k)
+    fixed = sw.lyapunov(bodies, "rk4", v=0.0, y=y, dt=0.002, steps=5000, every=500, exponents=k)
+    # Some ten steps in a unit of time, whose errors grow with the motion, by e^(0.5·10).
+    np.testing.assert_allclose(found.history, fixed.history, rtol=0, atol=10 * 1e-11 * np.exp(5.0) + 100 * 0.002**4)
+
+
+def test_with_a_tolerance_a_member_has_the_same_alone_and_a_driven_pendulum_shrinks_volumes() -> None:
+    omega, y = np.array([1.0, 1.5, 2.0]), np.array([[1.0], [2.0]])
+    drive = sw.Sinusoid(0.5, 0.7, 0.1)
+    company = sw.lyapunov(sw.Pendulum(omega, 0.1, a=drive), "merson", v=0.1, y=y, **PACED)
+    np.testing.assert_allclose(company.sum, np.broadcast_to(-2 * 0.1 * omega, (2, 3)), rtol=0, atol=100 * 1e-9 * np.exp(1.0))
+    for i, k in np.ndindex(2, 3):
+        alone = sw.lyapunov(sw.Pendulum(omega[k], 0.1, a=drive), "merson", v=0.1, y=y[i, 0], **PACED)
+        np.testing.assert_array_equal(alone.history, company.history[:, :, i, k])
+        np.testing.assert_array_equal([alone.v, alone.y], [company.v[i, k], company.y[i, k]])
+    tolerance = (np.array([1e-6, 1e-8, 1e-10]), 1e-12)
+    each = sw.lyapunov(sw.Pendulum(omega, 0.1), "merson", v=0.1, y=1.0, **(PACED | {"tolerance": tolerance, "dt": 0.01 * omega}))
+    own = {"tolerance": (1e-8, 1e-12), "dt": 0.015}
+    alone = sw.lyapunov(sw.Pendulum(1.5, 0.1), "merson", v=0.1, y=1.0, **(PACED | own))
+    np.testing.assert_array_equal(alone.history, each.history[:, :, 1])
+
+
+def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
+    """ẏ = r·y² is infinite at t = 1/(r·y), and its disturbances grow as 2·r·y until then; for r < 0 they shrink."""
+
+    @sw.system(order=1)
+    def explosive(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
+        return rate * y**2
+
+    rate = np.array([-1.0, 0.5, -2.0])
+    with pytest.warns(sw.DivergenceWarning, match="1 of 3"):
+        found = sw.lyapunov(explosive(rate=rate), "dop853", y=1.0, tolerance=1e-9, at=np.arange(1.0, 6.0))
+    assert np.isnan(found.exponents[0, 1])
+    assert np.isfinite(found.history[0, 0, 1])  # up to t = 1 it was there
+    # The derivative of 1/(1 − r·t) by the start is the square of that.
+    right = -2.0 * np.log1p(-rate[[0, 2]] * 5.0) / 5.0
+    np.testing.assert_allclose(found.exponents[0, [0, 2]], right, rtol=0, atol=100 * 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"steps": 10}, "steps: goes with fixed steps only"),
+        ({"every": 10}, "every: goes with fixed steps only"),
+        ({"at": None}, "at: expected too"),
+        ({"tolerance": None}, "tolerance: expected too"),
+        ({"at": [1.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
+        ({"at": [0.0, 1.0]}, "at: expected times after t0 = 0, ascending"),
+        ({"transient": 2}, "transient: expected"),
+        ({"method": "rk4"}, "tolerance: rk4 does not estimate its error"),
+    ],
+)
+def test_wrong_calls_with_a_tolerance(wrong: dict[str, Any], message: str) -> None:
+    given: dict[str, Any] = {"method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0]}
+    with pytest.raises(sw.StepwellError, match=message):
+        sw.lyapunov(sw.Pendulum(), **(given | wrong))
 
 
 def test_wrong_derivatives_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:

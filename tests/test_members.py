@@ -51,7 +51,9 @@ def test_a_divergence_in_words(omega: Any, words: str) -> None:
 
 def test_an_early_stop_in_words() -> None:
     kept: dict[str, Any] = {"v": 0.0, "tolerance": 1e-6, "at": [99.0], "max_steps": 9}
-    with pytest.warns(sw.ToleranceWarning, match=r"^the run stopped before t = 99, at t = [\d.]+; out of max_steps$"):
+    with pytest.warns(
+        sw.ToleranceWarning, match=r"^the run stopped before t = 99, at t = [\d.]+; out of max_steps: 9 attempts, "
+    ):
         sw.integrate(sw.Oscillator(), "merson", y=1.0, **kept)
     with pytest.warns(sw.ToleranceWarning, match=r"^2 of 2 members stopped before t = 99; the first was member [01] at t = "):
         sw.integrate(sw.Oscillator(), "merson", y=[1.0, 2.0], **kept)

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _checks, engine
+from stepwell.engine import linear
+from stepwell.errors import TooLargeError
+from stepwell.stability import limit
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks are asked of Linux")
 
@@ -142,7 +145,8 @@ def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
 def test_the_peak_is_what_was_counted(run: str) -> None:
     """As it was counted, within a tenth, and 24 MB for what does not depend on the number of states: kernels, threads, imports.
 
-    Of three bodies the energy is counted beside the states. The peak without the run is that of a run of few states.
+    Of three bodies the energy is counted beside the states; of the matrix form the matrix is, before them.
+    The peak without the run is that of a run of few states.
     """
     said = aside(f"""
         counted = []
@@ -159,7 +163,7 @@ def test_the_peak_is_what_was_counted(run: str) -> None:
         most = 1000
         before = go({run})
         most = 10**9
-        print(go({run}) - before, counted[-1])
+        print(go({run}) - before, max(counted))
     """)
     peak, counted = map(float, said.split())
     assert peak < 1.1 * counted + 24e6
@@ -201,3 +205,81 @@ def test_what_is_kept_is_counted_as_it_is() -> None:
             run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=steps, every=every)
             assert len(run.t) == plan.kept
             np.testing.assert_array_equal(run.t, 0.1 * plan.saves)
+
+
+def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five of 1000² numbers, 38 MiB, where there are 30; as many as a run was seen to hold of a matrix of 1500² numbers."""
+    A = np.eye(1000, k=500) - np.eye(1000, k=-500)
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
+    with pytest.raises(sw.errors.TooLargeError, match=r"A: the matrix and its copies of 1 members need 38\.1 MiB, but 30 MiB"):
+        sw.LinearSystem(A)
+
+
+@pytest.mark.parametrize("form", ["matrix", "power"])
+def test_transition_matrices_are_counted_before_they_are_made(form: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight numbers for an element of 60 000 × 60 000, and three more for a power of it."""
+    monkeypatch.setattr(linear, "transition", None)  # no work is begun
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(200e9, "memory of this machine")]))
+    with pytest.raises(
+        TooLargeError, match=r"the transition matrices of 60000 × 60000 numbers of 1 members need (215|295) GiB.*'direct'"
+    ):
+        sw.integrate(sw.Chain(30_000), "rk4", v=0.0, y=0.0, dt=0.1, steps=10, form=form)
+
+
+def test_a_search_for_limits_is_counted_before_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """60 numbers for an element of a matrix, of as many members as are searched at once, and 250 for a limit with its mode."""
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(100e6, "memory of this machine")]))
+    monkeypatch.setattr(limit, "Search", None)  # no work is begun
+    with pytest.raises(TooLargeError, match=r"the limits of 1 members need 172 MiB.*of fewer states"):
+        sw.stability_limit(sw.LinearSystem(-np.eye(613)), "rk4")
+    with pytest.raises(TooLargeError, match=r"the limits of 100000 members need 31\d MiB"):
+        sw.stability_limit(sw.Pendulum(), "rk4", v=0.0, y=np.ones(100_000))
+
+
+@LINUX
+def test_limits_of_more_members_take_no_more_memory_than_their_results() -> None:
+    """Of 12 numbers a state, 1820 members are searched at once, in 60 numbers for each element of their matrices: 126 MB."""
+    said = aside("""
+        from stepwell.stability import limit, limit_search
+        def took(members):
+            sw.stability_limit(sw.NBody([1.0, 1.0, 1.0]), "leapfrog", v=0.0, y=np.random.default_rng(1).random((3, 2, members)))
+            return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        few = took(20)
+        print((took(1500) - few) * 1024)
+    """)
+    counted = 8.0 * (60 * 144 + 250 + 4 * 12) * 1500
+    assert int(said) < counted < 126e6
+
+
+@pytest.mark.parametrize("system", ["batch of systems", "batch of states"])
+def test_limits_in_parts_are_those_of_all_at_once(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the bit, and so are their modes."""
+    random = np.random.default_rng(5)
+    y = random.random((3, 2, 7))
+    given: dict[str, Any] = {"v": 0.0, "y": y}
+    of: list[Any] = [sw.NBody([1.0, 2.0, 3.0])] if system == "batch of states" else []
+    if not of:
+        of = [sw.Oscillator(np.linspace(1, 2, 7), 0.1, x=sw.Sinusoid(1.0, 2.0)), sw.Chain(4, stiffness=1 + random.random((5, 7)))]
+        given = {}
+    for each in of:
+        whole = sw.stability_limit(each, "false_euler", **given)
+        monkeypatch.setattr(limit, "members_at_once", lambda n: 3)
+        parts = sw.stability_limit(each, "false_euler", **given)
+        monkeypatch.undo()
+        np.testing.assert_array_equal(parts, whole)
+        np.testing.assert_array_equal(parts.grows, whole.grows)
+        for one, other in zip(parts.modes, whole.modes, strict=True):
+            assert one == other
+
+
+@LINUX
+def test_a_jacobian_takes_little_more_memory_than_it_has_numbers() -> None:
+    """Directions of the complex step go some at a time: what they take is below 20 times a million complex numbers."""
+    said = aside("""
+        y = np.random.default_rng(1).random((33, 2, 300))
+        sw.jacobian(sw.NBody(np.ones(33)), v=0.0, y=y[..., :1])
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        matrix = sw.jacobian(sw.NBody(np.ones(33)), v=0.0, y=y).matrix
+        print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 - matrix.nbytes)
+    """)
+    assert int(said) < 20 * 16 * 2**20

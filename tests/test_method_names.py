@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell._method_names import names_of, spelling
+from stepwell._method_names import _why_not_here, names_of, spelling
 from stepwell.errors import UnknownNameError
 
 ALL = {m.name: m for m in sw.methods()}
@@ -69,6 +69,9 @@ def test_a_false_friend_is_another_method_or_explained(method: str, friend: str)
     if holders(re.sub(r"( \(| with ).*", "", friend)):  # a method with a remark, of which the name alone is known
         return
     assert "did you mean" not in told
+    if "implicit" in told:  # none is here, and no explicit method is near to it
+        assert spelling(friend) in ("backward_euler", "implicit_euler")
+        return
     assert "is not here; nearest, but not the same: " in told.replace("which is", "is")
     assert method in told or ", which is not here" in told or "Dormand-Prince 5(4)" in friend
 
@@ -88,7 +91,7 @@ def test_a_typing_error_in_a_false_friend_is_explained_too(wrong: str, meant: st
     with pytest.raises(UnknownNameError) as caught:
         sw.method(wrong)
     told = str(caught.value).partition("Known:")[0]
-    assert "not here; nearest, but not the same: " in told
+    assert ("no implicit method is here" if "Euler" in wrong else "not here; nearest, but not the same: ") in told
     assert ("did you mean" in told) == (meant is not None)
     assert meant is None or f"did you mean {meant!r}?" in told
 
@@ -118,3 +121,36 @@ def test_a_new_record_needs_nothing_else() -> None:
     assert names.methods[spelling("COMMON name")] == ["one", "two"]
     assert names.friends["third"] == ("Fourth 4(3)", ["two"])
     assert names.friends["fourth_4_3"] == ("", ["two"])
+
+
+@pytest.mark.parametrize(
+    ("names", "why"),
+    [
+        (
+            "backward Euler|implicit Euler|Crank-Nicolson|crank–nicolson|Rosenbrock23|Rodas4P|Radau|BDF|LSODA|SDIRK2|ode15s",
+            "implicit, and",
+        ),
+        (
+            "TR-BDF2|implicit_midpoint|Newmark-beta|Kvaerno5|KenCarp4|IMEX|Gauss-Legendre 4|generalized alpha",
+            "implicit, and no impl",
+        ),
+        ("euler_maruyama|Euler–Maruyama|Milstein|SRIW1|BAOAB", "for equations with noise, .* sw.Sampled"),
+        (
+            "tsit5|Tsitouras 5(4)|Vern7|RK23|ode23|BS3|Cash-Karp",
+            "not here; merson, fehlberg, fehlberg_5, dop853 and taylor choose",
+        ),
+        ("Adams-Bashforth|AB2|ABM4|Gear's method|linear multistep method", "a method of several steps, and none of them is here"),
+    ],
+)
+def test_methods_of_a_kind_that_is_not_here(names: str, why: str) -> None:
+    """They are said to be what they are, and no method that has a similar name is suggested."""
+    for name in names.split("|"):
+        with pytest.raises(UnknownNameError, match=rf"^method: ['\"]?{re.escape(name)}['\"]? is {why}") as caught:
+            sw.method(name)
+        assert "did you mean" not in str(caught.value)
+        assert "nearest" not in str(caught.value)
+
+
+def test_no_name_of_a_record_is_of_a_kind_that_is_not_here() -> None:
+    for _, name in NAMES:
+        assert _why_not_here(spelling(name)) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -116,6 +117,48 @@ def test_bodies_whose_energy_the_method_made() -> None:
     with pytest.warns(sw.AccuracyWarning, match="^bodies 1 and 2 met within step 13 "):
         run = sw.integrate(printed, "standard_euler", v=scene.v, y=scene.y, **wild)
     assert abs(run.energy[-1] - run.energy[0]) > abs(run.energy[0])
+
+
+def from_apocentre(e: float) -> dict[str, Any]:
+    """Of an orbit of axis 1 around a unit of mass at rest."""
+    v, y = np.zeros((2, 2)), np.zeros((2, 2))
+    v[1, 1], y[1, 0] = math.sqrt((1.0 - e) / (1.0 + e)), 1.0 + e
+    return {"v": v, "y": y}
+
+
+#: The least distance is 1 − e = 0.01, passed at the speed √((1 + e)/(1 − e)) = 14: 0.5 in such a step.
+THROWN: dict[str, Any] = from_apocentre(0.99) | {"dt": 0.0335593220338983, "steps": 1000}
+
+
+@pytest.mark.parametrize("force", ["newton", "logarithmic"])
+@pytest.mark.parametrize("at", [0, 1])
+def test_a_body_without_mass_that_is_thrown_out(at: int, force: Any) -> None:
+    """The energy of all bodies is blind to it; its own per unit of mass is kept, wherever the attractor is."""
+    blocks = {name: block[:: 1 - 2 * at] + (name == "v") * 0.3 for name, block in from_apocentre(0.99).items()}
+    system = sw.NBody([0.0, 1.0] if at else [1.0, 0.0], force=force)
+    options: dict[str, Any] = {"dt": THROWN["dt"], "steps": 1000} if force == "newton" else {"dt": 0.5, "steps": 1000}
+    with pytest.warns(sw.AccuracyWarning, match=f"^body {1 - at}, which has no mass, has another energy per mass at the end"):
+        sw.integrate(system, "dop853" if force == "newton" else "standard_euler", **blocks, **options)
+    # No warnings, which would be errors: of steps that follow it, of a small error, and of a run that goes on from a carry.
+    sw.integrate(system, "dop853", **blocks, tolerance=1e-9, at=[10.0, 33.0])
+    sw.integrate(system, "leapfrog", **from_apocentre(0.3), dt=0.01, steps=3000)
+
+
+def test_bodies_without_mass_in_a_batch() -> None:
+    v, y = (np.stack([block] * 3, axis=-1) for block in from_apocentre(0.99).values())
+    v[1, 1, 0] = 1.0 / math.sqrt(1.99)  # a circle
+    match = (
+        "^2 bodies without mass have another energy per mass at the end: body 1 of member 1 has 6.35 instead of -0.5, so dop853"
+    )
+    with pytest.warns(sw.AccuracyWarning, match=match):
+        sw.integrate(sw.NBody([1.0, 0.0], force="newton"), "dop853", **THROWN | {"v": v, "y": y})
+    # Two attractors may throw out a third body in truth: nothing is said of its energy.
+    with pytest.warns(sw.AccuracyWarning) as told:
+        sw.integrate(sw.NBody([[1.0, 1.0, 1e-3], [0.0, 0.0, 0.0]], force="newton"), "dop853", **THROWN | {"v": v, "y": y})
+    assert len(told) == 1
+    heavy = sw.NBody([1.0, 1.0, 0.0], force="newton")
+    apart = np.array([[-0.5, 0.0], [0.5, 0.0], [0.0, 3.0]])
+    sw.integrate(heavy, "dop853", v=apart[:, ::-1] * [-1.4, 1.4] * [[1.0], [1.0], [0.0]], y=apart, tolerance=1e-10, at=[40.0])
 
 
 def test_energies_at_both_ends_are_those_of_the_system() -> None:

@@ -51,14 +51,17 @@ def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
     class Counting:
         def __init__(self) -> None:
             self.v = self.y = 0
+            self.last = ""
 
         def dv(self, t: float, v: float, y: float) -> float:
             self.v += 1
+            self.last = "v"
             assert any(t == pytest.approx(c * 0.25) for c in method.nodes)
             return 0.0
 
         def dy(self, t: float, v: float, y: float) -> float:
             self.y += 1
+            self.last = "y"
             return 0.0
 
     if method.has_series:  # the rates are run once, and each order of the series counts as an evaluation
@@ -66,8 +69,10 @@ def test_the_recorded_evaluations_are_the_ones_made(method: sw.Method) -> None:
         return
     counting = Counting()
     method.steps.step(counting, 0.0, 0.25, 0.0, 1.0)
-    # PEFRL begins and ends with a drift: one more of the rate that costs nothing.
-    assert (counting.v, counting.y) == (method.evaluations, method.evaluations + (method.name == "pefrl"))
+    # A method that begins and ends with a drift, as PEFRL, has one more of the rate that costs nothing.
+    drifts = method.needs_acceleration and counting.last == "y" and counting.y > counting.v
+    assert drifts or method.name != "pefrl"
+    assert (counting.v, counting.y) == (method.evaluations, method.evaluations + drifts)
 
 
 @pytest.mark.parametrize("method", sw.methods(), ids=lambda m: m.name)
@@ -76,9 +81,12 @@ def test_a_stage_of_weight_zero_is_not_evaluated(method: sw.Method) -> None:
 
     A tolerance of 1e-5 is one of order 8, that of steps of fixed length by the series.
     """
-    extra = method.name == "fehlberg"
+    stages = getattr(method.steps, "stages", None)
+    free = sw.Oscillator().scaled(0.1, ())
+    extra = 0 if stages is None else len(stages(free, 0.0, 0.1, 0.5, 1.0)) - method.evaluations
+    assert extra == 1 if method.name == "fehlberg" else extra >= 0
     assert method.attempt_evaluations == (0 if method.error_order is None else method.evaluations + extra)
-    if extra:
+    if method.name == "fehlberg":
         assert (method.evaluations, 0.5 in method.nodes) == (5, False)
     if method.error_order is not None:
         run = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-5, at=[1.0])

@@ -80,7 +80,7 @@ def test_an_end_that_slides_on_a_smooth_floor_leaves_the_order(method: str, orde
     lost = []
     for h in (1 / 240, 1 / 480):
         start: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": round(0.5 / h), "every": 1}
-        run = sw.integrate(dumb_bell(floor=sw.Floor(0.0)), method, **start, control=RESETTING)
+        run = sw.integrate(dumb_bell(floor=sw.Floor(restitution=0.0)), method, **start, control=RESETTING)
         lost.append(np.ptp(run.energy))
     assert np.log2(lost[0] / lost[1]) == pytest.approx(order, rel=0.05)
 
@@ -89,7 +89,7 @@ def test_newtons_law_with_friction_would_add_energy() -> None:
     """Kane's paradox, with e = 1 and a rod at 45° that sticks: without the limit the energy would grow; with it, it stays."""
     mu, h = 2.0, 1e-7
     v0 = np.array([[0.7, -1.0], [0.7, -1.0]])
-    bell = dumb_bell((1.0, 2.0), gravity=0.0, floor=sw.Floor(1.0, mu))
+    bell = dumb_bell((1.0, 2.0), gravity=0.0, floor=sw.Floor(restitution=1.0, friction=mu))
     run = sw.integrate(bell, "rk4", v=v0, y=tilted(-0.25 * np.pi, 0.5 * h), dt=h, steps=1, every=1, control=RESETTING)
     assert run.energy[-1] <= run.energy[0] * (1.0 + ROUNDING)
 
@@ -98,7 +98,7 @@ def test_rods_apart_do_not_share_energy() -> None:
     """Two dumb-bells in one system are those of two systems, to the last bit."""
     y = np.concatenate([tilted(0.4, 0.1), tilted(1.1, 0.3) + np.array([3.0, 0.0])])
     given: dict[str, Any] = {"v": 0.0, "dt": 1 / 120, "steps": 150, "every": 1, "control": RESETTING}
-    floor = sw.Floor(0.8, 0.3)
+    floor = sw.Floor(restitution=0.8, friction=0.3)
     both = sw.integrate(sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=floor), "rk4", y=y, **given)
     for part in (slice(0, 2), slice(2, 4)):
         one = sw.integrate(dumb_bell(floor=floor), "rk4", y=y[part], **given)
@@ -106,7 +106,7 @@ def test_rods_apart_do_not_share_energy() -> None:
 
 
 def test_one_rod_is_the_pendulum() -> None:
-    floor = [sw.Floor(0.7, 0.2, normal=(1.0, 0.2, 0.0)), sw.Sphere((0.0, 0.5, -1.0), 0.3, restitution=0.5)]
+    floor = [sw.Floor(restitution=0.7, friction=0.2, normal=(1.0, 0.2, 0.0)), sw.Sphere((0.0, 0.5, -1.0), 0.3, restitution=0.5)]
     given: dict[str, Any] = {"dt": 0.01, "steps": 200, "every": 1}
     v, y = np.array([-0.5, 0.4, 0.0]), np.array([0.8, 0.0, -0.6])
     one = sw.integrate(sw.Pendulum3D(1.0, G, floor=floor), "rk4", v=v, y=y, **given)
@@ -123,7 +123,7 @@ def rope(n: int, dim: int) -> tuple[sw.Rods, Any]:
     lengths = np.sqrt((np.diff(y, axis=0) ** 2).sum(axis=1))
     ball = np.zeros(dim)
     ball[0] = 1.2
-    floor = [sw.Floor(0.3, 0.4), sw.Sphere(ball, 0.5, restitution=0.3)]
+    floor = [sw.Floor(restitution=0.3, friction=0.4), sw.Sphere(ball, 0.5, restitution=0.3)]
     return sw.Rods(np.ones(n), [(i, i + 1) for i in range(n - 1)], lengths, gravity=G, floor=floor), y
 
 
@@ -155,7 +155,7 @@ def test_a_rope_falls_on_a_ball_and_a_floor_and_rests() -> None:
 
 
 def test_a_state_that_is_not_finite_stays_so() -> None:
-    bell = dumb_bell(floor=[sw.Floor(0.5, 0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)])
+    bell = dumb_bell(floor=[sw.Floor(restitution=0.5, friction=0.1), sw.Sphere((0.0, 0.0), 9.0, inside=True)])
     with pytest.warns((sw.DivergenceWarning, sw.AccuracyWarning)):
         run = sw.integrate(bell, "rk4", v=[[1e200, -1e200], [0.0, 0.0]], y=tilted(0.3, 0.1), dt=1.0, steps=5, every=1)
     first = int(run.first_bad_step)
@@ -257,7 +257,7 @@ def is_noticed() -> bool:
 def equal_to_the_core() -> bool:
     """Of two dumb-bells, one beside the other, whose energies must not be shared."""
     y = np.concatenate([tilted(0.4, 0.01), tilted(1.1, 0.02) + np.array([3.0, 0.0])])
-    pair = sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=sw.Floor(0.8, 0.3))
+    pair = sw.Rods(np.ones(4), [(0, 1), (2, 3)], 1.0, gravity=G, floor=sw.Floor(restitution=0.8, friction=0.3))
     runs = [
         sw.integrate(pair, "rk4", v=0.0, y=y, dt=1 / 60, steps=12, every=1, control=RESETTING, backend=backend)
         for backend in ("rust", "numpy")

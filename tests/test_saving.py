@@ -192,7 +192,7 @@ def test_memory_is_not_lent_for_much_less() -> None:
     assert place(_memory.empty((size - size // 10,))) == at
 
 
-@pytest.mark.skipif(_core.isa() == "baseline", reason="times are those of machine code")
+@pytest.mark.skipif(_core.isa() == "interpret", reason="times are those of machine code")
 @pytest.mark.parametrize("name", ["false_euler", "verlet", "leapfrog"])
 def test_keeping_every_step_costs_a_small_multiple_of_the_steps(name: str) -> None:
     """Measured: 1.5 to 2.4 times. Where a velocity takes a call of its own it was 29 to 33 times; the bound is far from both."""

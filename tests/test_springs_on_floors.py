@@ -54,10 +54,13 @@ def cloth(n: int, **given: Any) -> tuple[sw.Springs, Any]:
 
 FLOORS = {
     "elastic": sw.Floor(),
-    "e = 0.5": sw.Floor(0.5),
-    "e = 0, rough": sw.Floor(0.0, 0.5),
+    "e = 0.5": sw.Floor(restitution=0.5),
+    "e = 0, rough": sw.Floor(restitution=0.0, friction=0.5),
     "a ball": sw.Sphere((0.1, 0.1, -0.3), 0.3, restitution=0.7, friction=0.2),
-    "a trough": [sw.Floor(0.8, normal=(0.5, 0.0, 1.0)), sw.Floor(0.8, 0.3, normal=(-0.5, 0.2, 1.0), offset=-0.1)],
+    "a trough": [
+        sw.Floor(restitution=0.8, normal=(0.5, 0.0, 1.0)),
+        sw.Floor(restitution=0.8, friction=0.3, normal=(-0.5, 0.2, 1.0), offset=-0.1),
+    ],
 }
 
 
@@ -106,7 +109,7 @@ def test_a_mistake_in_a_net_is_noticed(old: str, new: str, monkeypatch: Any) -> 
 @pytest.mark.parametrize("height", [0.05, 0.6])
 def test_damped_jelly_comes_to_rest_on_the_floor(share: float, height: float) -> None:
     """At rest the floor carries it: no particle is below it, three or more are on it, and the springs carry the others."""
-    net, layout = jelly(damping=0.5, floor=sw.Floor(0.0, 0.5))
+    net, layout = jelly(damping=0.5, floor=sw.Floor(restitution=0.0, friction=0.5))
     h = share * float(net.safe_step("false_euler"))
     y = np.add(layout, [0.0, 0.0, height])
     run = sw.integrate(net, "false_euler", v=0.0, y=y, dt=h, steps=int(8.0 / h), every=int(0.5 / h))
@@ -182,7 +185,7 @@ def test_small_and_large_nets_have_the_bits_of_the_reference(n: int, method: str
     """A large net is stepped in rows, a small one by a tape; also in batches, with threads, in pieces and in a World."""
     floor = [
         sw.Sphere((0.0, 0.0, -0.2), 0.15, friction=0.3),
-        sw.Floor(0.5, offset=-0.3),
+        sw.Floor(restitution=0.5, offset=-0.3),
         sw.Floor(offset=-0.25, way="spring", omega=9.0),
     ]
     net, y = cloth(n, stiffness=10.0, fixed=[0], floor=floor)
@@ -195,7 +198,7 @@ def test_small_and_large_nets_have_the_bits_of_the_reference(n: int, method: str
     for _ in range(4):
         world.step(30)
     assert np.array_equal(world.y, whole.y[-1])
-    many, _ = cloth(n, stiffness=10.0, fixed=[0], floor=[sw.Floor(np.array([0.5, 0.0, 1.0]), offset=-0.1)])
+    many, _ = cloth(n, stiffness=10.0, fixed=[0], floor=[sw.Floor(restitution=np.array([0.5, 0.0, 1.0]), offset=-0.1)])
     batch: dict[str, Any] = {"v": start["v"][..., np.newaxis], "y": y[..., np.newaxis], "dt": 0.004, "steps": 60}
     runs = [
         sw.integrate(many, method, **batch, threads=threads, backend=by)
@@ -203,7 +206,9 @@ def test_small_and_large_nets_have_the_bits_of_the_reference(n: int, method: str
     ]
     assert_same(runs[0], runs[1])
     assert_same(runs[0], runs[2])
-    one = sw.integrate(cloth(n, stiffness=10.0, fixed=[0], floor=sw.Floor(0.5, offset=-0.1))[0], method, **start, steps=60)
+    one = sw.integrate(
+        cloth(n, stiffness=10.0, fixed=[0], floor=sw.Floor(restitution=0.5, offset=-0.1))[0], method, **start, steps=60
+    )
     assert np.array_equal(one.y, runs[0].y[..., 0])
 
 

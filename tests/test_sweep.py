@@ -18,6 +18,7 @@ import xarray
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.sweeps import axes as of_axes
 from stepwell.sweeps import crossings, observed, outcomes
+from stepwell.sweeps.task import Stopped
 from sweeping import AXES, OUTCOMES, duffing, power, small, unlike
 
 Oscillator = sw.Oscillator
@@ -243,6 +244,20 @@ def test_directions_and_what_never_passes() -> None:
     np.testing.assert_allclose(found.y_crossing, 1.5 * np.pi, atol=1e-8)
 
 
+@pytest.mark.parametrize(("number", "word"), [(1, "rising"), (-1, "falling"), (0, "both")])
+def test_directions_are_those_of_events(number: int, word: Any) -> None:
+    """As a number or as a word, in both; a crossing of both says it as an event does."""
+    crossings = [sw.sweeps.Crossing("y", 0.5, each) for each in (number, word)]
+    events = [sw.Event(power, direction=each) for each in (number, word)]
+    assert [each.direction for each in crossings + events] == [number] * 4
+    assert events[0] == events[1]
+    assert repr(crossings[0]) == repr(crossings[1])
+    with pytest.raises(ArgumentError, match=r"direction: there is no 'up'.* Known: rising, falling, both"):
+        sw.sweeps.Crossing("y", direction="up")  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="direction: expected -1 or more, up to 1, got 2"):
+        sw.Event(power, direction=2)
+
+
 def test_a_crossing_at_a_state_counts_once() -> None:
     """A sampled level that is met exactly at a state: it is passed there, and not again in the next interval."""
     of = [
@@ -272,6 +287,19 @@ def test_periods(memory: float) -> None:
     assert (abs(found.y_period.values - period) < bound).all()
     wrong = found.y_period.values * n / (n + 1)  # as many intervals as passages
     assert (abs(wrong - period) > bound).all()
+
+
+def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
+    """As at Ctrl-C: of a chunk that would take days, in a thread that no signal reaches."""
+    start, calls = {"v": 0.0, "y": np.ones(1000), "dt": 0.1, "t0": 0.0}, []
+
+    def look() -> None:
+        calls.append(None)
+        if len(calls) == 5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        sw.sweeps.Exponents(every=20).of_start(sw.Pendulum(), "rk4", start, 40, 10**12, look)
 
 
 def test_lyapunov_exponents_are_those_of_lyapunov() -> None:

@@ -185,7 +185,7 @@ def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
 
     sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
     sw.sweep(spring(1.0), {"k": [1.0, 2.0]}, "rk4", **given, store=path).close()
-    with pytest.raises(ArgumentError, match=r"is of another sweep and is not continued \(first steps: "):
+    with pytest.raises(ArgumentError, match=r"is not continued \(the equations are others: their first steps have other bits"):
         sw.sweep(spring(1.0 + 2**-50), {"k": [1.0, 2.0]}, "rk4", **given, store=path)
 
 
@@ -296,3 +296,56 @@ def test_after_a_signal_in_the_middle(sent: signal.Signals, ending: str, tmp_pat
     with xarray.open_dataset(store, **options) as found:
         np.testing.assert_array_equal(found.y_last, whole.y_last)
         np.testing.assert_array_equal(found.end, whole.y_last)
+
+
+TORN = {
+    "empty": lambda whole: b"",
+    "half": lambda whole: whole[: len(whole) // 2],
+    "of another shape": lambda whole: json.dumps(json.loads(whole) | {"shape": [7]}).encode(),
+}
+
+
+@KINDS
+@pytest.mark.parametrize("how", TORN)
+@pytest.mark.parametrize("what", ["y_last", "status", "gamma", "y0", "progress/hashes"])
+def test_torn_metadata_is_told(what: str, how: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before any work; nothing is written, so that what is whole can still be read."""
+    path = tmp_path / f"a.{ending}"
+    interrupted(path, 2, monkeypatch)
+    store = path if ending == "zarr" else path.with_name(f"{path.name}.unfinished")
+    file = store / what / "zarr.json"
+    whole = file.read_bytes()
+    torn = TORN[how](whole)
+    file.write_bytes(torn)
+    with pytest.raises(ArgumentError, match=rf"^store: .* the metadata of {what} is torn \(.*remove it, or give another path"):
+        small(store=path, outcomes="last")
+    assert file.read_bytes() == torn
+    file.write_bytes(whole)
+    assert unlike(small(outcomes="last"), small(store=path, outcomes="last").load()) == []
+
+
+@KINDS
+def test_a_full_disk_leaves_nothing_that_is_none(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a folder without a store, nor a half of one; and what is done stays where there is one."""
+    import zarr
+
+    path = tmp_path / f"a.{ending}"
+    original = zarr.Group.create_array
+
+    def full(*_: Any, **__: Any) -> Any:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(zarr.Group, "create_array", full)
+        with pytest.raises(
+            ArgumentError, match=r"^store: .* cannot be written: No space left on device; .* make room and call again"
+        ):
+            small(store=path, outcomes="last")
+    assert os.listdir(tmp_path) == []
+    assert original is zarr.Group.create_array
+    interrupted(path, 2, monkeypatch)
+    with monkeypatch.context() as patch:
+        patch.setattr(zarr.Array, "__setitem__", full)
+        with pytest.raises(ArgumentError, match="the chunks that are done are kept: make room and call again"):
+            small(store=path, outcomes="last")
+    assert unlike(small(outcomes="last"), small(store=path, outcomes="last").load()) == []

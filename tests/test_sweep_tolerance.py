@@ -324,8 +324,11 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a force": ({"force": 1.0}, "force: goes with fixed steps only"),
     "forces": ({"axes": {"force": [1.0, 2.0]}}, "axes: force: goes with fixed steps only"),
     "steps as an axis": ({"axes": {"dt": [0.1, 0.2]}}, "axes: dt: with a tolerance, dt is the step to try first"),
-    "no times": ({"at": None}, "at: expected too, since the other was given"),
-    "times alone": ({"tolerance": None}, "tolerance: expected too, since the other was given"),
+    "no times": ({"at": None}, "at: expected too with tolerance=: the times at which states are saved, such as at="),
+    "times alone": (
+        {"tolerance": None},
+        "tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6",
+    ),
     "an axis without times": ({"tolerance": None, "at": None, "axes": {"tolerance": [1e-6, 1e-9]}}, "at: expected too"),
     "a list": ({"tolerance": [1e-6, 1e-9]}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
     "three": ({"tolerance": (1e-6, 1e-9, 1.0)}, "tolerance: expected a number, or a pair (relative, absolute), the same for all"),
@@ -346,7 +349,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         "at: expected two or more times, since with a tolerance Ext",
     ),
     "one time for a mean": ({"at": [1.0], "outcomes": ["last", "mean"]}, "since with a tolerance Mean sees the states at these"),
-    "Lyapunov exponents": ({"outcomes": "lyapunov"}, "outcomes: Exponents: Lyapunov exponents are those of fixed steps"),
+    "too few intervals": ({"outcomes": sw.sweeps.Exponents(transient=999)}, "transient: expected fewer intervals than at has"),
     "a method without an estimate": ({"method": "rk4"}, "tolerance: rk4 does not estimate its error"),
     "a series of two orders": (
         {"method": "taylor", "tolerance": None, "axes": {"tolerance": [1e-6, 1e-12]}},
@@ -366,6 +369,25 @@ def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
     with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
         sw.sweep(**(GOOD | wrong))
+
+
+def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
+    """Each member to its own tolerance."""
+    omega, tolerance, at = np.array([1.0, 2.0, 3.0]), np.array([1e-6, 1e-10]), np.linspace(1.0, 12.0, 12)
+    found = sw.sweep(
+        sw.Pendulum,
+        {"omega": omega, "tolerance": tolerance},
+        "dop853",
+        v=0.0,
+        y=1.0,
+        at=at,
+        outcomes=sw.sweeps.Exponents("all", transient=4),
+    )
+    for i, k in np.ndindex(3, 2):
+        truth = sw.lyapunov(
+            sw.Pendulum(omega[i]), "dop853", v=0.0, y=1.0, tolerance=tolerance[k], at=at, transient=4, exponents="all"
+        )
+        np.testing.assert_array_equal(found.lyapunov[i, k], truth.exponents)
 
 
 def test_a_history_needs_no_interval() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell import _core, engine
-from stepwell.errors import UnsupportedError
+from stepwell.errors import ToleranceWarning, UnsupportedError
 from stepwell.reference import series, series_pace
 from stepwell.reference.traced import Tracer
 from test_graphs import assert_one_graph
@@ -409,6 +410,249 @@ def test_what_is_refused() -> None:
     with pytest.raises(UnsupportedError, match=r"about 633600 operations a step, and may have 100000; take dop853"):
         sw.integrate(bodies, "taylor", v=0.0 * state, y=state, dt=0.01, steps=3)
     assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
+
+
+#: What is made of pieces, as rates of v.
+PIECES: dict[str, Callable[[Any, Any, Any], Any]] = {
+    "ceil of the time": lambda t, v, y: -np.ceil(t),
+    "minus a floor": lambda t, v, y: -np.floor(-y),
+    "trunc": lambda t, v, y: np.trunc(y),
+    "rint": lambda t, v, y: np.rint(-y),
+    "mod": lambda t, v, y: np.mod(t, 1.0),
+    "remainder": lambda t, v, y: np.remainder(y, 0.7),
+    "%": lambda t, v, y: (2.0 * y + t) % 1.5,
+    "//": lambda t, v, y: y // 1.0,
+    "sign": lambda t, v, y: -np.sign(y),
+    "copysign": lambda t, v, y: np.copysign(1.0, -y),
+    "a truth as a number": lambda t, v, y: (y > 0.0) * -1.0,
+    "maximum": lambda t, v, y: -np.maximum(y, 0.5),
+    "clip": lambda t, v, y: -np.clip(y, -0.5, 0.5),
+    "inside a function": lambda t, v, y: np.exp(-abs(y)),
+}
+
+
+@pytest.mark.parametrize("name", PIECES)
+def test_pieces_are_refused_alike(name: str) -> None:
+    rates = sw.system(PIECES[name])
+    with pytest.raises(UnsupportedError, match=r"tolerance: .* chooses between values .*; use another method, such as dop853"):
+        sw.integrate(rates, "taylor", v=0.3, y=1.3, tolerance=1e-9, at=[4.0])
+
+
+@pytest.mark.parametrize("name", sorted({*FUNCTIONS} - {"abs"}))
+def test_functions_are_no_pieces_however_they_are_signed(name: str) -> None:
+    """Roundings and operations on bits within a function do not count, and its negative may be made of another one of them."""
+    of_p = FUNCTIONS[name][0]
+
+    def signed(t: Any, y: Any) -> Any:
+        p = polynomial(t)
+        return -of_p(p) + 0.0 * (0.0 - of_p(p)) + -1.0 * of_p(0.0 - (-p)) + 0.0 * y
+
+    assert not sw.system(order=1)(signed)().sized(None, np.zeros(())).chooses
+
+
+def fall(power: float, below: float) -> sw.System:
+    """Attracted by a point ``below`` zero with (y + below)^−power: it is there in a finite time."""
+
+    @sw.system
+    def falling(t: Any, v: Any, y: Any) -> Any:
+        return -((y + below) ** -power)
+
+    return falling()
+
+
+def decay(power: float, factor: float) -> sw.System:
+    @sw.system(order=1)
+    def decaying(t: Any, y: Any) -> Any:
+        return factor * y**power
+
+    return decaying()
+
+
+def pole_of_time() -> sw.System:
+    @sw.system(order=1)
+    def driven(t: Any, y: Any) -> Any:
+        return 1.0 / (1.7 - 0.6 * t) ** 2
+
+    return driven()
+
+
+def head_on() -> sw.System:
+    return sw.NBody([1.0, 1.0], force="newton")
+
+
+#: Motions that end in a singularity from y = 1 and v = 0, and when.
+ENDS: dict[str, tuple[Callable[[], sw.System], float]] = {
+    "collision": (lambda: fall(2, 0.0), math.pi / math.sqrt(8.0)),
+    "steep collision": (lambda: fall(3, 0.0), 1.0),
+    "far from zero": (lambda: fall(2, -0.5), 0.5**1.5 * math.pi / math.sqrt(8.0)),
+    "soft collision": (lambda: fall(1, 0.0), math.sqrt(math.pi / 2.0)),
+    "root": (lambda: decay(-1, -0.5), 1.0),
+    "cube root": (lambda: decay(-2, -1.0), 1.0 / 3.0),
+    "two thirds": (lambda: decay(-0.5, -1.0), 2.0 / 3.0),
+    "pole": (lambda: decay(2, 1.0), 1.0),
+    "double pole": (lambda: decay(1.5, 1.0), 2.0),
+    "root of a pole": (lambda: decay(3, 1.0), 0.5),
+    "pole of the time": (pole_of_time, 1.7 / 0.6),
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
+@pytest.mark.parametrize("name", ENDS)
+def test_no_step_crosses_a_singularity(name: str, tolerance: float) -> None:
+    """However small the last terms are there, and though coefficients pass all bounds of numbers.
+
+    Each of n steps errs by less than 2τ of the largest length so far, which is 1 before the motion is fast; the time of the end
+    changes by at most twice the relative error (T ~ y² of a root, y^1.5 of a collision): 4nτ, and n roundings.
+    """
+    of, end = ENDS[name]
+    start = {} if of().v_shape == (0,) else {"v": 0.0}
+    with pytest.warns(ToleranceWarning, match=r"stopped before t = 50, at t = .*(too small to move the time|finite)"):
+        run = sw.integrate(of(), "taylor", y=1.0, tolerance=tolerance, at=[50.0], **start)
+    assert run.paces is not None
+    assert run.status != 0
+    assert np.isnan(run.y[-1])
+    steps = float(run.paces.accepted)
+    assert steps < 300
+    assert abs(float(run.paces.t) / end - 1.0) < 4.0 * steps * (tolerance + EPS)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("backward", [False, True])
+def test_one_singular_component_among_others_ends_the_run(tolerance: float, backward: bool) -> None:
+    """Components that are larger and move smoothly hide no pole of another, forward or backward in time: as above, 4nτ."""
+    sign = -1.0 if backward else 1.0
+
+    @sw.system(order=1)
+    def among_others(t: Any, y: Any) -> Any:
+        return sign * np.stack([-0.5 / y[0], 1e3 * np.cos(2.0 * t), -0.3 * y[2]])
+
+    with pytest.warns(ToleranceWarning, match=r"too small to move the time"):
+        run = sw.integrate(among_others(), "taylor", y=[1.0, 0.0, 1.0], tolerance=tolerance, at=[sign * 1.5])
+    assert run.paces is not None
+    assert run.status != 0
+    steps = float(run.paces.accepted)
+    assert abs(abs(float(run.paces.t)) - 1.0) < 4.0 * steps * (tolerance + EPS)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_steps_end_at_jumps_and_at_branches(tolerance: float) -> None:
+    """ẏ = |t − 1.3| has the integral (t − 1.3)·|t − 1.3|/2; no step crosses 0.9 and 2.1, nor goes on behind 1.3 as before."""
+
+    @sw.system(order=1)
+    def kinked(t: Any, y: Any) -> Any:
+        return np.sqrt((t - 1.3) ** 2) + 0.0 * y
+
+    at = np.array([0.5, 1.0, 1.5, 3.0])
+    run = sw.integrate(kinked, "taylor", y=1.0, tolerance=tolerance, at=at, jumps=[0.9, 2.1])
+    assert run.paces is not None
+    assert run.status == 0
+    true = 1.0 + 0.5 * ((at - 1.3) * np.abs(at - 1.3) + 1.3**2)
+    # Each of n steps errs by less than 2τ of the largest length.
+    assert np.max(np.abs(run.y - true)) < 2.0 * tolerance * true.max() * float(run.paces.accepted)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9, 1e-15])
+@pytest.mark.parametrize("offset", [0.0, 1e3])
+def test_bodies_that_collide_head_on_stop(tolerance: float, offset: float) -> None:
+    """Two of mass 1 at rest at distance 1: they meet after π/√16, and neither passes through the other."""
+    y = np.array([[-0.5, offset], [0.5, offset]])
+    with pytest.warns(ToleranceWarning, match=r"a collision"):
+        run = sw.integrate(head_on(), "taylor", v=0.0 * y, y=y, tolerance=tolerance, at=[3.0])
+    assert run.paces is not None
+    # As above, with the tolerance relative to the length of y, 1 or more.
+    size = max(1.0, math.sqrt(2.0) * offset)
+    assert abs(float(run.paces.t) / (math.pi / 4.0) - 1.0) < 4.0 * float(run.paces.accepted) * size * (tolerance + EPS)
+
+
+@pytest.mark.parametrize("octaves", [-200, -40, 300])
+def test_steps_do_not_depend_on_the_unit_of_time(octaves: int) -> None:
+    """A unit that is a power of two changes no bit of y, though the coefficients of order 20 differ by 2⁶⁰⁰⁰."""
+    unit = 2.0**octaves
+
+    @sw.system(order=1)
+    def oval(t: Any, y: Any, *, rate: float = 1.0) -> Any:
+        return rate * np.stack([y[1] / np.sqrt(1.0 + y[0] * y[0]), -y[0]])
+
+    ask: dict[str, Any] = {"y": [1.0, 0.0], "tolerance": 1e-15}
+    plain, scaled = (sw.integrate(oval(rate=1.0 / u), "taylor", at=[5.0 * u, 20.0 * u], **ask) for u in (1.0, unit))
+    assert plain.paces is not None
+    assert scaled.paces is not None
+    assert np.array_equal(plain.y, scaled.y)
+    assert plain.paces.accepted == scaled.paces.accepted > 20
+    assert plain.paces.h * unit == scaled.paces.h
+
+
+#: Rates that are smooth along a solution although they change their branch: as a series goes on they would be others.
+BRANCHED: dict[str, Callable[[Any, Any, Any], Any]] = {
+    "root of a square": lambda t, v, y: -np.sqrt(y**2),
+    "hypot": lambda t, v, y: -np.hypot(y, 0),
+    "norm": lambda t, v, y: -np.linalg.norm(np.stack([y, 0.0 * y])),
+    "sign by a root": lambda t, v, y: -y / np.sqrt(y * y),
+    "cut of arctan2": lambda t, v, y: np.arctan2(np.sin(3.0 * t), np.cos(3.0 * t)),
+    "two zeros in a step": lambda t, v, y: -np.sqrt(((t - 2.0) ** 2 - 0.01) ** 2),
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("name", BRANCHED)
+def test_a_step_does_not_leave_a_branch(name: str, tolerance: float) -> None:
+    """|y| as a root, and others: as right as the tolerance says.
+
+    Each of n steps errs by less than 2τ of the largest length, 7, as does each change of branch, which is made in a step whose
+    whole motion is within the tolerance. Of ÿ = −|y| an error grows less than ÿ = y makes it, in 4 units of time by cosh 4 = 27.
+    """
+    rates = sw.system(BRANCHED[name])
+    run = sw.integrate(rates, "taylor", v=0.3, y=1.3, tolerance=tolerance, at=[4.0])
+    true = sw.integrate(rates, "dop853", v=0.3, y=1.3, tolerance=1e-13, at=[4.0])
+    assert run.paces is not None
+    assert run.status == 0
+    assert run.paces.rejected > 0
+    error = max(abs(float(run.v[-1] - true.v[-1])), abs(float(run.y[-1] - true.y[-1])))
+    assert error < 2.0 * tolerance * 7.0 * 27.0 * (float(run.paces.accepted) + 1.0)
+    assert error < 10.0 * tolerance  # and in fact: such errors do not all add up
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize(("inverse", "of"), [(np.arcsin, np.sin), (np.arccos, np.cos), (np.arctan, np.tan)])
+def test_a_branch_that_ends_at_a_rounding_is_right_or_said(inverse: Any, of: Any, tolerance: float) -> None:
+    """Within 1e-8 of its turns a sine is rounded to ±1, where the inverse has no derivative; a tangent has a pole."""
+    rates = sw.system(lambda t, v, y: -inverse(of(2.0 * y)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ToleranceWarning)
+        run = sw.integrate(rates, "taylor", v=0.3, y=1.3, tolerance=tolerance, at=[4.0])
+    true = sw.integrate(rates, "dop853", v=0.3, y=1.3, tolerance=1e-13, at=[4.0])
+    assert run.status != 0 or abs(run.y[-1] - true.y[-1]) < 10.0 * tolerance
+
+
+def test_branches_of_a_batch_are_those_of_the_reference() -> None:
+    """Steps that fail, and saved states within those that follow."""
+
+    @sw.system
+    def kinked(t: Any, v: Any, y: Any) -> Any:
+        return -np.hypot(y, 0.1 * v) - np.sqrt((y - 0.2) ** 2) + np.arctan2(v, y)
+
+    y = np.linspace(0.5, 1.5, 9)
+    ask: dict[str, Any] = {"v": 0.3, "y": y, "tolerance": 1e-6, "at": np.linspace(0.1, 3.0, 40)}
+    ours, theirs = (sw.integrate(kinked, "taylor", backend=backend, **ask) for backend in ("rust", "numpy"))
+    assert ours.paces is not None
+    assert theirs.paces is not None
+    assert ours.paces.rejected.min() > 0
+    assert np.array_equal(ours.y, theirs.y)
+    assert all(np.array_equal(a, b) for a, b in zip(ours.paces, theirs.paces, strict=True))
+
+
+def test_tame_motions_meet_no_bound() -> None:
+    """No step of these is rejected, at any tolerance; and from 1e-4 on none is shorter than by the tolerance alone."""
+    eight = sw.scenes.figure_eight()
+    arguments: list[tuple[sw.System, Any, Any]] = [
+        (eight.system, eight.v, eight.y),
+        (sw.Pendulum(), 0.0, 2.5),
+        (sw.NBody([1.0, 0.0], force="newton"), [[0.0, 0.0], [0.0, math.sqrt(199.0)]], [[0.0, 0.0], [0.01, 0.0]]),
+    ]
+    for (system, v, y), tolerance in itertools.product(arguments, (1e-2, 1e-3, 1e-4, 1e-9, 1e-15)):
+        run = sw.integrate(system, "taylor", v=v, y=y, tolerance=tolerance, at=[6.2])
+        assert run.paces is not None
+        assert run.status == run.paces.rejected == 0
 
 
 def three_bodies(members: int) -> dict[str, Any]:

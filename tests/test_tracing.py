@@ -133,11 +133,11 @@ def test_every_attempt(name: str) -> None:
         relative=row(1e-3, 1e-2, 1e-3),
         absolute=row(0.0, 1e-2, 0.0),
         lasts=row(1.0, 0.0, 1.0),
-        longest_v=row(0.7, 0.2, 0.0),
-        longest_y=row(0.4, 0.3, 0.0),
         begin=row(T - 2.0, T, T - 1.0),
         interval=row(np.inf, 1e-3, 0.1),
         until=row(-np.inf, T + 1.0, T + 1.0),
+        most_step=row(np.inf, 1.0, 0.05),
+        wall=row(np.inf, 1.9, T + 0.02),
         before=row(0.9, 0.6, 1.0),
         most=row(5.0, 1.0, 5.0),
         accepted=row(0.0, 3.0, 7.0),
@@ -145,18 +145,20 @@ def test_every_attempt(name: str) -> None:
         extra_steps=row(0.0, 2.0, 4.0),
         error=row(0.0, 2.0, 0.5),
         work=row(0.0, 0.3, -0.2),
+        longest=np.array(
+            [row(0.7, 0.2, 0.0), row(0.4, 0.3, 0.0)][-engine.groups_of(engine.Plan(system, ABLE[0], (MEMBERS,), H)) :]
+        ),
     )
     paces = [pace, pace._replace(target=row(9.0, T, 9.0), relative=row(9.0, 1.0, 9.0)), pace._replace(extra=row(0.01, 0.0, 0.02))]
-    axes = len(system.v_shape), len(system.y_shape)
     for method in ABLE:
         tape = Tape()
         symbols = Tracer(system, tape).attempt(method)
         s = adaptive.Attempted(system.scaled(1.0, system.batch))
         with np.errstate(all="ignore"):
-            attempt = engine.attempts(method, s, axes)
+            attempt = engine.attempts(engine.Plan(system, method, (MEMBERS,), H), s)
             outcomes = [attempt(each, 9.0, v, y) for each in paces]
         for each, (after, v1, y1) in zip(paces, outcomes, strict=True):
-            assert_computes(numbers(system, tape, symbols, v, y, *each, budget=9.0), v1, y1, *after)
+            assert_computes(numbers(system, tape, symbols, v, y, *each.numbers, budget=9.0), v1, y1, *after.numbers)
 
 
 def test_the_matrix_form() -> None:

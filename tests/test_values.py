@@ -115,8 +115,8 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         lambda: sw.Rods([1.0, 1.0], [((0.0, 0.0), 0), (0, 1)], 1.0),
         lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], 1.0),
         lambda: sw.Rods([1.0, 1.0], [((0.0, 1.0), 0), (0, 1)], [1.0, 2.0], gravity=0.0),
-        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(0.5)),
-        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor([0.5, 0.6])),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(restitution=0.5)),
+        lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(restitution=[0.5, 0.6])),
     ],
     "Chain": [
         lambda: sw.Chain(3),
@@ -160,7 +160,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     ],
     "Floor": [
         sw.Floor,
-        lambda: sw.Floor(0.5),
+        lambda: sw.Floor(restitution=0.5),
         lambda: sw.Floor(friction=0.1),
         lambda: sw.Floor(normal=(1.0, 1.0)),
         lambda: sw.Floor(offset=1.0),

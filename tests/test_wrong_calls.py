@@ -37,6 +37,31 @@ class Refuses:
         raise TypeError("no array here")
 
 
+class WithGradient:
+    """As a tensor that a gradient is computed through: whatever asks for its numbers gets an error of its own kind."""
+
+    def __init__(self, array: Any) -> None:
+        self.array = np.asarray(array)
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.")
+
+    def __dlpack__(self, **_: Any) -> Any:
+        raise BufferError("Can't export tensors that require gradient")
+
+    def __dlpack_device__(self) -> Any:
+        return 1, 0
+
+    def __len__(self) -> int:
+        return len(self.array)
+
+    def __getitem__(self, index: Any) -> WithGradient:
+        return WithGradient(self.array[index])
+
+    def __float__(self) -> float:
+        return float(self.array)
+
+
 def _misaligned(shape: tuple[int, ...]) -> Any:
     size = int(np.prod(shape))
     return np.frombuffer(b"x" + np.ones(size).tobytes(), np.float64, offset=1).reshape(shape)
@@ -140,6 +165,12 @@ JUNK: dict[str, Callable[[], Any]] = {
     "misaligned": lambda: _misaligned((3,)),
     "misaligned too": lambda: _misaligned((3, 2)),
     "one number wide": lambda: np.broadcast_to(np.float64(1.0), (3,)),
+    "with a gradient": lambda: WithGradient(np.ones(3)),
+    "numbers with gradients": lambda: [WithGradient(1.0), WithGradient(0.5)],
+    "10**11 members": lambda: np.broadcast_to(np.float64(1.0), (10**11,)),
+    "10**11 vectors": lambda: np.broadcast_to(np.ones((3, 1)), (3, 10**11)),
+    "10**11 whole numbers": lambda: np.broadcast_to(1, (10**11,)),
+    "a range of 10**11": lambda: range(10**11),
     "a system": lambda: sw.Pendulum(),
     "a control": lambda: sw.EnergyControl(0.1),
     "an input": lambda: sw.Sampled(np.ones((2, 5)), 0.1),
@@ -248,6 +279,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "start": None,
             "carry": None,
             "carried_by": None,
+            "carried_for": None,
             "first_bad_step": None,
             "dt_before": None,
         }
@@ -277,6 +309,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "start": "first_order",
             "carry": 1.0,
             "carried_by": "verlet",
+            "carried_for": "0" * 64,
             "backend": "numpy",
         },
     ),
@@ -343,7 +376,12 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "lyapunov": (
         sw.lyapunov,
         {"system": sw.Pendulum(), "method": "rk4", "v": 0.0, "y": 1.0, "dt": 0.1, "steps": 4, "exponents": "all"}
-        | {"transient": 2, "every": 2, "t0": 0.0},
+        | {"transient": 2, "every": 2, "t0": 0.0, "threads": 1},
+    ),
+    "lyapunov with a tolerance": (
+        sw.lyapunov,
+        {"system": sw.Pendulum(), "method": "merson", "v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": [1.0, 2.0], "exponents": 1}
+        | {"transient": 1, "t0": 0.0, "dt": 0.1},
     ),
     "load": (sw.load, {"path": SAVED, "system": None}),
     "load own": (sw.load, {"path": SAVED_OWN, "system": own.pendulum}),

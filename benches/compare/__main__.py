@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .. import stages
 from . import extras, machine, peers, report, runner, workloads
-from .chosen import tables
+from .chosen import solar, tables
 from .own import first_call
 
 EPILOG = """To compare at another CPU level: STEPWELL_KERNELS=avx2 (stepwell), STEPWELL_BENCH_MARCH=x86-64-v3 (C),
@@ -54,7 +54,7 @@ def main() -> None:
         parts += [report.markdown(*made), report.threads(rows)]
         write()
     if "chosen".startswith(only):
-        parts.append("## Adaptive steps\n\n" + tables.READING.format(repeats=repeats))
+        parts.append("## Adaptive steps\n\n" + tables.READING.format(repeats=repeats, budget=solar.BUDGET))
         for made in tables.tables(repeats, given.quick, given.members):
             report.show(*made)
             parts.append(report.markdown(*made))
@@ -64,10 +64,13 @@ def main() -> None:
         made = first_call.table(repeats, given.quick)
         report.show(*made)
         parts.append(report.markdown(*made))
+        write()
     if "stages".startswith(only):
-        for made in (stages.table(), stages.adaptive_table()):
+        for make in (stages.table, stages.adaptive_table):
+            made = make()
             report.show(*made)
             parts.append(report.markdown(*made))
+            write()
     made = "Besides steps", ["what", "measured", "aim"], [list(line) for line in extras.table(repeats, given.quick)]
     report.show(*made)
     parts += [report.markdown(*made)]

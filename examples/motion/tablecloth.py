@@ -15,7 +15,7 @@ ends = [(at[:, :-1], at[:, 1:]), (at[:-1], at[1:]), (at[:-1, :-1], at[1:, 1:]), 
 pairs = np.concatenate([np.stack([i.ravel(), j.ravel()], axis=1) for i, j in ends])
 y = np.stack([at % n / (n - 1) - 0.5, at // n / (n - 1) - 0.5, 0.0 * at], axis=-1).reshape(-1, 3)
 ball = sw.Sphere((0.0, 0.0, -0.35), 0.3, restitution=0.0, friction=0.8)
-floor = sw.Floor(0.0, friction=0.5, offset=-0.65)
+floor = sw.Floor(restitution=0.0, friction=0.5, offset=-0.65)
 cloth = sw.Springs(
     pairs, stiffness=60.0, layout=y, damping=0.02, masses=1e-3, drag=1e-3, gravity=(0, 0, -9.81), floor=[ball, floor]
 )

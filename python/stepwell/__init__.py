@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from . import _core, errors
-from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, StepwellError, ToleranceWarning
+from .errors import AccuracyWarning, ControlWarning, DivergenceWarning, EventWarning, StepwellError, ToleranceWarning
 
 if TYPE_CHECKING:
     from . import (
@@ -77,6 +77,7 @@ __all__ = [
     "DivergenceWarning",
     "EnergyControl",
     "Event",
+    "EventWarning",
     "Explanation",
     "Explorer",
     "ExportedStep",
@@ -146,7 +147,7 @@ __all__ = [
 def isa() -> str:
     """The CPU level in use: the best of this machine, or the one that ``STEPWELL_KERNELS`` names. All give the same bits.
 
-    At ``baseline`` steps are interpreted (``STEPWELL_KERNELS=interpret``); at the others they become machine code.
+    At ``interpret`` steps are interpreted; at the others they become machine code.
 
     Example:
         >>> sw.isa() in sw.isa_levels()
@@ -159,7 +160,7 @@ def isa_levels() -> list[str]:
     """The CPU levels that this machine has.
 
     Example:
-        >>> "baseline" in sw.isa_levels()
+        >>> "interpret" in sw.isa_levels()
         True
     """
     return _core.isa_levels()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import operator
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
+from itertools import islice
 from math import isfinite, prod
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -29,6 +30,12 @@ LAST_STEP = 2**53
 
 #: NumPy has 32 axes in its older versions; those of a block, of saved states, outputs, nodes and inputs go with those of a batch.
 MOST_AXES = 24
+
+#: Less memory than this, in bytes, is not checked: a check takes as long as filling some hundred kilobytes.
+_FEW_BYTES = 1 << 24
+
+#: Lists of names, functions or pairs are no longer than this; a range or a broadcast array takes no memory until it is made one.
+MOST_OF_A_LIST = 1_000_000
 
 #: So many characters of a path are shown in a message.
 PATH = 1000
@@ -56,14 +63,13 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
         return np.array(value)  # the most frequent case: nothing more to check
     if type(value) is np.ndarray and _core.sound(value, finite, positive):
         return value  # likewise; the checks below say what is wrong with any other
+    if type(value) is np.ndarray and value.nbytes > _FEW_BYTES and 0 in value.strides:
+        _room(argument, value.shape)
+        once = numbers(argument, once_of(value), positive=positive, finite=finite, unit=unit)
+        return np.broadcast_to(once, value.shape)
     if type(value) is np.ndarray and value.dtype == np.float32 and _core.sound(wide := _widened(value), finite, positive):
         return wide
-    if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
-        value = shared(argument, value)
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, RecursionError, UserWarning) as error:  # a warning is of masked numbers in a list
-        raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+    array: Array = as_array(argument, value)
     if type(value) is not np.ndarray and (masked := _masked(value)):
         raise ArgumentError(f"{argument}: expected numbers{_in(unit)}, got a masked array in which {masked} are masked")
     if _core.sound(array, finite, positive):
@@ -73,6 +79,7 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if array.dtype.kind not in "iuf":
         raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
     if array.dtype != np.float64 or not array.dtype.isnative:
+        _room(argument, array.shape)
         with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused below
             array = array.astype(np.float64)
     if not array.flags.aligned:
@@ -84,6 +91,50 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if positive and (wrong := array <= 0).any():
         raise ArgumentError(f"{argument}: expected numbers above zero{_in(unit)}, got {array[wrong][0]:g}{_where(wrong)}")
     return array
+
+
+def as_array(argument: str, value: Any) -> Any:
+    """What a user gives as an array, of whatever dtype; of another library's array NumPy's over the same memory."""
+    if hasattr(value, "__dlpack__") and not isinstance(value, np.ndarray):
+        return shared(argument, value)
+    if not isinstance(value, np.ndarray) or 0 in value.strides:
+        _room(argument, _nested(value))
+    try:
+        return np.asarray(value)
+    except RuntimeError as error:
+        if isinstance(error, RecursionError):
+            raise ShapeError(
+                f"{argument}: expected a number or a regular array, got a {type(value).__name__} of itself"
+            ) from None
+        raise _foreign(argument, value, error) from None
+    except (ValueError, TypeError, BufferError, UserWarning) as error:  # a warning is of masked numbers in a list
+        raise ShapeError(f"{argument}: expected a number or a regular array, got {type(value).__name__} ({error})") from None
+
+
+def once_of(array: Any) -> Any:
+    """The part of an array that it repeats along its broadcast axes."""
+    return array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)] if array.size else array
+
+
+def _nested(value: Any) -> Shape:
+    """The shape of lists within lists, by the first of each: what they need is known before it is taken."""
+    shape: Shape = ()
+    while len(shape) < MOST_AXES and isinstance(value, (list, tuple, range)) and len(value):
+        shape, value = (*shape, len(value)), value[0]
+    return (*shape, *value.shape) if isinstance(value, np.ndarray) else shape
+
+
+def _room(argument: str, shape: Shape) -> None:
+    """Raise if an array of floats of that shape does not fit in memory."""
+    needed = 8.0 * prod(shape)
+    if needed <= _FEW_BYTES:
+        return
+    available, bound = available_memory()
+    if needed > available:
+        raise TooLargeError(
+            f"{argument}: expected an array that fits in memory, got shape {shape}: {_bytes(needed)} as floats, but "
+            f"{_bytes(max(available, 0.0))} are available ({bound})"
+        )
 
 
 def _widened(value: Any) -> Array:
@@ -100,12 +151,18 @@ def shared(argument: str, value: Any) -> Any:
     try:
         return np.from_dlpack(value)
     except Exception as error:  # of what kind it is differs from library to library
-        why = str(error).strip().splitlines() or [type(error).__name__]
-        raise DTypeError(
-            f"{argument}: expected an array in the memory of the CPU, of a type that NumPy has and without gradients, got "
-            f"{type(value).__module__}.{type(value).__name__} ({short(why[0])[1:-1]}); convert it first: PyTorch's by "
-            f".detach().cpu().double(), JAX's by jax.device_get outside of jax.jit"
-        ) from None
+        raise _foreign(argument, value, error) from None
+
+
+def _foreign(argument: str, value: Any, error: Exception) -> DTypeError:
+    """The error of an array of another library that NumPy cannot take, or of a list of them."""
+    why = str(error).strip().splitlines() or [type(error).__name__]
+    kind = type(value).__name__ if type(value).__module__ == "builtins" else f"{type(value).__module__}.{type(value).__name__}"
+    return DTypeError(
+        f"{argument}: expected an array in the memory of the CPU, of a type that NumPy has and without gradients, got "
+        f"{kind} ({short(why[0])[1:-1]}); convert it first: PyTorch's by .detach().cpu().double(), JAX's by jax.device_get "
+        f"outside of jax.jit"
+    )
 
 
 def _masked(value: Any) -> int:
@@ -144,6 +201,16 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
     return float(array)
 
 
+def step(value: Any) -> float:
+    """Return ``dt`` as one float other than zero; below zero time runs back."""
+    if type(value) is float and isfinite(value) and value != 0.0:
+        return value
+    dt = number("dt", value, unit="units of time")
+    if dt == 0.0:
+        raise ArgumentError("dt: expected a number other than zero in units of time, got 0")
+    return dt
+
+
 def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     """Return ``value`` as a whole number in ``least … most``."""
     if type(value) is int and least <= value <= most:
@@ -161,14 +228,27 @@ def count(argument: str, value: Any, least: int, most: int = LAST_STEP) -> int:
     return n
 
 
+#: In which direction a quantity passes a level: as numbers, which SciPy takes too, and as words.
+DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
+
+
+def direction(argument: str, value: Any) -> int:
+    """Return a direction as 1, −1 or 0; it may be given as a word."""
+    return DIRECTIONS[known(argument, value, DIRECTIONS)] if isinstance(value, str) else count(argument, value, -1, 1)
+
+
 def several(argument: str, value: Any, what: str) -> list[Any]:
     """Return a list of what is given several of; a text is not the list of its letters."""
     if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
         raise DTypeError(f"{argument}: expected a list of {what}, got {short(value)} ({type(value).__name__})")
     try:
-        return list(value)
+        too_many = isinstance(value, Sized) and len(value) > MOST_OF_A_LIST
+        several = [] if too_many else list(islice(value, MOST_OF_A_LIST + 1))
     except NotImplementedError:  # a memoryview of several axes is iterable, and does not iterate
         raise DTypeError(f"{argument}: expected a list of {what}, got a {type(value).__name__} of several axes") from None
+    if too_many or len(several) > MOST_OF_A_LIST:
+        raise TooLargeError(f"{argument}: expected a list of at most {MOST_OF_A_LIST} {what}, got more in {short(value)}")
+    return several
 
 
 def callback(argument: str, value: Any) -> Any:
@@ -262,10 +342,6 @@ def member(array: Array, index: Shape) -> Array:
     for i in reversed(index):
         array = array[..., i]
     return np.asarray(array)
-
-
-#: Less memory than this, in bytes, is not checked: a check takes as long as filling some hundred kilobytes.
-_FEW_BYTES = 1 << 24
 
 
 def is_single(dtype: Any) -> bool:
@@ -399,7 +475,8 @@ def in_place(
     if not isinstance(array, np.ndarray):
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
     if array.dtype != dtype or not array.dtype.isnative:
-        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}")
+        other = f', or dtype="{array.dtype}" as an argument' if array.dtype in (np.float32, np.float64) else ""
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}; give such an array{other}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

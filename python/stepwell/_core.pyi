@@ -4,12 +4,13 @@ Arrays are C-contiguous. Rows are arrays of two axes: what is counted, and the m
 Plans, pacings and their arrays are read by the names of their attributes, which stand in ``engine/``.
 """
 
+from collections.abc import Callable
 from typing import Any, NoReturn, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .engine import AdaptiveArrays, Arrays, Pacing, Plan
+from .engine import AdaptiveArrays, Arrays, CorePacing, Plan
 
 __all__ = [
     "Equations",
@@ -19,6 +20,7 @@ __all__ = [
     "World",
     "__version__",
     "adapt",
+    "ask",
     "catalogue",
     "check",
     "compiled",
@@ -26,6 +28,7 @@ __all__ = [
     "in_parts",
     "isa",
     "isa_levels",
+    "listen",
     "program",
     "run",
     "series_evaluations",
@@ -63,6 +66,9 @@ class ModelSpec:
     ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
 
     ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length.
+
+    Operations that are given as ``step()`` make the step in place of the method: their rates are the next numbers of the state,
+    and their parameters are those of the system.
     """
 
     def __new__(
@@ -183,11 +189,12 @@ class Tape:
         dy: list[Symbol] | None = None,
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
-        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]]]] = ...,
+        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None]] = ...,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
 
-        ``functions`` are values with, for each that they depend on, the derivative by it.
+        ``functions`` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its
+        bounds.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """
@@ -210,13 +217,19 @@ def sound(value: object, finite: bool, positive: bool) -> bool:
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
+def ask(function: Callable[[], object] | None) -> None:
+    """Let this thread ask a function at intervals while it steps, or none; what the function raises ends the run."""
+
+def listen() -> None:
+    """Raise if this thread is to stop: what the function says that it asks, and ``KeyboardInterrupt`` after Ctrl-C."""
+
 def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
     """Whether some member has diverged, now or before.
 
     Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
     """
 
-def adapt(model: ModelSpec, plan: Plan, pacing: Pacing, arrays: AdaptiveArrays) -> bool:
+def adapt(model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArrays) -> bool:
     """Make a run with a tolerance. Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything.
 
     False if nothing was done, since the start is to be found and an attempt is too long for one tape.
@@ -255,6 +268,9 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
+
+def operations(model: ModelSpec) -> int:
+    """About how many operations a step of fixed length has, before any is traced."""
 
 def series_evaluations(model: ModelSpec, *, attempts: bool = False) -> int:
     """To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _encounters, engine
+from . import _encounters, _known_energy, engine
 from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
 from .control import EnergyControl
@@ -17,6 +17,7 @@ from .errors import AccuracyWarning, ControlWarning
 from .method_records import method
 from .result import Run
 from .systems import NBody
+from .systems.base import aligned
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5
@@ -57,10 +58,14 @@ def warn_of_nonsense(run: Run, start: State | None) -> None:
     if (text := system.doubt(run.y)) is not None:
         warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
+        if text is None and _is_heard(AccuracyWarning) and (text := _known_energy.told(run, start)) is not None:
+            warnings.warn(text, AccuracyWarning, stacklevel=3)
         return
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None
         energy = None if ends is None else _of_energy(run.method.name, ends)
+        if energy is None and system.keeps_energy and start is not None:
+            energy = _of_massless(run, system, start)
         met = None if run.encounter is None else _of_encounters(run, system, start, None if energy is None else energy[1])
         if text := "; ".join(text for text in (None if energy is None else energy[0], met) if text is not None):
             warnings.warn(text, AccuracyWarning, stacklevel=3)
@@ -141,12 +146,13 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
     If they went on alone, from the start or from a saved state; or that did so, alone, before the end.
     """
     n, members, made = bodies.y_shape[0], run.status.size, run.method.evaluations * run.steps
-    h, time = run.dt, run.steps * run.dt
+    # Where time runs back, bodies are looked at that go the other way.
+    h, time, way = abs(run.dt), run.steps * abs(run.dt), 1.0 if run.dt > 0.0 else -1.0
     # As many states as are little work against the run. Time runs back from the last.
     few = run.status.ndim == 0 and n <= FEW_BODIES
     looked = min(STATES, len(run.t) - 1, made // EVALUATIONS)
     between = np.linspace(1, len(run.t) - 1, looked, endpoint=False, dtype=int).tolist() if len(run.t) > 2 else []
-    states = [start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1])]
+    states = [(way * v, y) for v, y in (start, *((run.v[i], run.y[i]) for i in between), (-run.v[-1], run.y[-1]))]
     if few:
         if made < FEW_EVALUATIONS:
             return []
@@ -165,10 +171,8 @@ def _suspects(run: Run, bodies: NBody, start: State) -> list[tuple[int, ...]]:
 
 def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
     """What is to be said, and of which member."""
-    first, last, moved = ends
-    with np.errstate(all="ignore"):
-        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
-    wrong &= np.isfinite(last)  # members that diverged were named before
+    first, last, _ = ends
+    wrong = _changed(ends)
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
@@ -179,6 +183,54 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, tuple[int, ...]] | None:
         f"so {method} did not follow its orbit"
     )
     return text, index
+
+
+def _changed(ends: Ends) -> Any:
+    """Where an energy at the end is of another size than at the start."""
+    first, last, moved = ends
+    with np.errstate(all="ignore"):
+        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+    return wrong & np.isfinite(last)  # members that diverged were named before
+
+
+def _of_massless(run: Run, bodies: NBody, start: State) -> tuple[str, tuple[int, ...]] | None:
+    """What is to be said of bodies without mass around a single one with mass, and of which member.
+
+    The energy of all bodies is blind to them. Relative to a single attractor each keeps its energy per unit of mass; several
+    attractors may take from it or add to it as much as they like.
+    """
+    if bodies.masses.all():
+        return None  # the usual case, which takes a microsecond
+    alone = np.count_nonzero(bodies.masses, axis=0) == 1
+    made = run.method.evaluations * run.steps if run.paces is None else _least(run.paces.evaluations)
+    if not alone.any() or made < FEW_EVALUATIONS or run.y[-1].size > MOST_NUMBERS:
+        return None
+    (v, y), batch = (run.v[-1], run.y[-1]), run.status.shape
+    masses = np.broadcast_to(aligned(bodies.masses, 1, batch), (len(y), *batch))
+    attractor = masses.argmax(axis=0)[np.newaxis, np.newaxis]
+    strength = bodies.G * masses.max(axis=0)
+
+    def energies(v: Array, y: Array) -> tuple[Array, Array]:
+        d, w = (each - np.take_along_axis(each, attractor, axis=0) for each in (y, v))
+        r2 = (d * d).sum(axis=1) + bodies.softening * bodies.softening
+        kinetic = 0.5 * (w * w).sum(axis=1)
+        return kinetic + strength * (-1.0 / np.sqrt(r2) if bodies.force == "newton" else 0.5 * np.log(r2)), kinetic
+
+    with np.errstate(all="ignore"):
+        (first, began), (last, ended) = energies(np.broadcast_to(start[0], y.shape), start[1]), energies(v, y)
+    wrong = _changed(Ends(first, last, np.maximum(began, ended))) & (masses == 0.0) & alone
+    if not wrong.any():
+        return None
+    body, *index = np.argwhere(wrong)[0].tolist()
+    some = int(np.count_nonzero(wrong))
+    who, energies_at = f"body {body}{of_member(tuple(index))}", f"{last[body, *index]:.3g} instead of {first[body, *index]:.3g}"
+    energy, followed = "another energy per mass at the end", f"so {run.method.name} did not follow"
+    text = (
+        f"{who}, which has no mass, has {energy}: {energies_at}, {followed} its orbit"
+        if some == 1
+        else f"{some} bodies without mass have {energy}: {who} has {energies_at}, {followed} their orbits"
+    )
+    return text, tuple(index)
 
 
 def _ends(run: Run, bodies: NBody, start: State | None) -> Ends | None:

@@ -35,6 +35,24 @@ MAX_LENGTH = 200
 OPTIONAL_WORDS = ("the", "method", "rule", "scheme", "integrator")
 
 
+#: Methods of a kind that is not here, by their usual names in the spelling of ``spelling``, and what there is instead.
+NOT_HERE = {
+    r"implicit_.*|.*_implicit|backward_euler|crank_nicolson|i?bdf\d?|.*radau.*|lsod[aei]?r?|l?vode|cvode|(esd|sd|d)irk.*|"
+    r"tr_?bdf2|rosenbrock.*|ros\d.*|rodas.*|kvaerno\d?|kencarp\d+|lobatto.*|gauss_legendre.*|newmark.*|hht.*|generali[sz]ed_alpha|"
+    r"ode(15s|15i|23s|23t|23tb)|backward_differentiation.*|exponential_euler|xpbd|imex.*": (
+        "implicit, and no implicit method is here; for stiff springs shorten the step (stability_limit, safe_step) or use Rods, "
+        "for stiff equations SciPy's Radau, BDF or LSODA."
+    ),
+    r"euler_maruyama|.*milstein.*|sri?w?\d?|sra\d?|sosri\d?|sosra\d?|langevin|baoab|.*stochastic.*": (
+        "for equations with noise, and there is none here; noise that is held over a step is an input, sw.Sampled."
+    ),
+    r"tsit(ouras)?_?5.*|vern(er)?_?\d|(bogacki_shampine|bs|rk|ode)_?(3|23|32)|cash_karp|rkck|(ode|rk)(78|89)|ode113|feagin.*": (
+        "not here; merson, fehlberg, fehlberg_5, dop853 and taylor choose their steps, with tolerance= and at=."
+    ),
+    r"adams.*|abm?_?\d?|.*multistep.*|gear.*|stormer_cowell": "a method of several steps, and none of them is here.",
+}
+
+
 class Names(NamedTuple):
     """All names of the records, in the spelling of ``spelling``.
 
@@ -101,10 +119,14 @@ def resolved(name: str, methods: dict[str, Method]) -> Method:
     if key in names.qualified:
         told = "; ".join(f"{full} is {holder!r}" for holder, full in names.qualified[key])
         raise UnknownNameError(f"method: {shown} does not say which: {told}. Known: {', '.join(methods)}.")
-    if key in names.friends:
+    if key in names.friends or _why_not_here(key):
         told = _explained(shown.strip("'"), key, names)
         raise UnknownNameError(f"method: {told} Known: {', '.join(methods)}.")
     raise UnknownNameError(f"method: there is no {shown}{_hint(key, names)} Known: {', '.join(methods)}.")
+
+
+def _why_not_here(key: str) -> str | None:
+    return next((why for pattern, why in NOT_HERE.items() if re.fullmatch(pattern, key)), None)
 
 
 def _hint(key: str, names: Names) -> str:
@@ -128,6 +150,8 @@ def _nearest(key: str, known: Iterable[str], margin: float = 0.0) -> tuple[float
 
 def _explained(name: str, key: str, names: Names) -> str:
     """What the name of a method that is not here means, and which methods are the nearest."""
+    if why := _why_not_here(key):
+        return f"{name} is {why}"
     what, near = names.friends[key]
     real = spelling(what) if what else key
     near = names.friends[real][1] if real in names.friends else near

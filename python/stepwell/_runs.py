@@ -8,6 +8,7 @@ import numpy as np
 
 from . import _checks
 from ._checks import Array
+from .errors import ArgumentError
 from .systems import System
 
 if TYPE_CHECKING:
@@ -42,6 +43,14 @@ def spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Arra
     if not array.ndim:
         return _checks.over(array, batch)
     return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
+
+
+def goes_with_times(has_tolerance: bool, at: Any) -> None:
+    """Raise if one of ``tolerance`` and ``at`` is missing, saying what it is."""
+    if at is None:
+        raise ArgumentError("at: expected too with tolerance=: the times at which states are saved, such as at=[t1, t2]")
+    if not has_tolerance:
+        raise ArgumentError("tolerance: expected too with at=: the error that a step may have, such as tolerance=1e-6")
 
 
 def bar_of(title: str) -> Any:

@@ -46,9 +46,9 @@ def _is_of_rods(system: System) -> bool:
 
 def rounded_step(dt: float) -> float:
     """A step, rounded to float32; raise if nothing is left of it."""
-    rounded = float(np.float32(dt)) if dt <= LARGEST_SINGLE else np.inf
-    if not 0.0 < rounded < np.inf:
-        raise ArgumentError(f"dt: expected a number above zero in float32, from 1.4e-45 to 3.4e38 units of time, got {dt!r}")
+    rounded = float(np.float32(dt)) if abs(dt) <= LARGEST_SINGLE else np.inf
+    if not 0.0 < abs(rounded) < np.inf:
+        raise ArgumentError(f"dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32, got {dt!r}")
     return rounded
 
 

@@ -18,6 +18,9 @@ Object = TypeVar("Object")
 #: Among the attributes of an object that cannot be changed any more.
 DONE = "_done"
 
+#: Of more bytes than this it is made sure that a copy fits in memory.
+LARGE = 1 << 24
+
 
 class Value:
     """Equal to another of its class if all that it holds is equal, arrays number by number; NaN equals NaN.
@@ -90,7 +93,7 @@ class Maker(ABCMeta):
     if not TYPE_CHECKING:  # which takes the arguments from ``__init__``
 
         def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-            """A new object; its arrays are read-only from now on."""
+            """A new object; its arrays are its own from now on, and read-only."""
             made = super().__call__(*args, **kwargs)
             read_only(vars(made))
             vars(made)[DONE] = True
@@ -114,8 +117,8 @@ class Maker(ABCMeta):
 class Fixed(metaclass=Maker):
     """An object that cannot be changed, since what was made of it would not see the change.
 
-    Attributes cannot be assigned, except those that begin with ``_``, and its arrays are read-only. ``changed`` makes another
-    object.
+    Attributes cannot be assigned, except those that begin with ``_``. Its arrays are read-only, and copies of what it was given:
+    whoever gave them may go on to write into theirs. ``changed`` makes another object.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -130,7 +133,8 @@ class Fixed(metaclass=Maker):
 
     def _refuse(self, name: str, what: str) -> None:
         if not name.startswith("_") and DONE in vars(self):
-            raise FixedError(f"{name}: the {name} of {type(self).__name__} cannot be {what}; {self._instead}")
+            kind = getattr(self, "kind_name", type(self).__name__)
+            raise FixedError(f"{name}: the {name} of {kind} cannot be {what}; {self._instead}")
 
     @property
     def _instead(self) -> str:
@@ -176,14 +180,36 @@ def aligned(attributes: dict[str, Any]) -> None:
 
 
 def read_only(attributes: dict[str, Any]) -> None:
-    """Replace arrays by read-only views, and dictionaries of them by some that cannot be changed."""
+    """Replace arrays by read-only ones that nobody else can write to, and dictionaries of them by some that cannot be changed."""
     for name, value in attributes.items():
         if isinstance(value, np.ndarray):
-            if value.flags.writeable:
-                attributes[name] = view = value.view()
-                view.flags.writeable = False
+            attributes[name] = frozen(name, value)
         elif type(value) is dict and not name.startswith("_"):
             attributes[name] = FixedDict(value)
+
+
+def frozen(name: str, array: Any) -> Any:
+    """An array that nobody else can write to: itself if it is read-only and owns its numbers, or else a read-only copy.
+
+    A view that is read-only does not suffice: what it views may still be written to.
+    """
+    owner = array
+    while isinstance(owner.base, np.ndarray):
+        owner = owner.base
+    if not array.flags.writeable and not owner.flags.writeable and (owner.base is None or type(owner.base) is bytes):
+        return array
+    if array.nbytes > LARGE and 0 not in array.strides:
+        from ._checks import fits  # which needs this module
+
+        fits(f"{name}: copies", array.nbytes / 8, (), "an array that is read-only and owns its memory is not copied")
+    if not array.size or 0 not in array.strides:
+        copied = array.copy()
+        copied.flags.writeable = False
+        return copied
+    # What was broadcast stays one number for many.
+    once = array[tuple(slice(None) if stride else slice(1) for stride in array.strides)].copy()
+    once.flags.writeable = False
+    return np.broadcast_to(once, array.shape)
 
 
 class FixedDict(dict[str, Any]):

@@ -13,6 +13,9 @@ StepForm = Literal["direct", "matrix"]
 #: What computes a run.
 Backend = Literal["rust", "numpy"]
 
+#: What is between samples of an input.
+Interpolation = Literal["hold", "linear", "cubic"]
+
 #: What the velocity of an oscillator is.
 OscillatorForm = Literal["canonical", "physical"]
 
@@ -24,6 +27,9 @@ BodyForce = Literal["logarithmic", "newton", "printed"]
 
 #: What a surface does to a point behind it.
 ContactWay = Literal["safe", "restitution", "flip", "spring"]
+
+#: In which direction a quantity passes a level.
+Direction = Literal["rising", "falling", "both"]
 
 #: How a control divides by what it keeps.
 ControlForm = Literal["limited", "printed"]

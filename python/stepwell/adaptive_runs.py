@@ -5,31 +5,52 @@ from __future__ import annotations
 import warnings
 from contextlib import nullcontext
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from . import _checks, engine
-from ._brief import first_of, share
-from ._checks import Array
+from . import _checks, _going_on, engine
+from ._brief import share
+from ._checks import Array, Shape
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
+from ._stops import warn_of_stops
 from .compatible import goes_with_series, not_of_a_step
 from .control import a_control
 from .errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
-from .result import AdaptiveState, Paces, Run, Status
+from .reference.acceptance import Acceptance
+from .result import AdaptiveState, Paces, Run
 from .systems import System
 from .systems.base import TINY
 
 if TYPE_CHECKING:
     from .events import Event
-    from .reference.adaptive import Pace
 
 #: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
 MOST_STEPS = 1_000_000
 #: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
 MAX_ABSOLUTE_SHARE = 0.01
+
+
+class AdaptiveOptions(NamedTuple):
+    """What goes with a tolerance only, as the user gave it.
+
+    Attributes:
+        tolerance: as ``integrate`` takes it.
+        at: the times at which states are saved.
+        max_steps: the most attempts of a member.
+        max_step: the longest step.
+        jumps: times that no step crosses.
+        positive: which components must not become negative.
+    """
+
+    tolerance: Any
+    at: Any
+    max_steps: Any = None
+    max_step: Any = None
+    jumps: Any = None
+    positive: Any = None
 
 
 def adaptive_run(
@@ -38,12 +59,10 @@ def adaptive_run(
     v: Any,
     y: Any,
     dt: Any,
-    tolerance: Any,
-    at: Any,
-    max_steps: Any,
+    options: AdaptiveOptions,
     record: Any,
     t0: Any,
-    went: tuple[Any, Any] | None,
+    went: tuple[Any, Any, Any] | None,
     control: Any,
     fused: bool,
     threads: int | None,
@@ -51,66 +70,76 @@ def adaptive_run(
     progress: bool,
     asked: list[Event] | None,
 ) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on from ``went``, a carry and the method of it."""
-    if how.error_order is None:
-        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
-        raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
-    if system.rubbing is not None:
+    """The run with a tolerance, and where it began, if it did not go on from ``went``: a carry, its method and what it is for."""
+    control = _steppable(system, how, a_control(control), options, went)
+    t0 = _checks.numbers("t0", t0, unit="units of time")
+    times = _checks.numbers("at", options.at, unit="units of time").copy()  # they become those of the run
+    if times.ndim == 0 or len(times) == 0:
+        raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
+    backward = _is_backward(times, t0)
+    if backward and (acting := system.keeper if control is None else control) is not None and getattr(acting, "pushes", True):
         raise UnsupportedError(
-            f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
-            f"estimated; use dt= and steps="
+            f"at: {acting!r} leads a state back to its target as time goes on, so backward in time it leads away from it; "
+            f"use a projection"
         )
-    if system.contacts:
-        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
-    control = a_control(control)
-    if how.has_series:
-        goes_with_series(system, control)
-    not_of_a_step(system.keeper if control is None else control)
-    if at is None or (tolerance is None) == (went is None):
-        if at is not None and went is not None:
-            raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
-        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
-    t0 = _checks.number("t0", t0, unit="units of time")
-    times = _checks.numbers("at", at, unit="units of time")
-    if times.ndim != 1 or len(times) == 0:
-        raise ShapeError(f"at: expected times along one axis, got shape {times.shape}")
-    carry = None if went is None else _paces_of(how, *went)
-    since = t0 if carry is None else float(carry[engine.TARGET].max(initial=t0))
-    if times[0] < since or (len(times) > 1 and (np.diff(times) <= 0).any()):
-        begin = f"t0 = {t0:g} on" if carry is None else f"the last time of the run that goes on, {since:g}, on"
-        raise ArgumentError(f"at: expected times that ascend from {begin}, got {times[:5].tolist()}{'…' * (len(times) > 5)}")
-    last = float(times[-1])
-    system.check_time(max(abs(t0), abs(last)))
+    sign = -1.0 if backward else 1.0
     backend = _checks.known("backend", backend, BACKENDS)
-    budget = MOST_STEPS if max_steps is None else _checks.count("max_steps", max_steps, 1)
+    budget = MOST_STEPS if options.max_steps is None else _checks.count("max_steps", options.max_steps, 1)
     v = _checks.block("v", v, system.v_shape, system.axes)
     y = _checks.block("y", y, system.y_shape, system.axes)
+    acceptance = Acceptance(system.groups, positive=_positive(system, options.positive, v, y))
+    numbers = prod(system.v_shape) + prod(system.y_shape)
+    groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
+    carry = None
+    if went is not None:
+        carry = _paces_of(how, went, groups, numbers)
+        acceptance = acceptance._replace(own=len(carry) == engine.PACE_NUMBERS + 3 * groups + numbers)
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-    if carry is None:
-        relative, absolute = _tolerances(tolerance)
-        first = None if dt is None else _checks.numbers("dt", dt, positive=True, unit="units of time")
-        tolerances = {"relative": relative.shape} | ({} if absolute is None else {"absolute": absolute.shape})
-        batches["tolerance"] = _checks.batch_shape(tolerances)
-        if first is not None:
-            batches["dt"] = first.shape
-    else:
+    batches |= {"t0": t0.shape, "at": times.shape[1:]}
+    first = most_step = None
+    if carry is not None:
         if dt is not None:
             raise ArgumentError("dt: the run that goes on has its next step already")
         batches["carry"] = carry.shape[1:]
+    elif dt is not None:
+        first = _checks.numbers("dt", dt, unit="units of time")
+        if (sign * first <= 0.0).any():
+            raise ArgumentError(
+                f"dt: expected a step {'below' if backward else 'above'} zero, as at= goes, got {_checks.short(dt)}"
+            )
+        first = sign * first
+        batches["dt"] = first.shape
+    if options.max_step is not None:
+        most_step = _checks.numbers("max_step", options.max_step, positive=True, unit="units of time")
+        batches["max_step"] = most_step.shape
+    jumps = _jumps(system, options.jumps, t0, times)
+    if jumps is not None:
+        batches["jumps"] = jumps.shape[1:]
     if control is not None:
         batches |= {"control": control.batch}
+    tolerances = None
+    if carry is None:
+        tolerances = _tolerances(options.tolerance, system, acceptance, _checks.batch_shape(batches))
+        acceptance = acceptance._replace(own=tolerances.of_groups)
+        shapes = {"relative": tolerances.relative.shape}
+        if tolerances.absolute is not None:
+            shapes["absolute"] = tolerances.absolute.shape
+        batches["tolerance"] = _checks.batch_shape({name: shape[tolerances.of_groups :] for name, shape in shapes.items()})
     batch = _checks.batch_shape(batches)
     if carry is not None and carry.shape[1:] != batch:
         raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.shape[1:]}")
+    since = sign * t0 if carry is None else np.maximum(carry[engine.TARGET], sign * t0)
+    _ascending(sign * times, since, sign, carry is not None)
+    for end in (t0, times):
+        system.check_time(float(np.abs(end).max()))
     record = quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
-    numbers = prod(system.v_shape) + prod(system.y_shape)
     _checks.fits(
         "the saved states",
-        len(times) * numbers + NUMBERS_PER_STATE * (numbers + 1),
+        len(times) * numbers + (NUMBERS_PER_STATE + 3) * (numbers + 1),
         batch,
         "ask for fewer times or split the batch",
-        beside=len(times) * BYTES_PER_TIME,
+        beside=times.size * BYTES_PER_TIME,
     )
     v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
     ended, adapt = None, engine.adapt
@@ -119,18 +148,32 @@ def adaptive_run(
 
         ended = adaptive.AdaptiveRun(asked)
         adapt = ended.adapt
-    with bar_of(f"{how.title} to t = {times[-1]:g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
+    with bar_of(f"{how.title} to t = {times[-1].max():g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        order = order_of_series(how, relative if carry is None else carry[engine.RELATIVE])
-        plan = engine.Plan(system, how, batch, 1.0, t0, threads=workers, backend=backend, progress=told, fused=fused, order=order)
-        paces = engine.paces(plan, first, relative, absolute) if carry is None else _without_work(carry)
-        out = adapt(plan, engine.Pacing(np.ascontiguousarray(times), budget, carry is None), paces, v, y)
+        order = order_of_series(how, tolerances.relative if tolerances is not None else _relative(carry, acceptance, groups))
+        begin: Any = sign * t0 if t0.ndim else float(sign * t0)
+        plan = engine.Plan(
+            system, how, batch, 1.0, begin, threads=workers, backend=backend, progress=told, fused=fused, order=order,
+            acceptance=acceptance, backward=backward,
+        )  # fmt: skip
+        at = np.ascontiguousarray(sign * times)
+        pacing = engine.Pacing(at, budget, carry is None, None if jumps is None else np.sort(sign * jumps, axis=0))
+        if carry is None or went is None:
+            assert tolerances is not None
+            paces = engine.paces(plan, first, tolerances, most_step, pacing)
+        else:
+            paces, v, y, begins = _going_on.taken_up(plan, pacing, carry, str(went[2]), v, y)
+            pacing = pacing._replace(begins=begins)
+            if most_step is not None:
+                paces[engine.MOST_STEP] = most_step
+        out = adapt(plan, pacing, paces, v, y)
     accepted, rejected, extra_steps = out.paces[engine.COUNTS].astype(np.int64)
     # Saved states and the step that is held for them are by the same coefficients, but where operations are fused.
     again = out.paces[engine.HELD] > 0.0 if how.has_series and not fused else extra_steps
     evaluations = out.evaluations * (accepted + rejected + again)
     stopped = np.count_nonzero(out.status) > 0
+    given_again = {"max_step": options.max_step, "jumps": options.jumps, "positive": options.positive}
     run = Run(
         t=times,
         v=out.v,
@@ -141,31 +184,143 @@ def adaptive_run(
         system=system,
         method=how,
         dt=1.0,
-        t0=t0,
+        t0=t0.item() if t0.size == 1 and t0.ndim == 0 else t0,
         start_step=0,
         steps=0,
         start=None,
-        paces=Paces(out.paces[engine.TIME], out.paces[engine.STEP], accepted, rejected, evaluations),
-        stand=AdaptiveState(out.last_v, out.last_y, _aimed(out.paces, last), last, how.name),
+        paces=Paces(sign * out.paces[engine.TIME], sign * out.paces[engine.STEP], accepted, rejected, evaluations),
+        stand=AdaptiveState(
+            out.last_v,
+            out.last_y,
+            _aimed(out.paces, at[-1]),
+            times[-1],
+            how.name,
+            {name: each for name, each in given_again.items() if each is not None},
+        ),
         fused=fused,
         work=None if system.control is None else out.paces[engine.WORK] / engine.pushes(system.control, how.attempt_evaluations),
     )
     for name in record:
         run.recorded[name] = run.quantity(name)
     if stopped:
-        _warn_of_stops(run)
-    if np.count_nonzero(out.paces[engine.ABSOLUTE]):
-        _warn_of_lost(engine.pace_of(out.paces, batch))
+        run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
+        warn_of_stops(run)
+    if not acceptance.own and np.count_nonzero(out.paces[engine.ABSOLUTE]):
+        _warn_of_lost(out.paces, groups)
     if ended is not None:
         ended.tell(run)
-    return run, None if carry is not None else (v, y)
+    return run, (v, y) if pacing.begins else None
 
 
-def _without_work(paces: Array) -> Array:
-    """The same where no control has done anything yet in this run."""
-    paces = paces.copy()
-    paces[engine.WORK] = 0.0
-    return paces
+def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptions, went: Any) -> Any:
+    """The control, if the method can step the system with a tolerance; what has to be given is there."""
+    if how.error_order is None:
+        able = ", ".join(m.name for m in every_method() if m.error_order is not None)
+        raise UnsupportedError(f"tolerance: {how.name} does not estimate its error, so it cannot choose its steps; use {able}")
+    if system.rubbing is not None:
+        raise UnsupportedError(
+            f"tolerance: {system!r} has friction that sticks; what it does depends on the step, so the error of a step cannot be "
+            f"estimated; use dt= and steps="
+        )
+    if system.contacts:
+        raise UnsupportedError(f"tolerance: goes with systems that meet no surfaces, got {system!r}; use dt= and steps=")
+    if how.has_series:
+        goes_with_series(system, control)
+        if options.positive is not None:
+            raise UnsupportedError(
+                f"positive: {how.name} rejects no step for the sign of a component; use a method that does, such as dop853"
+            )
+    not_of_a_step(system.keeper if control is None else control)
+    if options.tolerance is not None and went is not None:
+        raise ArgumentError("tolerance: given twice, for carry has that of the run that goes on")
+    return control
+
+
+def _is_backward(times: Array, t0: Array) -> bool:
+    """Whether the last times are before the start; of all members alike."""
+    ahead = times[-1] - t0
+    if (ahead > 0.0).any() and (ahead < 0.0).any():
+        raise ArgumentError("at: expected all members to go forward in time, or all backward, got some of each")
+    return bool((ahead < 0.0).any()) or (not (ahead > 0.0).any() and len(times) > 1 and bool((times[1] < times[0]).any()))
+
+
+def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
+    """Raise unless times go on from where members stand, in the direction of the run."""
+    if (times[0] >= since).all() and (len(times) == 1 or (np.diff(times, axis=0) > 0).all()):
+        return
+    word = "descend" if sign < 0.0 else "ascend"
+    start = sign * np.asarray(since)
+    at = f"{start.item():g}" if start.size == 1 else f"{start.min():g} to {start.max():g}"
+    begin = f"the last time of the run that goes on, {at}, on" if goes_on else f"t0 = {at} on"
+    shown = (sign * times).reshape(len(times), -1)[:5, 0].tolist()
+    raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown}{'…' * (len(times) > 5)}")
+
+
+def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
+    """The times that no step crosses, in ascending order along the first axis: those of the user and of inputs."""
+    # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
+    ahead = bool(np.max(times[-1] - t0) >= 0.0)
+    of_inputs = system.jumps(*((float(np.min(t0)), np.inf) if ahead else (-np.inf, float(np.max(t0)))))
+    if given is None:
+        return of_inputs if len(of_inputs) else None
+    jumps = np.atleast_1d(_checks.numbers("jumps", given, unit="units of time"))
+    own = np.broadcast_to(of_inputs.reshape(-1, *(jumps.ndim - 1) * (1,)), (len(of_inputs), *jumps.shape[1:]))
+    return np.sort(np.concatenate([jumps, own]), axis=0)
+
+
+def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:
+    """Places of the components that must not become negative, among the numbers of v and then of y."""
+    if given is None or given is False:
+        return ()
+    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
+    if given is True:
+        places = list(range(n_v, n_v + n_y))
+    else:
+        parts = given if isinstance(given, (list, np.ndarray)) else [given]
+        places = sorted({_place(system, part) for part in parts})
+    rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
+    for place in places:
+        if (rows[place] < 0.0).any():
+            raise ArgumentError(
+                f"positive: expected a start at which {_name_of(system, place)} is not negative, got {rows[place].min():g}"
+            )
+    return tuple(places)
+
+
+def _rows_of(block: Array, axes: int) -> list[Array]:
+    return list(block.reshape((-1, *block.shape[axes:])))
+
+
+def _place(system: System, part: Any) -> int:
+    """The place of a component that is given as an index of y, or as ("v", …) or ("y", …)."""
+    block, index = (
+        ("y", part) if not isinstance(part, tuple) or not part or isinstance(part[0], (int, np.integer)) else (part[0], part[1:])
+    )
+    block = _checks.known("positive", block, ["v", "y"])
+    shape = system.v_shape if block == "v" else system.y_shape
+    index = index if isinstance(index, tuple) else (index,)
+    fits = len(index) == len(shape) and all(
+        isinstance(i, (int, np.integer)) and not isinstance(i, bool) and 0 <= i < n for i, n in zip(index, shape, strict=True)
+    )
+    if shape == () and index == (0,):
+        index, fits = (), True
+    if not fits:
+        raise ArgumentError(
+            f"positive: expected True, or components of {block}, whose shape is {shape}: an index of y, or as ('y', 0), got "
+            f"{_checks.short(part)}"
+        )
+    return (
+        int(np.ravel_multi_index(index, shape)) + (prod(system.v_shape) if block == "y" else 0)
+        if shape
+        else (prod(system.v_shape) if block == "y" else 0)
+    )
+
+
+def _name_of(system: System, place: int) -> str:
+    """A component as it is written."""
+    n_v = prod(system.v_shape)
+    block, shape, number = ("v", system.v_shape, place) if place < n_v else ("y", system.y_shape, place - n_v)
+    return f"{block}[{', '.join(map(str, np.unravel_index(number, shape)))}]" if shape else block
 
 
 def _aimed(paces: Array, target: float) -> Array:
@@ -195,74 +350,98 @@ def order_of_series(method: Method, relative: Array) -> int:
     return order
 
 
-def _paces_of(method: Method, carry: Any, carried_by: Any) -> Array:
-    """The numbers that say where the members stand of a run with a tolerance that goes on."""
-    if carried_by is None:
-        raise ArgumentError("carried_by: expected the method by which the run goes on, as run.resume has it")
+def _relative(carry: Any, acceptance: Acceptance, groups: int) -> Array:
+    """The relative tolerances in a carry."""
+    if not acceptance.own:
+        return np.asarray(carry[engine.RELATIVE])
+    return np.asarray(carry[engine.PACE_NUMBERS + groups : engine.PACE_NUMBERS + 2 * groups])
+
+
+def _paces_of(method: Method, went: tuple[Any, Any, Any], groups: int, of_state: int) -> Array:
+    """The numbers that say where the members stand of a run with a tolerance that goes on, and their states there."""
+    carry, carried_by, carried_for = went
+    for name, each, what in (("carried_by", carried_by, "the method"), ("carried_for", carried_for, "the digest")):
+        if each is None:
+            raise ArgumentError(f"{name}: expected {what} by which the run goes on, as run.resume has it")
+    _going_on.a_digest(carried_for)
     by = _checks.known("carried_by", carried_by, [each.name for each in every_method()])
     if by != method.name:
         raise ArgumentError(f"carry: expected that of a run by {method.name}, got one by {by}")
     numbers = _checks.numbers("carry", carry, finite=False)
-    if numbers.shape[:1] != (engine.PACE_NUMBERS,):
+    expected = [engine.PACE_NUMBERS + each * groups + of_state for each in (1, 3)]
+    if numbers.shape[:1] not in [(each,) for each in expected]:
         raise ShapeError(
-            f"carry: with a tolerance expected that of run.resume, {engine.PACE_NUMBERS} numbers for each member along the first "
-            f"axis, got shape {numbers.shape}"
+            f"carry: with a tolerance expected that of run.resume, {expected[0]} or {expected[1]} numbers for each member along "
+            f"the first axis, got shape {numbers.shape}"
         )
     return numbers
 
 
-def _tolerances(tolerance: Any) -> tuple[Array, Array | None]:
-    """The relative one, and the absolute one of a pair."""
+def _tolerances(tolerance: Any, system: System, acceptance: Acceptance, batch: Shape) -> engine.Tolerances:
+    """The relative one, and the absolute one of a pair: numbers over the batch, or of each component along the first axis."""
     if isinstance(tolerance, list):
         raise DTypeError(
-            "tolerance: expected a number, an array over the batch, or a tuple (relative, absolute), got a list, which might be "
-            "meant as either; make it a NumPy array or a tuple"
+            "tolerance: expected a number, an array, or a tuple (relative, absolute), got a list, which might be meant as "
+            "either; make it a NumPy array or a tuple"
         )
-    if not isinstance(tolerance, tuple):
-        return _checks.numbers("tolerance", tolerance, positive=True), None
-    if len(tolerance) != 2:
-        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(tolerance)} of them")
-    relative, absolute = (_checks.numbers("tolerance", each, positive=True) for each in tolerance)
-    return relative, absolute
+    parts = tolerance if isinstance(tolerance, tuple) else (tolerance,)
+    if isinstance(tolerance, tuple) and len(parts) != 2:
+        raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(parts)} of them")
+    relative = _checks.numbers("tolerance", parts[0], positive=True)
+    absolute = None if len(parts) == 1 else _checks.not_negative("tolerance", parts[1])
+    each = [relative] if absolute is None else [relative, absolute]
+    of_components = [_is_of_components(part, system, batch) for part in each]
+    if not any(of_components):
+        return engine.Tolerances(relative, absolute)
+    of_groups = [_of_groups(part, own, system, acceptance) for part, own in zip(each, of_components, strict=True)]
+    return engine.Tolerances(of_groups[0], of_groups[1] if len(of_groups) > 1 else None, of_groups=True)
 
 
-#: Why a member of a run with a tolerance stopped, in words.
-WHY_STOPPED = {
-    Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: a collision, in the motion or "
-    "by the errors that the tolerance allows",
-    Status.NOT_FINITE: "no step, however small, gives finite numbers",
-}
+def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
+    """Whether a tolerance is one for each component of y, shape (*block, …), and not one for each member."""
+    axes = len(system.y_shape)
+    fits = bool(axes) and part.ndim >= axes and part.shape[:axes] == system.y_shape
+    if fits and part.ndim <= len(batch) and part.shape == batch[len(batch) - part.ndim :]:
+        raise ShapeError(
+            f"tolerance: an array of shape {part.shape} may be meant for each component of y or for each member; give it the "
+            f"shape (*block, *batch): {system.y_shape + len(batch) * (1,)} for components, {axes * (1,) + part.shape} for members"
+        )
+    return fits
 
 
-def _warn_of_stops(run: Run) -> None:
-    assert run.paces is not None
-    stopped = run.status != 0
-    time = float(run.paces.t[stopped].min())
-    first = tuple(np.argwhere(stopped & (run.paces.t == time))[0].tolist())
-    some = int(np.count_nonzero(stopped))
-    warnings.warn(
-        f"{share(some, stopped.shape, stopped.size)} stopped before t = {run.t[-1]:g}"
-        f"{first_of(some, first, stopped.size) or ','} at t = {time:g}; {WHY_STOPPED[Status(int(run.status[first]))]}",
-        ToleranceWarning,
-        stacklevel=4,
-    )
+def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acceptance) -> Array:
+    """A tolerance of each group: of several components the least."""
+    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
+    groups = acceptance.groups or (0,) * n_v + (int(n_v > 0),) * n_y
+    count = sum(acceptance.counts(n_v, n_y))
+    if not of_components:
+        return np.broadcast_to(part, (count, *part.shape))
+    if n_v not in (0, n_y):
+        raise ShapeError(
+            f"tolerance: v and y have different shapes, {system.v_shape} and {system.y_shape}; give one number for all"
+        )
+    rows = part.reshape(n_y, *part.shape[len(system.y_shape) :])
+    of_each = np.concatenate([rows, rows]) if n_v else rows
+    least = np.full((count, *rows.shape[1:]), np.inf)
+    for group, row in zip(groups, of_each, strict=True):
+        least[group] = np.minimum(least[group], row)
+    return least
 
 
-def lost_in_tolerance(pace: Pace) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Members whose absolute tolerance is most of what a step may err, and much of the motion itself, shape (*batch)."""
-    lost = np.zeros(pace.t.shape, dtype=bool)
-    if not pace.absolute.any():
-        return lost
-    for square in (pace.longest_v, pace.longest_y):
-        longest = np.sqrt(square)
-        lost |= (longest > 0.0) & (pace.absolute > pace.relative * longest) & (pace.absolute > MAX_ABSOLUTE_SHARE * longest)
-    return lost
+def lost_in_tolerance(paces: Array, groups: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Members whose absolute tolerance is most of what a step may err, and much of the motion itself, shape (*batch).
+
+    ``paces`` are the numbers of where they stand. The motion is that of the group that has been the largest.
+    """
+    absolute, relative = paces[engine.ABSOLUTE], paces[engine.RELATIVE]
+    longest = paces[engine.PACE_NUMBERS : engine.PACE_NUMBERS + groups].max(axis=0, initial=0.0)
+    lost = (longest > 0.0) & (absolute > relative * longest) & (absolute > MAX_ABSOLUTE_SHARE * longest)
+    return np.asarray(lost, dtype=bool)
 
 
-def _warn_of_lost(pace: Pace) -> None:
+def _warn_of_lost(paces: Array, groups: int) -> None:
     """Warn of members that are lost in their absolute tolerance."""
-    lost = lost_in_tolerance(pace)
+    lost = lost_in_tolerance(paces, groups)
     if lost.any():
         warnings.warn(
             f"tolerance: for {share(int(lost.sum()), lost.shape, lost.size)} the absolute part lets a step err by more "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import _checks
-from .control import EnergyControl
+from .control import Control, EnergyControl, NormControl
 from .errors import ArgumentError, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
@@ -75,6 +75,26 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
         raise ArgumentError(
             f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
             f"{anew}"
+        )
+
+
+def goes_back(system: System, control: Any) -> None:
+    """Raise if a system has no past that steps back in time could find."""
+    if system.rubbing is not None:
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and friction that sticks forgets how fast it was: {system!r} at rest has many "
+            f"pasts; use dt above zero"
+        )
+    if any(surface.way != "spring" for surface in system.contacts):
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and a bounce is found where a step ends behind a surface, as late as time goes on; "
+            f'got {system!r}. Use way="spring"; or of a motion without friction and loss step −v with dt above zero'
+        )
+    control = system.keeper if control is None else control
+    if getattr(control, "pushes", False) or isinstance(control, (Control, NormControl)):
+        raise UnsupportedError(
+            f"dt: below zero time runs back, and {control!r} drives back to its target as time goes on, so away from it as time "
+            f"goes back; use a projection"
         )
 
 

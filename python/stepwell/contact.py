@@ -128,9 +128,9 @@ class Floor(Surface):
 
     def __init__(
         self,
+        *,
         restitution: Any = 1.0,
         friction: Any = None,
-        *,
         normal: Any = None,
         offset: Any = 0.0,
         way: ContactWay = "safe",

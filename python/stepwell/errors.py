@@ -5,6 +5,11 @@ A message says what was given, what was expected, and the argument's name.
 
 from __future__ import annotations
 
+from contextvars import ContextVar
+
+#: The errors of what is being traced, in their order; None while nothing is.
+REFUSED: ContextVar[list[TraceError] | None] = ContextVar("refused", default=None)
+
 
 class StepwellError(Exception):
     """The base class of every error that stepwell raises intentionally.
@@ -14,7 +19,7 @@ class StepwellError(Exception):
         ...     sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.0, steps=10)
         ... except sw.StepwellError as error:
         ...     print(error)
-        dt: expected numbers above zero in units of time, got 0
+        dt: expected a number other than zero in units of time, got 0
     """
 
 
@@ -43,6 +48,12 @@ class TraceError(ArgumentError):
 
     #: Whether the cause may be a state of another shape than the function expects.
     of_shape = False
+
+    def __init__(self, *said: object) -> None:
+        super().__init__(*said)
+        # A user's `except Exception` may swallow it; what went on to be traced would not be the user's equations.
+        if (refused := REFUSED.get()) is not None:
+            refused.append(self)
 
 
 class TooLargeError(ArgumentError, MemoryError):
@@ -97,6 +108,21 @@ class ControlWarning(UserWarning):
         ...     run = bodies.run("standard_euler", steps=1, control=sw.EnergyControl(1e3, "printed"))
         >>> caught[0].category.__name__
         'ControlWarning'
+    """
+
+
+class EventWarning(UserWarning):
+    """Some members came to rest at an event whose changes of the state follow each other within no time.
+
+    Example:
+        >>> @sw.system
+        ... def ball(t, v, y): return -9.81
+        >>> ground = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="ground")
+        >>> with warnings.catch_warnings(record=True) as caught:
+        ...     warnings.simplefilter("always", sw.EventWarning)
+        ...     run = sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.01, steps=300, events=ground)
+        >>> bool(run.status == sw.Status.REST), run.stopped_at.round(6)  # √(2/9.81)·(1 + 0.5)/(1 − 0.5)
+        (True, array(1.354571))
     """
 
 

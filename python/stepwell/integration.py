@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _encounters, _growth, _memory, engine
+from . import _checks, _core, _encounters, _going_on, _growth, _memory, engine
 from ._brief import first_of, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
-from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
-from .adaptive_runs import adaptive_run
-from .compatible import fits_together, forced, goes_on_alike, goes_on_by_a_rule, velocities
+from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, goes_with_times, quantities, spread
+from .adaptive_runs import AdaptiveOptions, adaptive_run
+from .compatible import fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
 from .method_records import Method
@@ -56,12 +56,16 @@ def integrate(
     t0: float = 0.0,
     start: str | None = None,
     max_steps: int | None = None,
+    max_step: Any = None,
+    jumps: Any = None,
+    positive: Any = None,
     progress: bool = False,
     threads: int | None = None,
     backend: Backend = "rust",
     start_step: int = 0,
     carry: Any = None,
     carried_by: str | None = None,
+    carried_for: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
 ) -> Run:
@@ -71,7 +75,7 @@ def integrate(
     others. The result is the same to the last bit on every CPU, for every number of threads, with either backend, alone or
     in a batch, in one piece or in several.
 
-    Most runs need ``v``, ``y``, ``dt``, ``steps`` and ``every``, or ``tolerance`` and ``at``. The last five, from
+    Most runs need ``v``, ``y``, ``dt``, ``steps`` and ``every``, or ``tolerance`` and ``at``. The last six, from
     ``start_step`` on, are those of a run that continues another: ``**run.resume`` gives them, and they are not written by hand.
 
     Args:
@@ -79,19 +83,23 @@ def integrate(
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero; if None in a continued run, the step of that run. With a tolerance, the step
-            to try first; if None, a hundredth of the time in which the state changes at the start, or a millionth of the unit of
-            time from rest.
+        dt: the step, in units of time, below zero to go back; if None in a continued run, that of it. With a tolerance, the step
+            to try first; if None, a hundredth of the time in which the state changes at the start, or from rest a millionth of
+            the time to the first saved state.
         steps: number of steps, one or more.
         every: save the state every so many steps, and at the first and the last; None saves the last alone.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
-            each stays below this. The error of a block is relative to the largest length (norm) of the block so far, so that the
-            units of v and y do not matter. A tuple (relative, absolute) allows relative·length + absolute instead, the absolute
-            part in the units of the state. Each is a number or an array that broadcasts over the batch; a list is refused, since
-            it could mean either. A run that continues by ``carry`` has its tolerance already. For methods with an
-            ``error_order``: merson, fehlberg, fehlberg_5, dop853.
-        at: with a tolerance, the times at which to save the state, ascending, from t0 on. Steps do not depend on them: a state
-            within a step is computed by one extra step from its start.
+            each stays below this. One number is relative: of own equations to the largest that each component has been, so that
+            units do not matter; of built-in systems, whose directions are equivalent, to the largest length of each block. For a
+            component that decays to nothing, or a stiff one, give a tuple (relative, absolute): it allows relative·size +
+            absolute with the present size, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a
+            number, an array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a
+            list is refused. A run that continues by ``carry`` has its tolerance already. For methods with an ``error_order``:
+            merson, fehlberg, fehlberg_5, dop853, taylor.
+        at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
+            time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
+            from its start. Steps do not depend on these times, but for the first from rest; and where the extra step errs by
+            more than is tolerated, the step missed something and is rejected.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
@@ -108,9 +116,17 @@ def integrate(
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
-        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated.
+        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated. With a tolerance, the time of
+            the start, a number or an array over the batch.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        max_step: with a tolerance, the longest step, in units of time, a number or an array over the batch. What lasts for less
+            than a step may be stepped over without a sign: give this, or ``jumps``, where rates change suddenly in time.
+        jumps: with a tolerance, times at which rates jump, shape (jumps,), or (jumps, *batch) for jumps of each member. No step
+            crosses one; behind it the step is chosen anew.
+        positive: with a tolerance, the components that must not become negative: True for all of y, or one or a list of indices
+            of y, or of tuples such as ("v", 0). A step that makes one negative is rejected; a member stops where no step is small
+            enough.
         progress: show a progress bar, in a terminal or in a notebook.
         threads: how many threads share the members, or the pairs of many bodies; None for as many as are worthwhile.
         backend: ``"rust"``, or ``"numpy"`` for the reference.
@@ -119,6 +135,9 @@ def integrate(
             the step-size controller.
         carried_by: the method of that carry, from ``run.resume``. Any other method is then refused, since its carry has another
             meaning.
+        carried_for: for which system and state that carry holds, from ``run.resume``. With other parameters or equations, another
+            control, or a ``v`` or ``y`` of your own, the run begins anew from ``v`` and ``y``; with a tolerance at the last time
+            that was asked for, and with the tolerance of before.
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
@@ -137,9 +156,10 @@ def integrate(
             large that the motion is lost in it.
         AccuracyWarning: if a run stayed finite and can be seen to mean nothing: a pendulum turned so far that its angle has no
             sine; a state grew a million times by fixed steps that are beyond the stability limit at the start; bodies that
-            nothing controls ended with an energy of another size; bodies met within one step, which is then named. That is looked
-            for where it is little work against the run, or where there is reason to (docs/howto/nbody.md); not in the pieces of a
-            run that carries something. ``Run.encounters`` checks every step.
+            nothing controls ended with an energy of another size, or with a tolerance any system whose energy or declared
+            invariant is constant; a motion along a line passed a barrier that is higher than its energy; bodies met within one
+            step, which is then named. That is looked for where it is little work against the run, or where there is reason to
+            (docs/howto/nbody.md); not in the pieces of a run that carries something. ``Run.encounters`` checks every step.
 
     Example:
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, every=50)
@@ -168,15 +188,20 @@ def integrate(
         if not isinstance(start_step, int) or start_step != 0:
             fixed["start_step"] = start_step
         _only_fixed(fixed)
-        went = None if carry is None else (carry, carried_by)
+        goes_with_times(tolerance is not None or carry is not None, at)
+        went = None if carry is None else (carry, carried_by, carried_for)
         asked = None if events is None else _asked(events, "direct")
+        options = AdaptiveOptions(tolerance, at, max_steps, max_step, jumps, positive)
         run, begun = adaptive_run(
-            system, how, v, y, dt, tolerance, at, max_steps, record, t0, went, control, fused, threads, backend, progress, asked
+            system, how, v, y, dt, options, record, t0, went, control, fused, threads, backend, progress, asked
         )
         warn_of_nonsense(run, begun)
         return run
     if max_steps is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    for name, option in (("max_step", max_step), ("jumps", jumps), ("positive", positive)):
+        if option is not None:
+            raise ArgumentError(f"{name}: goes with tolerance= and at= only; steps of fixed length are dt long, whatever comes")
     dt = dt_before if dt is None else dt
     if dt is None or steps is None:
         missing = " and ".join(name for name, given in (("dt", dt), ("steps", steps)) if given is None)
@@ -198,7 +223,7 @@ def integrate(
         )
     if form == "power":
         goes_on_by_a_rule(system)
-    dt = _checks.number("dt", dt, positive=True, unit="units of time")
+    dt = _checks.step(dt)
     if single:
         from . import _single  # only such runs need it
 
@@ -208,14 +233,17 @@ def integrate(
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
     begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
-    if not begin < end < np.inf:
+    if begin == end or not np.isfinite(end):
         raise ArgumentError(
             f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
             f"after {steps} steps of {dt:g}"
         )
-    system.check_time(max(-begin, end))
+    last = max(abs(begin), abs(end))
+    system.check_time(last)
     if single:
-        _single.check_inputs(system, max(-begin, end))
+        _single.check_inputs(system, last)
+    if dt < 0.0:
+        goes_back(system, control)
     every = None if every is None else _checks.count("every", every, 1)
     record = quantities(system, record)
     workers = 0 if threads is None else _checks.count("threads", threads, 1, 4096)
@@ -227,10 +255,11 @@ def integrate(
 
     finite = first_bad_step is None
     v = _checks.block("v", v, system.v_shape, system.axes, finite=finite)
-    if carry is not None:
-        v = _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
+    slot = None if carry is None else _checks.block("carry", carry, system.v_shape, system.axes, finite=finite)
     y = _checks.block("y", y, system.y_shape, system.axes, finite=finite)
     batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    if slot is not None:
+        batches["carry"] = slot.shape[len(system.v_shape) :]
     if control is not None:
         batches["control"] = control.batch
     if force is not None:
@@ -254,7 +283,7 @@ def integrate(
         beside=plan.kept * BYTES_PER_TIME,
     )
     if single:
-        for name, block in (("v", v), ("y", y), ("force", force)):
+        for name, block in (("v", v), ("y", y), ("carry", slot), ("force", force)):
             _checks.fits_single(name, block)
         if control is not None:  # whose target is that of the start as it is stepped
             v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
@@ -265,20 +294,24 @@ def integrate(
         if single:
             _single.check_control(system)
     system = system.stepped_by(how)
+    stepped = system.over_steps(how, t0, dt)
+    carried = slot is not None and _going_on.holds(carried_for, system, batch, v, y)
+    if slot is not None and carried:
+        v = spread(slot, system.v_shape, batch)
     before = _checks.diverged_before(first_bad_step, v, y, batch, start_step)
 
     if force is not None:
         plan = plan._replace(force=spread(force, system.v_shape, batch))
-    if record or system is not plan.system:
+    if record or stepped is not plan.system:
         # In float32 they are computed from the saved states, in float64.
         kept = () if single else tuple(name for name in record if name in system.quantities)
-        plan = plan._replace(system=system, record=kept)
-    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carry is not None)
+        plan = plan._replace(system=stepped, record=kept)
+    make: Callable[[engine.Plan], engine.Outcome] = partial(engine.advance, v=v, y=y, before=before, carried=carried)
     ended = None
     if asked is not None:
         from .events import driver  # only such runs need it
 
-        ended = driver.Run(asked, v, y, before, carry is not None)
+        ended = driver.Run(asked, v, y, before, carried)
         make = ended.made
     if _checks.flag("progress", progress):
         with bar_of(f"{how.title}, {steps} steps") as told:
@@ -304,9 +337,9 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         fused=fused,
-        collision=partial(_encounters.collision, plan, v, y, carry is not None) if collides else None,
-        encounter=partial(_encounters.of_member, plan, v, y, carry is not None, steps) if collides else None,
-        overshoots=partial(_encounters.overshoots, plan, v, y, carry is not None, steps) if collides else None,
+        collision=partial(_encounters.collision, plan, v, y, carried) if collides else None,
+        encounter=partial(_encounters.of_member, plan, v, y, carried, steps) if collides else None,
+        overshoots=partial(_encounters.overshoots, plan, v, y, carried, steps) if collides else None,
         recorded=out.recorded,
         work=out.work,
         force=plan.force,
@@ -321,8 +354,8 @@ def integrate(
     if "energy" in record and "energy" not in run.recorded:
         run.recorded["energy"] = run.energy
     if out.diverged:
-        _warn(run, before)
-    begun = None if carry is not None or before is not None else (v, y)
+        _warn(run, before, None if carried else (v, y))
+    begun = None if carried or before is not None else (v, y)
     warn_of_nonsense(run, begun)
     _growth.warn_of(run, begun)
     return run
@@ -352,12 +385,12 @@ def _only_fixed(given: dict[str, Any]) -> None:
 
 def _kept(array: Array) -> Array:
     """A copy that is as small as what it was spread from."""
-    own = array[tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)].copy()
+    own = _checks.once_of(array).copy()
     return own if own.shape == array.shape else np.broadcast_to(own, array.shape)
 
 
-def _warn(run: Run, before: Whole | None) -> None:
-    """Warn of the members that diverged in this run."""
+def _warn(run: Run, before: Whole | None, start: tuple[Array, Array] | None) -> None:
+    """Warn of the members that diverged in this run; ``start`` is where it began, if not from what a method carries."""
     if not np.count_nonzero(run.status):
         return
     bad = run.first_bad_step >= 0 if before is None else (run.first_bad_step >= 0) & (before < 0)
@@ -370,6 +403,12 @@ def _warn(run: Run, before: Whole | None) -> None:
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
+    if start is not None and step == run.start_step + 1:
+        from ._stops import of_the_start  # only such runs need it
+
+        t = run.t0 + run.start_step * run.dt
+        if wrong := of_the_start(run.system, run.status.shape, t, start, first):
+            met = f"; {wrong} at the start, t = {t:g}"
     some = int(np.count_nonzero(bad))
     warnings.warn(
         f"{share(some, bad.shape, bad.size)} diverged{first_of(some, first, bad.size)} at step {step} "

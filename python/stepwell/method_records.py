@@ -162,8 +162,8 @@ def methods() -> tuple[Method, ...]:
     """Every method, in the order of the document.
 
     Example:
-        >>> [method.name for method in sw.methods() if method.error_order is not None]
-        ['fehlberg', 'merson', 'fehlberg_5', 'dop853', 'taylor']
+        >>> [method.name for method in sw.methods() if "Fehlberg" in method.title]
+        ['fehlberg', 'fehlberg_5']
     """
     return tuple(_catalogue().values())
 

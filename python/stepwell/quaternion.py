@@ -43,6 +43,7 @@ def from_axis_angle(axis: Any, angle: Any) -> Array:
             f"angle: expected at most {LAST_ANGLE:.3g} rad, beyond which a sine means nothing, got {angle[wrong][0]:g}"
         )
     rest = _checks.batch_shape({"axis": axis.shape[1:], "angle": angle.shape})
+    _checks.fits("axis, angle: the quaternions", 16, rest, "ask for fewer")
     axis = aligned(axis, 1, rest)
     largest = np.abs(axis).max(axis=0)
     if not (largest > 0.0).all():
@@ -75,6 +76,7 @@ def product(p: Any, q: Any) -> Array:
     """
     p, q = _along("p", p, 4), _along("q", q, 4)
     rest = _checks.batch_shape({"p": p.shape[1:], "q": q.shape[1:]})
+    _checks.fits("p, q: the quaternions", 12, rest, "ask for fewer")
     (a, b, c, d), q = aligned(p, 1, rest), aligned(q, 1, rest)
     return np.stack(
         [
@@ -106,6 +108,7 @@ def matrix(q: Any) -> Array:
         array([0., 1., 0.])
     """
     q = _along("q", q, 4)
+    _checks.fits("q: the matrices", 32, q.shape[1:], "ask for fewer")
     largest = np.abs(q).max(axis=0)
     if not (largest > 0.0).all():
         raise ArgumentError("q: expected quaternions that are not zero, got one that is")

@@ -48,6 +48,9 @@ class Status(IntEnum):
     NOT_FINITE = 4
     #: A terminal event stopped it; ``Run.stopped_at`` says when.
     EVENT = 5
+    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest; ``Run.stopped_at`` says
+    #: when.
+    REST = 6
 
 
 @by_value
@@ -80,13 +83,15 @@ class AdaptiveState(NamedTuple):
         pace: the state of the step-size controller, shape (numbers, *batch), with the last output time in it.
         last: the last output time.
         method: name of the method to which the pace belongs.
+        options: further arguments of ``integrate`` that go on: ``max_step``, ``jumps``, ``positive``.
     """
 
     v: Array
     y: Array
     pace: Array
-    last: float
+    last: Any
     method: str
+    options: dict[str, Any] = {}  # noqa: RUF012  # it is not written to
 
 
 class Run(Value):
@@ -110,8 +115,9 @@ class Run(Value):
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
         events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
-        stopped_at: the time at which a terminal event stopped each member, NaN for others, shape (*batch); later saved states are
-            that of the event. None if there was no such event to look for.
+        stopped_at: the time at which each member stopped, by a terminal event or, with a tolerance, by itself before the last
+            output time; NaN for others, shape (*batch). Later saved states are that of the event, or NaN. None if none stopped by
+            itself and there was no such event to look for.
         paces: the adaptive steps of a run with a tolerance, or None; ``dt`` and ``steps`` are not meaningful in such a run.
         fused: whether steps were computed with fused multiply-adds.
         force: what was added to v̇, or None, shape (*block, *batch).
@@ -264,26 +270,30 @@ class Run(Value):
         """Arguments with which ``integrate`` continues from here, to the bit, as if the run had never stopped.
 
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
-        last one. A carry is for the same method only. ``save`` writes all of it to a file. ``dt`` is that of this run; another
-        is refused, since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are
-        given again.
+        last one. A carry is for the same method only; with another system, or ``v`` or ``y`` of your own, the run begins anew
+        from the state at its last time. ``save`` writes all of it to a file. ``dt`` is that of this run; another is refused,
+        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again.
 
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
         """
-        if (stopped := int(np.count_nonzero(self.status == Status.EVENT))) > 0:
+        if (stopped := int(np.count_nonzero(self.status >= Status.EVENT))) > 0:
             raise UnsupportedError(
                 f"resume: {share(stopped, self.status.shape, self.status.size)} stopped at an event, "
-                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run"
-                f"{' for each' if stopped > 1 else ''}: v=run.v[-1], y=run.y[-1], t0=run.stopped_at"
+                f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "
+                + (
+                    "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])"
+                    if self.status.shape
+                    else "from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)"
+                )
             )
+        from . import _going_on  # only runs that go on need it
+
         told: dict[str, Any] = {"fused": True} if self.fused else {}
         if self.dtype != "float64":
             told["dtype"] = self.dtype
         if self.stand is not None:
-            kept = {} if self.system.keeper is None else {"control": self.system.keeper}
-            going_on = {"v": self.stand.v, "y": self.stand.y, "t0": self.t0, **told, **kept}
-            return going_on | {"carry": self.stand.pace, "carried_by": self.stand.method}
+            return _going_on.with_tolerance(self) | told
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}
         state |= {"dt_before": self.dt, **told}
         if self.start is not None:
@@ -294,7 +304,10 @@ class Run(Value):
             state["control"] = self.system.keeper
         if self.force is not None:
             state["force"] = self.force
-        return state | ({} if self.carry is None else {"carry": self.carry, "carried_by": self.method.name})
+        if self.carry is None:
+            return state
+        carried_for = _going_on.identity(self.system, self.status.shape, self.v[-1], self.y[-1])
+        return state | {"carry": self.carry, "carried_by": self.method.name, "carried_for": carried_for}
 
     def save(self, path: str | Path) -> None:
         """Write the run to a file, from which ``stepwell.load`` reads it again, bit for bit, and from which it goes on.

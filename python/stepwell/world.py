@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checks, _core, _growth, engine
+from . import _checks, _core, _going_on, _growth, engine
 from ._brief import MAX_LINE, shortened
 from ._checks import Array
-from .compatible import fits_together, forced, goes_on_alike, velocities
+from .compatible import fits_together, forced, goes_back, goes_on_alike, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
 from .method_records import Method
@@ -31,7 +31,7 @@ class World:
         method: its name, or what ``stepwell.method`` returns.
         v: velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).
         y: coordinate block, likewise; it may share no memory with ``v``.
-        dt: the step, in units of time, above zero.
+        dt: the step, in units of time, below zero to go back.
         t0: time of step 0.
         start_step: number of the first step.
         start: how to start a method that has several ways; see ``method(…).starts``.
@@ -42,6 +42,7 @@ class World:
         carry: what the method carries in place of v, from ``resume``, of the shape of ``v``; ``v`` and ``y`` are those of
             the same step.
         carried_by: the method of that carry, from the ``resume`` of a run or a world. Any other method is then refused.
+        carried_for: for which system and state it holds, likewise. With another system or state the world begins anew.
         dt_before: the step so far, likewise. Another ``dt`` is then refused.
         fused: compute each step with fused multiply-adds; see ``integrate``.
         dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
@@ -106,6 +107,7 @@ class World:
         force: Array | None = None,
         carry: Array | None = None,
         carried_by: str | None = None,
+        carried_for: str | None = None,
         dt_before: float | None = None,
         fused: bool = False,
         dtype: Any = "float64",
@@ -114,7 +116,7 @@ class World:
         how = find_method(method)
         system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
-        dt = _checks.number("dt", dt, positive=True, unit="units of time")
+        dt = _checks.step(dt)
         single = _checks.is_single(dtype)
         kind: Any = np.float32 if single else np.float64
         if single:
@@ -146,18 +148,24 @@ class World:
                 raise ShapeError(f"carry: expected the shape of v, {v.shape}, got {carry.shape}")
             carry = np.ascontiguousarray(carry, dtype=kind).reshape(-1)
         stepped = system
-        if (control := a_control(control)) is not None:
+        control = a_control(control)
+        if dt < 0.0:
+            goes_back(system, control)
+        if control is not None:
             if _checks.batch_shape({"control": control.batch, "v and y": batch}) != batch:
                 raise ShapeError(f"control: its batch {control.batch} does not broadcast to that of v and y, {batch}")
             stepped = system.controlled(control, np.asarray(v, np.float64), np.asarray(y, np.float64), dt)
             fits_together(stepped, how)
             stepped = stepped.stepped_by(how)
+        if carry is not None and not _going_on.holds(carried_for, stepped, batch, v, y):
+            carry = None
         if single:
             _single.check_control(stepped)
-            _single.check_inputs(stepped, abs(t0) + first * dt)
-        stepped.check_time(abs(t0) + first * dt)
+            _single.check_inputs(stepped, abs(t0) + first * abs(dt))
+        stepped.check_time(abs(t0) + first * abs(dt))
         fused = _checks.flag("fused", fused)
-        plan = engine.Plan(stepped, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
+        seen = stepped.over_steps(how, t0, dt)
+        plan = engine.Plan(seen, how, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single)
         # Views: the core knows rows, not axes.
         watched = None if force is None else force.reshape(-1)
         loop = _core.World(engine.model(plan), plan, v.reshape(-1), y.reshape(-1), carry, watched)
@@ -219,7 +227,11 @@ class World:
         if self._force is not None:
             state["force"] = self._force.copy()
         carry = self._core.carry() if self._method.carry is not None else None
-        return state | ({} if carry is None else {"carry": carry.reshape(self._v.shape)})
+        if carry is None:
+            return state
+        members = self._y.shape[len(self._system.y_shape) :]
+        carried_for = _going_on.identity(self._system, members, self._v, self._y)
+        return state | {"carry": carry.reshape(self._v.shape), "carried_for": carried_for}
 
     def __repr__(self) -> str:
         members = self._y.shape[len(self._system.y_shape) :]

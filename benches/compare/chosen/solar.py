@@ -6,8 +6,12 @@ Where the error of a step is below rounding, that of the energy is a sum of roun
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,6 +47,10 @@ VELOCITIES = np.array(
 YEAR = 365.25
 #: Saved states; the error of the energy is the root of the mean square over the last half of them, for a single one may be zero.
 SAVED = 64
+#: Seconds that a contestant has for all lengths together: some ten times what each of them takes on a quiet machine.
+BUDGET = 600.0
+#: Where ``benches`` is.
+ROOT = Path(__file__).parents[3]
 #: A tolerance of a rounding. (REBOUND's epsilon is its default, 1e-9: the size of a term, not an error.)
 ROUNDING = 2.0**-53
 
@@ -65,14 +73,9 @@ def energy(v: Array, y: Array) -> Array:
     return np.asarray(total)
 
 
-def contestants() -> Iterator[tuple[str, Solve]]:
-    """Those that are installed: each a function from times to states."""
-    yield "stepwell taylor", ours
-    for name, maker in (("heyoka", heyokas), ("REBOUND IAS15", rebounds)):
-        try:
-            yield name, maker()
-        except ImportError:
-            continue
+def contestants() -> dict[str, Callable[[], Solve]]:
+    """What makes each a function from times to states, by its name; what is not installed raises ``ImportError``."""
+    return {"stepwell taylor": lambda: ours, "heyoka": heyokas, "REBOUND IAS15": rebounds}
 
 
 def ours(times: Array) -> tuple[Array, Array]:
@@ -116,20 +119,49 @@ def rebounds() -> Solve:
     return solve
 
 
-def table(years: tuple[float, ...]) -> Table:
+def run(name: str, years: list[float]) -> None:
+    """Error and seconds of each length of the run by one contestant, a line for each as soon as it is done."""
+    start = energy(*(block[np.newaxis] for block in at_rest()))[0]
+    solve = contestants()[name]()
+    solve(YEAR * np.array([100.0]))  # whatever it compiles
+    for length in years:
+        times = YEAR * length * np.arange(1, SAVED + 1) / SAVED
+        begin = time.perf_counter()
+        v, y = solve(times)
+        seconds = time.perf_counter() - begin
+        off = (energy(v, y)[SAVED // 2 :] - start) / start
+        print(json.dumps([float(np.sqrt(np.mean(off * off))), seconds]), flush=True)
+
+
+def measured(name: str, years: tuple[float, ...], budget: float) -> list[tuple[float, float]] | None:
+    """Error and seconds of the lengths that a contestant did within so many seconds, in a process that is ended then.
+
+    None if it is not installed.
+    """
+    command = [sys.executable, "-m", __name__, name, *map(str, years)]
+    try:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=budget, check=False)
+    except subprocess.TimeoutExpired as late:
+        lines = (late.stdout or b"").decode().splitlines(keepends=True)
+        return [tuple(json.loads(line)) for line in lines if line.endswith("\n")]
+    if "ModuleNotFoundError" in done.stderr:
+        return None
+    if done.returncode:
+        raise RuntimeError(f"{name}: {done.stderr}")
+    return [tuple(json.loads(line)) for line in done.stdout.splitlines()]
+
+
+def table(years: tuple[float, ...], budget: float = BUDGET) -> Table:
     """A column for the error and the time of each length of the run."""
     lines = []
-    start = energy(*(block[np.newaxis] for block in at_rest()))[0]
-    for name, solve in contestants():
-        solve(YEAR * np.array([100.0]))  # whatever it compiles
-        cells = []
-        for length in years:
-            times = YEAR * length * np.arange(1, SAVED + 1) / SAVED
-            begin = time.perf_counter()
-            v, y = solve(times)
-            seconds = time.perf_counter() - begin
-            off = (energy(v, y)[SAVED // 2 :] - start) / start
-            cells += [f"{float(np.sqrt(np.mean(off * off))):.1e}", number(1e3 * seconds)]
-        lines.append([name, *cells])
+    for name in contestants():
+        if (found := measured(name, years, budget)) is not None:
+            cells = [[f"{error:.1e}", number(1e3 * seconds)] for error, seconds in found]
+            late = [["—", f"not in {budget:g} s"]] * (len(years) - len(found))
+            lines.append([name, *(each for pair in cells + late for each in pair)])
     head = [each for length in years for each in (f"error after {length:,.0f} years", "ms")]
     return "Chosen steps: the outer solar system at rounding level, relative error of the energy", ["contestant", *head], lines
+
+
+if __name__ == "__main__":
+    run(sys.argv[1], [float(each) for each in sys.argv[2:]])

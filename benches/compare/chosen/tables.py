@@ -35,7 +35,7 @@ over the least time of the repeats, of the worst tolerance. One thread. — says
 time. What numba and heyoka compile is not timed. SciPy does 5 of many orbits.
 
 The outer solar system is another question: all go at a tolerance of a rounding, and what is compared is how the roundings of
-the energy add up, and the time of a single run.
+the energy add up, and the time of a single run. Each goes in a process of its own, which is ended after {budget:.0f} s.
 """
 
 

@@ -198,7 +198,16 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
             elif candidate.by == "step":
                 scene.run(candidate.method, dt, steps=1)
             else:
-                integrate(scene.system, candidate.method, v=scene.v, y=scene.y, tolerance=1.0, at=[dt], max_steps=1)
+                integrate(
+                    scene.system,
+                    candidate.method,
+                    v=scene.v,
+                    y=scene.y,
+                    tolerance=1.0,
+                    at=[dt],
+                    max_steps=1,
+                    **scene.adaptive_options,
+                )
         except UnsupportedError as error:
             return str(error).removeprefix(f"{candidate.method.name} ").removeprefix("dtype: ")
         except ArgumentError as error:

@@ -108,7 +108,8 @@ class AdaptiveTrials:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ToleranceWarning)
             warnings.simplefilter("ignore", AccuracyWarning)
-            run = integrate(scene.system, method, v=scene.v, y=scene.y, tolerance=tolerance, at=at, max_steps=most)
+            options: dict[str, Any] = {"tolerance": tolerance, "at": at, "max_steps": most} | scene.adaptive_options
+            run = integrate(scene.system, method, v=scene.v, y=scene.y, **options)
         assert run.paces is not None
         self.work += int(run.paces.evaluations)
         return run

@@ -273,9 +273,13 @@ class Advice:
             raise ArgumentError("row: nothing fits, so there is nothing to run")
         if row.tolerance is None:
             return self.scene.run(row.method, row.dt, steps=row.steps, every=1, dtype=row.dtype)
-        most = row.steps + 1
         scene = self.scene
-        return integrate(scene.system, row.method, v=scene.v, y=scene.y, tolerance=row.tolerance, at=self.asked, max_steps=most)
+        options: dict[str, Any] = {
+            "tolerance": row.tolerance,
+            "at": self.asked,
+            "max_steps": row.steps + 1,
+        } | scene.adaptive_options
+        return integrate(scene.system, row.method, v=scene.v, y=scene.y, **options)
 
     def summary(self) -> list[str]:
         """The advice in sentences, a line each."""

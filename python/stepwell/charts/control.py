@@ -292,7 +292,8 @@ def _kinds(system: System, forms: Any, ways: Any) -> list[str]:
 
 def _counts(evaluations: Any) -> tuple[int, ...]:
     """The numbers of evaluations, each once, ascending."""
-    several = evaluations if isinstance(evaluations, (list, tuple)) or np.ndim(evaluations) == 1 else [evaluations]
+    one = isinstance(evaluations, str) or not isinstance(evaluations, Iterable) or getattr(evaluations, "ndim", 1) == 0
+    several = [evaluations] if one else _checks.several("evaluations", evaluations, "numbers")
     counts = sorted({_checks.count("evaluations", each, 1) for each in several})
     if not counts:
         raise ShapeError("evaluations: expected one number or several, got none")

@@ -114,7 +114,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
         warnings.simplefilter("ignore", AccuracyWarning)
-        motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times}
+        motion: dict[str, Any] = {"v": scene.v, "y": scene.y, "tolerance": tolerance, "at": times} | scene.adaptive_options
         run = integrate(scene.system, method, **motion, dt=scene.dt, max_steps=MOST_TRIED, fused=fused)
     assert run.paces is not None
     state_error, end_error, energy_error = _errors(scene, run)
@@ -305,6 +305,7 @@ def tried_times(scene: Scene, methods: Sequence[Method], members: int | None = N
                 dt=scene.dt,
                 threads=1,
                 fused=fused,
+                **scene.adaptive_options,
             )
             assert run.paces is not None
             tried += int(run.paces.evaluations.max()) // method.attempt_evaluations

@@ -12,14 +12,14 @@ import numpy as np
 
 from .._checks import Array
 from .._encounters import MAX_RERUN
+from .._known_energy import keeps_energy
 from .._value import Value
 from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..integration import integrate
 from ..result import Run
 from ..scenes import Scene
 from ..scenes import scene as find_scene
-from ..systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs, System
-from ..systems.own import OwnSystem
+from ..systems import NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs
 from .files import write_csv, write_json
 from .style import Drawn
 
@@ -282,19 +282,6 @@ def _begins(scene: Scene, run: Run) -> bool:
     scale = max(float(np.abs(block).max(initial=0.0)) for _, block in pairs)  # a system of first order has no v
     near = (2.0**-21 if run.dtype == "float32" else 1e-9) * scale
     return all(np.allclose(found, block, rtol=0.0, atol=near) for found, block in pairs)
-
-
-def keeps_energy(run: Run) -> bool:
-    """Whether nothing takes or gives energy in the true motion: no damping, drag, friction, floors, inputs or torques."""
-    system: System = run.system.uncontrolled
-    if run.force is not None or getattr(system, "torques_act", False) or system.contacts:
-        return False
-    if isinstance(system, OwnSystem):
-        return True  # its energy is what was declared to be constant
-    terms = [getattr(system, name, None) for name in ("damping", "drag", "friction")]
-    if any(term is not None and np.any(term) for term in terms):
-        return False
-    return isinstance(system, RigidBody) or not any(getattr(system, name, None) is not None for name in system.input_names)
 
 
 def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:

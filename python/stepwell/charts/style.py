@@ -17,7 +17,7 @@ from ..method_records import methods as every_method
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARKERS = "osD^vPh*<>pdX8H"
+MARKERS: tuple[Any, ...] = (*"osD^vPh*<>pdX8H", (4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180))
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
 #: cones: tests/test_looks.py measures them.
 FAMILIES = {
@@ -35,7 +35,7 @@ PALE = "#b8b8b8"
 SECOND = ("#111111", "#666666", "#999999")
 PEERS = "1234+|"
 #: The line shows the order: the higher, the more solid.
-LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
+LINES = {1: (0, (1, 1.2)), 2: (0, (5, 2)), 3: (0, (8, 1.8)), 5: (0, (12, 1.5)), 8: (0, (24, 1.2))}
 GREY = "#666666"
 
 #: Sizes in points, for pictures of about 1600 pixels' width at 100 dots per inch.

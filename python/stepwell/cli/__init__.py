@@ -58,6 +58,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (StepwellError, OSError) as error:
         print(_wrapped(f"stepwell: {error}"), file=sys.stderr)
         return FAILED
+    except MemoryError as error:  # of an allocation that no check has counted
+        print(_wrapped(f"stepwell: there is not enough memory for this: {error}".rstrip(": ")), file=sys.stderr)
+        return FAILED
     except KeyboardInterrupt:
         print("stepwell: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -139,7 +139,7 @@ def _adaptive(args: argparse.Namespace, chosen: Scene, to_draw: bool, given: dic
         if getattr(args, option) is not None:
             raise ArgumentError(f"--{option}: goes with fixed steps only; with --tolerance the steps follow the error")
     at = np.linspace(0.0, chosen.horizon, 1 + (ADAPTIVE_TO_DRAW if to_draw else ADAPTIVE))
-    given |= {} if args.dt is None else {"dt": args.dt}
+    given |= chosen.adaptive_options | ({} if args.dt is None else {"dt": args.dt})
     return integrate(chosen.system, args.method, v=chosen.v, y=chosen.y, tolerance=args.tolerance, at=at, **given)
 
 

@@ -24,6 +24,14 @@ SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
 LEAVES = {"state": "state[{}]", "parameter": "numbers[{}]", "step": "h", "time": "t"}
 
 
+#: Python looks for Ctrl-C at calls, and not between operations: after so many of them there is a call.
+LINES_BETWEEN_CALLS = 8
+
+
+def _call() -> None:
+    """Nothing, but a call."""
+
+
 class Evaluation:
     """Values of a tape, to be computed for many members at once.
 
@@ -60,9 +68,11 @@ def _compiled(operations: Sequence[tuple[str, Sequence[int], int]], roots: Seque
         last[root] = len(operations)
     names: list[str] = []
     free: list[str] = []
-    known: dict[str, Any] = {"sqrt": np.sqrt, "floor": np.floor}
+    known: dict[str, Any] = {"sqrt": np.sqrt, "floor": np.floor, "call": _call}
     text = ["def run(state, t, h, numbers, tables):"]
     for line, (name, of, given) in enumerate(operations):
+        if line % LINES_BETWEEN_CALLS == 0:
+            text.append("    call()")
         if name == "constant":
             known[own := f"c{line}"] = _constant(number(given))
             names.append(own)

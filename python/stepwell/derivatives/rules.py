@@ -34,7 +34,6 @@ NO_RULE = (
     "add bits",
     "shift up",
     "shift down",
-    "floor",
     "sample",
     "multiply add",
     "multiply subtract",
@@ -65,6 +64,8 @@ def operation(name: str, operands: list[Any], value: Any) -> tuple[Factor, ...]:
             return (0.5 / value,)
         case "negate":
             return (-1.0,)
+        case "floor":
+            return (None,)
         case _ if name in COMPARISONS:
             return None, None
     raise no_derivative(name)

@@ -84,6 +84,17 @@ class Traced:
         pairs = zip(self.state, changes, strict=True)
         return self.evaluation(self.roots + directional(self.tape, self.roots, pairs, self.marks))
 
+    def along(self, directions: int) -> list[Symbol]:
+        """The values, and their derivatives along several changes of the state: of a value in each direction, then of the next.
+
+        The numbers of the changes come behind the state's own in the same order. The sum that a control accumulates has the first
+        place behind the state, too, but no value depends on it.
+        """
+        first = self.length
+        changes = [[self.tape.state(first + i * directions + j) for i in range(self.length)] for j in range(directions)]
+        each = [directional(self.tape, self.roots, zip(self.state, change, strict=True), self.marks) for change in changes]
+        return self.roots + [derivative for of_one in zip(*each, strict=True) for derivative in of_one]
+
     @property
     def room(self) -> int:
         """The number of the state at which the changes begin."""

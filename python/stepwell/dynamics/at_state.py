@@ -118,10 +118,10 @@ def linearised(system: System, v: Array, y: Array, t: Any = 0.0) -> tuple[Array,
     if not system.complex_step or sum(maps.size(system)) <= MAX_TRACED_NUMBERS:
         return traced.matrix(system, "rates", None, members, v, y, t)
     matrix = np.broadcast_to(maps.rates(system, t, v, y), (*[sum(maps.size(system))] * 2, *members))
+    v, y = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
     with np.errstate(all="ignore"):
         s = system.scaled(1.0, members)
-        both = ((s.dv(t, v, y), system.v_shape), (s.dy(t, v, y), system.y_shape))
-    return matrix, np.concatenate([np.broadcast_to(each, (*shape, *members)).reshape(-1, *members) for each, shape in both])
+        return matrix, np.concatenate([s.dv(t, v, y).reshape(-1, *members), s.dy(t, v, y).reshape(-1, *members)])
 
 
 def by_growth(matrix: Array) -> Complex:

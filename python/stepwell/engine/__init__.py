@@ -12,8 +12,12 @@ import threading
 from .. import _core
 from .adaptive import (
     ABSOLUTE,
+    BLIND,
     COUNTS,
+    ERROR,
     HELD,
+    LASTS,
+    MOST_STEP,
     PACE_NUMBERS,
     RELATIVE,
     STEP,
@@ -22,22 +26,34 @@ from .adaptive import (
     WORK,
     Adapted,
     AdaptiveArrays,
+    CorePacing,
     Pacing,
+    Tolerances,
     adapt,
     attempt_by_numpy,
     attempts,
     begun,
     evaluations,
+    groups_of,
+    jumps_of,
+    numbers_of,
+    of_unit_step,
+    pace_numbers,
     pace_of,
     paces,
+    pacing_of_core,
 )
-from .direct import advance
+from .direct import advance, to_slot
 from .plan import Arrays, Outcome, Plan, Watched, model, pushes
 
 __all__ = [
     "ABSOLUTE",
+    "BLIND",
     "COUNTS",
+    "ERROR",
     "HELD",
+    "LASTS",
+    "MOST_STEP",
     "PACE_NUMBERS",
     "RELATIVE",
     "STEP",
@@ -47,9 +63,11 @@ __all__ = [
     "Adapted",
     "AdaptiveArrays",
     "Arrays",
+    "CorePacing",
     "Outcome",
     "Pacing",
     "Plan",
+    "Tolerances",
     "Watched",
     "adapt",
     "advance",
@@ -57,10 +75,17 @@ __all__ = [
     "attempts",
     "begun",
     "evaluations",
+    "groups_of",
+    "jumps_of",
     "model",
+    "numbers_of",
+    "of_unit_step",
+    "pace_numbers",
     "pace_of",
     "paces",
+    "pacing_of_core",
     "pushes",
+    "to_slot",
 ]
 
 if hasattr(os, "register_at_fork"):

@@ -30,7 +30,7 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
         case "step":
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
-            symbols = tracer.attempt(plan.method, plan.order)
+            symbols = tracer.attempt(plan.method, plan.order, plan.acceptance, backward=plan.backward)
         case _:
             symbols = tracer.slot(plan.method, what, plan.choice)
     numbers = dict(enumerate(tracer.numbers))

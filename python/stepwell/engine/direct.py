@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
 from math import prod
 from typing import Any
 
@@ -13,6 +12,7 @@ from .. import _core, _memory
 from .._checks import Array
 from ..reference import contact
 from ..reference import run as reference
+from ..reference.signal import of_slot, over
 from ..reference.types import Blocks, Whole
 from ..systems.base import rows
 from .by_tape import evaluated_slot, evaluated_step
@@ -79,7 +79,13 @@ def to_velocity(plan: Plan) -> reference.Velocity | None:
         return None
     if plan.by_tape:
         return evaluated_slot(plan, "finish")
-    return partial(plan.method.steps.finish, plan.scaled(), plan.choice)
+    s, finish = plan.scaled(), plan.method.steps.finish
+
+    def velocity(t: float, slot: Array, y: Array) -> Array:
+        with over(of_slot(t, plan.dt)):
+            return np.asarray(finish(s, plan.choice, t, slot, y))
+
+    return velocity
 
 
 def looped(
@@ -113,7 +119,8 @@ def to_slot(plan: Plan, v: Array, y: Array) -> Array:
     with np.errstate(all="ignore"):
         if plan.by_tape:
             return evaluated_slot(plan, "start")(t, v, y)
-        return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
+        with over(of_slot(t, plan.dt)):
+            return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
 
 
 def finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
+from .. import _checks, _core
 from .._checks import Array
 from ..reference import run as reference
 from ..reference.types import Blocks, Whole
@@ -17,6 +17,16 @@ from ..systems import Sampled
 from ..systems.base import flat
 from .direct import Looped, advance, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import Outcome, Plan
+
+#: Numbers that are kept at a time for each element of the matrix: unit vectors, their states after a step, what the core makes of
+#: them; and of powers one that is squared, one that is made, and their product.
+NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
+
+
+def _fits(plan: Plan, numbers: int) -> None:
+    """Raise if there is no memory for transition matrices."""
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    _checks.fits(f"the transition matrices of {n} × {n} numbers", float(numbers) * n * n, plan.batch, "use form='direct'")
 
 
 def transition(plan: Plan) -> Array:
@@ -38,11 +48,18 @@ def pulses(plan: Plan, inputs: Iterable[str]) -> Array:
     inputs = list(inputs)
     q = np.zeros((len(plan.method.nodes), len(inputs), n, *plan.batch))
     for i, node in enumerate(plan.method.nodes):
-        pulse = np.zeros(grid + 1)
-        pulse[_bin(node, grid)] = 1.0
+        pulse, part = np.zeros(grid + 1), abs(plan.dt) / grid
+        # Of a step back in time the last part comes first, and a node is at the end of its part.
+        back = plan.dt < 0.0
+        pulse[grid - _bin(node, grid) if back else _bin(node, grid)] = 1.0
+        start = -(grid + _LATE) * part if back else 0.0
         for j, name in enumerate(inputs):
-            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, plan.dt / grid)))
+            q[i, j] = one_step(plan._replace(system=plan.system.with_pulse(name, pulse, part, start)))
     return q
+
+
+#: Nodes are less than 0.9 of a part behind its beginning: so much more of it lies behind all of them.
+_LATE = 0.95
 
 
 def _bin(node: float, grid: int) -> int:
@@ -73,12 +90,14 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
     q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
     inputs = [each.signal() for each in plan.system.given_inputs().values()]
-    linear_map = {"n": n_v + n_y, "n_v": n_v, "p": P, "q": q, "inputs": inputs}
+    carries = int(plan.method.carry is not None)
+    linear_map = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
     return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
 
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """The run by the transition matrix, step by step."""
+    _fits(plan, NUMBERS_OF_AN_ELEMENT)
     given = plan.system.given_inputs()
     p, q = transition(plan), pulses(plan, given)
     q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
@@ -87,7 +106,9 @@ def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> O
     blocks = (*plan.system.v_shape, *plan.batch), (*plan.system.y_shape, *plan.batch)
     flat_v, flat_y = slot.reshape(n_v, *plan.batch), y.reshape(n_y, *plan.batch)
 
-    linear = reference.linear_step(p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt)
+    linear = reference.linear_step(
+        p, q, [i.signal() for i in given.values()], plan.method.nodes, plan.dt, plan.method.carry is not None
+    )
     finish = to_velocity(plan)
 
     def step(t: float, v: Array, y: Array) -> Blocks:
@@ -135,7 +156,7 @@ def _seen(
 
     Members that come near the end of the number range are stepped again by the reference, from the last check before that.
     """
-    most = _HUGE * min(plan.dt, 1.0)
+    most = _HUGE * min(abs(plan.dt), 1.0)
 
     def is_near(v: Array, y: Array) -> Any:
         return (before < 0) & ~((np.abs(v) < most).all(axis=-1 - before.ndim) & (np.abs(y) < most).all(axis=-1 - before.ndim))
@@ -162,6 +183,7 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     def wide(array: Array) -> Array:
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
+    _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
     given = plan.system.given_inputs()
     inputs = [
         Constant(wide(each.values[0]))

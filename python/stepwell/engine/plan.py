@@ -12,6 +12,7 @@ from .. import _checks, _core
 from .._checks import Array, Shape
 from ..control import EnergyControl
 from ..method_records import Method
+from ..reference.acceptance import Acceptance
 from ..reference.types import Whole
 from ..systems import System
 from ..systems.base import rows
@@ -27,7 +28,8 @@ class Watched(NamedTuple):
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
 
-    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32.
+    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. Of adaptive steps,
+    ``acceptance`` is what they must satisfy, and ``backward`` whether the time of the system is that of the run, negated.
     """
 
     system: System
@@ -49,6 +51,8 @@ class Plan(NamedTuple):
     watched: Watched | None = None
     order: int = 0
     single: bool = False
+    acceptance: Acceptance = Acceptance()  # it is immutable
+    backward: bool = False
 
     @property
     def dtype(self) -> type[Any]:
@@ -142,9 +146,12 @@ def model(plan: Plan) -> _core.ModelSpec:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if plan.watched is not None:
         given.append(("watched()", plan.watched.quantities))
-    if not plan.record and not plan.fused and not plan.order:
+    special = plan.order or plan.backward or plan.acceptance != Acceptance()
+    if not plan.record and not plan.fused and not special:
         return _core.ModelSpec(plan.system.kernel, plan.method.name, given)
     options: Any = {"record": list(plan.record), "fused": plan.fused, "order": plan.order}
+    if special:
+        options |= {"acceptance": tuple(plan.acceptance), "backward": plan.backward}
     return _core.ModelSpec(plan.system.kernel, plan.method.name, given, **options)
 
 

@@ -22,6 +22,7 @@ from .values import (
     folded,
     objects,
     of_shape,
+    value_of,
     wrapped,
 )
 
@@ -211,6 +212,10 @@ def clip(a: Any, a_min: Any = None, a_max: Any = None, *, min: Any = None, max: 
     return a if most is None else elementwise("minimum", functions.minimum, a, most)
 
 
+#: The most products of a matrix that are traced, in a second or two.
+MOST_PRODUCTS = 1_000_000
+
+
 def dot(a: Any, b: Any) -> Any:
     """As ``np.dot`` of arrays of one or two axes: sums of products, from the first to the last."""
     if np.ndim(objects(a)) == 0 or np.ndim(objects(b)) == 0:
@@ -227,10 +232,17 @@ def matmul(a: Any, b: Any) -> Any:
     columns = right.T if right.ndim == 2 else right[np.newaxis]
     if rows.shape[1] != columns.shape[1]:
         raise of_shape(f"@: shapes {left.shape} and {right.shape} do not fit")
+    if (products := len(rows) * len(columns) * rows.shape[1]) > MOST_PRODUCTS:
+        raise TraceError(
+            f"@: shapes {left.shape} and {right.shape} make {products} products, which are written out one by one; up to "
+            f"{MOST_PRODUCTS} can be traced. A linear system as large as that is sw.LinearSystem"
+        )
     made = np.empty((len(rows), len(columns)), dtype=object)
-    for i, row in enumerate(rows):
-        for j, column in enumerate(columns):
-            made[i, j] = folded(operator.add, (wrapped(x) * wrapped(y) for x, y in zip(row, column, strict=True)))
+    # Of plain values, which are a tenth of the work of scalars.
+    of_rows, of_columns = ([[value_of(each) for each in part] for part in parts] for parts in (rows, columns))
+    for i, row in enumerate(of_rows):
+        for j, column in enumerate(of_columns):
+            made[i, j] = Scalar(folded(operator.add, map(operator.mul, row, column)))
     return wrapped(made.reshape([n for n, items in ((len(rows), left), (len(columns), right)) if items.ndim == 2]))
 
 
@@ -281,6 +293,53 @@ def cumsum(a: Any, axis: Any = None) -> Any:
     return np.moveaxis(np.stack(rows), 0, axis or 0) if array(rows[0] if rows else a).ndim else np.stack(rows)
 
 
+#: The most points of a table that is written out; each makes four operations.
+MOST_POINTS = 256
+
+
+def interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
+    """As ``np.interp``: straight lines between the points of a table whose places are known."""
+    if period is not None:
+        raise TraceError("np.interp: period= is not known to own equations; write np.mod(x, period)")
+    places = objects(xp)
+    values = objects(fp)
+    if any(value_of(each) is None or not isinstance(value_of(each), float) for each in places.flat):
+        raise TraceError(
+            "np.interp: expected numbers that are known as the places xp, got some that depend on the state or parameters"
+        )
+    at = np.array([value_of(each) for each in places.flat])
+    if places.ndim != 1 or values.shape != places.shape or not len(at):
+        raise of_shape(
+            f"np.interp: expected xp and fp of one length along one axis, got shapes {places.shape} and {values.shape}"
+        )
+    if not (np.diff(at) > 0.0).all():
+        raise TraceError("np.interp: expected places xp that ascend")
+    if len(at) > MOST_POINTS:
+        raise TraceError(
+            f"np.interp: a table of {len(at)} points is too long to be written out, of more than {MOST_POINTS}; of the time, "
+            f"give it as a parameter: sw.Sampled(values, interval, start, interpolation='linear')"
+        )
+    return elementwise(
+        "interp", lambda x: _on_lines(x, at, [value_of(each) for each in values], value_of(left), value_of(right)), x
+    )
+
+
+def _on_lines(x: Any, at: Any, values: list[Any], left: Any, right: Any) -> Any:
+    place, value, slope = at[0], values[0] if left is None else left, 0.0
+    for i in range(len(at) - 1):
+        after = x >= at[i]
+        place, value, slope = (
+            functions.where(after, yes, no)
+            for yes, no in ((at[i], place), (values[i], value), ((values[i + 1] - values[i]) / (at[i + 1] - at[i]), slope))
+        )
+    after = x > at[-1] if right is not None else x >= at[-1]
+    place, value, slope = (
+        functions.where(after, yes, no)
+        for yes, no in ((at[-1], place), (values[-1] if right is None else right, value), (0.0, slope))
+    )
+    return slope * (x - place) + value
+
+
 def zeros_like(a: Any, dtype: Any = None) -> Any:
     """As many zeros as there are elements; nothing can be written to them."""
     return np.zeros(np.shape(objects(a)))
@@ -307,6 +366,7 @@ FUNCTIONS: dict[str, Any] = {
     "outer": outer,
     "norm": norm,
     "diff": diff,
+    "interp": interp,
     "cumsum": cumsum,
     "zeros_like": zeros_like,
     "empty_like": zeros_like,

@@ -6,15 +6,19 @@ import inspect
 import sys
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, overload
+from typing import Any, Literal, get_args, overload
 
 import numpy as np
 
 from .. import _checks
 from .._checks import Shape
+from .._value import frozen
 from ..errors import ArgumentError, DTypeError, UnknownNameError
 from ..systems.inputs import Sampled, Sinusoid
 from .invariants import Invariant, invariant
+
+#: What the error of an adaptive step is relative to.
+Scale = Literal["component", "row", "block"]
 
 
 class Definition:
@@ -26,15 +30,22 @@ class Definition:
         blocks: 2 if the function gives (v̇, ẏ).
         shape: the declared shapes of the blocks v and y; None where the state tells.
         quick_sines: whether sine and cosine are those of the built-in systems.
+        scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
         parameters: names and defaults.
         invariants: the declared invariants, by name.
     """
 
     def __init__(
-        self, function: Callable[..., Any], order: int, blocks: int, shape: tuple[Any, Any], quick_sines: bool = False
+        self,
+        function: Callable[..., Any],
+        order: int,
+        blocks: int,
+        shape: tuple[Any, Any],
+        quick_sines: bool = False,
+        scale: str = "component",
     ) -> None:
         self.function, self.order, self.blocks, self.shape = function, order, blocks, shape
-        self.quick_sines = quick_sines
+        self.quick_sines, self.scale = quick_sines, scale
         self.__name__ = self.name = function.__name__
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
@@ -72,7 +83,8 @@ class Definition:
 
         Args:
             function: ``f(v, y, *, parameters)``, or ``f(y, *, parameters)`` for a first-order system, that returns one number;
-                parameters are those of the system, by name. ``run.energy`` is the invariant called ``energy``.
+                it may take the time before the state, as the rates do, but not depend on it. Parameters are those of the system,
+                by name. ``run.energy`` is the invariant called ``energy``.
 
         Returns:
             The function.
@@ -130,7 +142,8 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     given = list(inspect.signature(function).parameters.values())
     positional = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+        first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
     parameters = {}
     for each in given:
         if each in positional[:state]:
@@ -142,7 +155,9 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
         parameters[each.name] = each.default
     for parameter, default in parameters.items():
         if not isinstance(default, (Sinusoid, Sampled)) and not callable(default):
-            _checks.numbers(f"{name}: default of {parameter}", default)
+            numbers = _checks.numbers(f"{name}: default of {parameter}", default)
+            if numbers.ndim:
+                parameters[parameter] = frozen(parameter, numbers)
     return parameters
 
 
@@ -150,9 +165,18 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
 def system(function: Callable[..., Any], /) -> Definition: ...
 @overload
 def system(
-    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False
+    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False, scale: Scale = "component"
 ) -> Callable[[Callable[..., Any]], Definition]: ...
-def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False) -> Any:
+def system(
+    function: Any = None,
+    /,
+    *,
+    order: int = 2,
+    blocks: int = 1,
+    shape: Any = None,
+    quick_sines: bool = False,
+    scale: Scale = "component",
+) -> Any:
     """Make a kind of system of a function: your own equations, in NumPy style, as fast as built-in ones.
 
     The function is run once for a system, with symbols in place of numbers, and its operations are recorded; it is not called
@@ -170,6 +194,9 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
 
         quick_sines: sine and cosine at half the operations, as the built-in systems have them: right to a unit in the last place
             of 1 for angles up to 10⁶ rad, where the others are right to a unit in their own last place.
+        scale: to what the error of an adaptive step is relative: to the largest that each ``"component"`` has been, so that the
+            units of one do not matter to another; to the length of each ``"row"`` along the last axis, for a state of shape
+            (bodies, 3) whose directions are equivalent; or to the length of each whole ``"block"``, v and y.
 
     Returns:
         A ``Definition``: called with parameters by name, it gives a ``System``.
@@ -193,13 +220,14 @@ def system(function: Any = None, /, *, order: int = 2, blocks: int = 1, shape: A
         raise ArgumentError("blocks: expected 1 with order=1, whose state is one block; for (v̇, ẏ) leave order out")
     shapes = _shapes(shape, order, blocks)
     quick_sines = _checks.flag("quick_sines", quick_sines)
+    scale = _checks.known("scale", scale, get_args(Scale))
 
     def define(function: Any) -> Definition:
         if isinstance(function, Definition):
             raise DTypeError(f"function: {function.name} is a system already")
         if not isinstance(function, FunctionType):
             raise DTypeError(f"function: expected a Python function such as f(t, v, y), got {type(function).__name__}")
-        return Definition(function, order, blocks, shapes, quick_sines)
+        return Definition(function, order, blocks, shapes, quick_sines, scale)
 
     return define if function is None else define(function)
 

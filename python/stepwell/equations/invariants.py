@@ -28,11 +28,13 @@ class Invariant(NamedTuple):
         name: of the function.
         function: of v and y, or of y alone in a first-order system, and of parameters of the system by name.
         parameters: their names.
+        takes_time: whether the function takes the time before the state, as rates do. It may not depend on it.
     """
 
     name: str
     function: Callable[..., Any]
     parameters: tuple[str, ...]
+    takes_time: bool = False
 
 
 def invariant(definition: Definition, function: Any) -> Invariant:
@@ -42,14 +44,21 @@ def invariant(definition: Definition, function: Any) -> Invariant:
     name = f"{definition.name}: {function.__name__}"
     state = ("v", "y") if definition.has_v else ("y",)
     given = list(inspect.signature(function).parameters.values())
-    head, rest = given[: len(state)], given[len(state) :]
-    if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
-        raise ArgumentError(f"{name}: expected a function ({', '.join(state)}, *, …), got ({', '.join(map(str, given))})")
-    for each in rest:
+    in_place = [each for each in given if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    # With the time there is one argument more before the parameters.
+    takes_time = len(in_place) > len(state) and in_place[len(state)].name not in definition.parameters
+    n = len(state) + takes_time
+    expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
+    if in_place[:n] != given[:n] or len(in_place) < n:
+        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+    for each in given[n:]:
         if each.name not in definition.parameters:
             known = ", ".join(definition.parameters) or "none"
-            raise ArgumentError(f"{name}: the system has no parameter {each.name!r}. Known: {known}.")
-    return Invariant(function.__name__, function, tuple(each.name for each in rest))
+            raise ArgumentError(
+                f"{name}: expected a function {expected} whose further arguments are parameters of the system, got "
+                f"{each.name!r}. Known: {known}."
+            )
+    return Invariant(function.__name__, function, tuple(each.name for each in given[n:]), takes_time)
 
 
 class Traced:
@@ -74,10 +83,15 @@ class Traced:
         state = map(self._tape.state, count())
         v, y = _symbols(equations.v_shape, state), _symbols(equations.y_shape, state)
         with recording() as self._marks:
-            made = equations.of_state(invariant, v, y, parameters)
+            made = equations.of_state(invariant, self._tape.time(), v, y, parameters)
         self._value = made if isinstance(made, _core.Symbol) else self._tape.number(float(made))
         self._state = [*v.flat, *y.flat]
         self._of_value = Operations(*self._tape.operations([self._value]))
+        if any(name == "time" for name, *_ in self._of_value.lines):
+            raise ArgumentError(
+                f"{equations.name}: {invariant.name}: expected a quantity of the state and the parameters, got one that depends "
+                f"on the time t"
+            )
 
     @cached_property
     def _of_gradient(self) -> Operations:

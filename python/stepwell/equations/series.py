@@ -15,13 +15,14 @@ from ..reference.replayed import Operations
 if TYPE_CHECKING:
     from .trace import Equations
 
-Functions = list[tuple[Any, list[tuple[Any, Any]]]]
+Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None]]
 
 
 def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
-    """The marked values on a tape, each with the values that it depends on and its derivatives by them, which join the tape.
+    """The marked values on a tape, each with its bounds, the values that it depends on and its derivatives by them.
 
-    The derivative of a function may be another function, such as the cosine of a sine; then that one's derivative joins, too.
+    Derivatives join the tape. That of a function may be another function, such as the cosine of a sine; then that one's
+    derivative joins, too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
     """
     found: Functions = []
     with recording(marks):
@@ -35,7 +36,10 @@ def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
                 value, wanted = tape.value(id), [isinstance(each, _core.Symbol) for each in mark.arguments]
                 factors = zip(mark.arguments, series.factors(mark, value, wanted), strict=True)
                 by = [(of, tape.number(by) if isinstance(by, float) else by) for of, by in factors if by is not None]
-                found.append((value, by))
+                if mark.name in ("mod", "remainder"):
+                    a, b = (each if isinstance(each, _core.Symbol) else tape.number(each) for each in mark.arguments)
+                    by.append(((a / b).floor(), -b))
+                found.append((value, by, series.BRANCHES.get(mark.name)))
     return found
 
 

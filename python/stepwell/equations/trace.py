@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import copy
 import linecache
+import re
+import sys
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._checks import Shape
-from ..errors import TraceError
+from ..errors import REFUSED, TraceError
 from ..reference.series import among
 from ..reference.types import Array as Numbers
 from .arrays import QUICK_SINES
@@ -131,11 +134,13 @@ class Equations:
             self._series = Rates(self, given)
         return self._series
 
-    def of_state(self, invariant: Invariant, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
+    def of_state(self, invariant: Invariant, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""
         state = [scalars(y, len(self.y_shape))]
         if self.definition.has_v:
             state.insert(0, scalars(v, len(self.v_shape)))
+        if invariant.takes_time:
+            state.insert(0, Scalar(t))
         parameters = {name: scalars(value, self.own_axes(name)) for name, value in given.items()}
         name = f"{self.name}: {invariant.name}"
         made = objects(self._run(rebound(invariant.function), name, *state, **parameters))
@@ -178,23 +183,36 @@ class Equations:
 
 
 def run_by(function: Callable[..., Any], name: str, quick_sines: bool, *given: Any, **named: Any) -> Any:
-    """Call a user's function; what it raises is told with its name and the line."""
-    before = QUICK_SINES.set(quick_sines)
+    """Call a user's function; what it raises is told with its name and the line, even if the function itself catches that."""
+    refused: list[TraceError] = []
+    before, outer = QUICK_SINES.set(quick_sines), REFUSED.set(refused)
     try:
-        return function(*given, **named)
+        made = function(*given, **named)
     except RecursionError:
         raise
     except Exception as error:
-        line = _line_of(error, getattr(function, "__code__", None))
-        known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
-        said = str(known) if isinstance(known, TraceError) else f"{type(error).__name__}: {error}"
-        told = TraceError(f"{name}{line}: {said}")
-        told.of_shape = (
-            known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
-        )
-        raise told from error
+        raise _told(error, function, name) from error
     finally:
+        REFUSED.reset(outer)
         QUICK_SINES.reset(before)
+    if refused:
+        raise _told(refused[0], function, name) from refused[0]
+    return made
+
+
+def _told(error: Exception, function: Any, name: str) -> TraceError:
+    """The error of a user's function with its name and the line."""
+    line = _line_of(error, getattr(function, "__code__", None))
+    known = error if isinstance(error, TraceError) else error.__cause__  # NumPy wraps what a float() raises
+    said = str(known) if isinstance(known, TraceError) else _in_words(error)
+    if (package := _abroad(error, function)) and isinstance(known, TraceError):
+        said += (
+            f". It was asked by {package}, whose functions are for numbers alone and cannot be traced; a table of the time is a "
+            f"parameter: sw.Sampled(values, interval, interpolation='linear' or 'cubic')"
+        )
+    told = TraceError(f"{name}{line}: {said}")
+    told.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+    return told
 
 
 def kind_of(made: Any) -> str:
@@ -225,6 +243,28 @@ def _numbers(items: Any, shape: Shape, batch: Shape) -> Numbers:
     for i, value in enumerate(values):
         numbers[i] = value
     return numbers.reshape((*shape, *batch))
+
+
+def _in_words(error: BaseException) -> str:
+    """What Python says of a value that is not what the function takes it for."""
+    match re.fullmatch(r"(cannot unpack non-iterable )?'?(Scalar|Array)'? object(.*)", str(error)):
+        case re.Match() as found if "not callable" in found[3]:
+            return "y is the state at t, and no function of the time: delays such as y(t − τ) are not here"
+        case re.Match() as found if found[2] == "Scalar" and not found[3].startswith(" has no attribute"):
+            return "expected an array, got one number"
+    return f"{type(error).__name__}: {error}"
+
+
+def _abroad(error: BaseException, function: Any) -> str:
+    """The package, other than the function's, this one and NumPy, whose code asked for a number; empty if none did."""
+    own = _package(getattr(function, "__globals__", {}))
+    packages = [_package(frame.f_globals) for frame, _ in walk_tb(error.__traceback__)]
+    inner = next((each for each in reversed(packages) if each not in ("stepwell", "numpy", own)), "")
+    return inner if inner in sys.modules and hasattr(sys.modules[inner], "__path__") else ""
+
+
+def _package(names: dict[str, Any]) -> str:
+    return str(names.get("__name__", "")).partition(".")[0]
 
 
 def _line_of(error: BaseException, code: Any) -> str:

@@ -30,7 +30,7 @@ def of_shape(text: str) -> TraceError:
 _KNOWN = (int, float, np.integer, np.floating)
 
 
-def _value(x: Any) -> Any:
+def value_of(x: Any) -> Any:
     """What a scalar holds, or a known number as one; None if it is neither."""
     if isinstance(x, Truth):
         return functions.where(x.value, 1.0, 0.0)
@@ -41,7 +41,7 @@ def _value(x: Any) -> Any:
     if isinstance(x, _KNOWN):
         return float(x)
     if isinstance(x, np.ndarray) and x.ndim == 0:
-        return _value(x.item())
+        return value_of(x.item())
     return None
 
 
@@ -57,7 +57,7 @@ def _mask(x: Any) -> Any:
 def elementwise(name: str, function: Callable[..., Any], *given: Any) -> Any:
     """A function of numbers over scalars and arrays, element by element, as NumPy broadcasts them."""
     if not any(isinstance(each, (Array, np.ndarray, list, tuple)) and np.ndim(objects(each)) for each in given):
-        values = [_value(objects(each)[()] if isinstance(each, (Array, np.ndarray)) else each) for each in given]
+        values = [value_of(objects(each)[()] if isinstance(each, (Array, np.ndarray)) else each) for each in given]
         if any(value is None for value in values):
             wrong = next(each for each, value in zip(given, values, strict=True) if value is None)
             raise TraceError(f"{name}: expected numbers, got {type(wrong).__name__}")
@@ -89,7 +89,7 @@ def objects(x: Any) -> Any:
 def wrapped(made: Any) -> Any:
     """Objects as an ``Array``, a single one as itself."""
     if not isinstance(made, np.ndarray):
-        return made if isinstance(made, Scalar) or _value(made) is None else Scalar(_value(made))
+        return made if isinstance(made, Scalar) or value_of(made) is None else Scalar(value_of(made))
     return Array(made) if made.ndim else wrapped(made[()])
 
 
@@ -108,7 +108,7 @@ def array(given: Any) -> Array:
         return Array(made)
     made = objects(given)
     for each in made.flat:
-        if _value(each) is None:
+        if value_of(each) is None:
             raise TraceError(f"expected numbers in an array, got {type(each).__name__}")
     return Array(made)
 
@@ -231,6 +231,12 @@ class Operators:
 
     __int__ = __index__ = __complex__ = __float__
 
+    def __getattr__(self, name: str) -> NoReturn:
+        if not name.startswith("_") and hasattr(np.ndarray, name):
+            known = ", ".join(each for each in dir(type(self)) if not each.startswith("_") and hasattr(np.ndarray, each))
+            raise TraceError(f"own equations do not know .{name} of a value. Known: {known}")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
     def __array_ufunc__(self, ufunc: Any, method: str, *given: Any, **options: Any) -> Any:
         from .arrays import ufunc_of
 
@@ -283,7 +289,7 @@ def compared(name: str, a: Any, b: Any) -> Any:
         if not isinstance(each, (Operators, np.ndarray, list, tuple, bool, np.bool_, *_KNOWN)):
             return NotImplemented
     if all(np.ndim(objects(each)) == 0 for each in (a, b)):
-        return Truth(COMPARISONS[name](_value(objects(a)[()]), _value(objects(b)[()])))
+        return Truth(COMPARISONS[name](value_of(objects(a)[()]), value_of(objects(b)[()])))
     return wrapped(np.frompyfunc(lambda a, b: compared(name, a, b), 2, 1)(objects(a), objects(b)))
 
 

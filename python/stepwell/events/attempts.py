@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import _core, engine
 from .._checks import Array
-from ..reference import adaptive
 from ..reference.bits import less, where
 from ..systems.base import rows as rows_of
 
@@ -37,7 +36,15 @@ class Attempts(NamedTuple):
 
 
 def attempted(
-    plan: engine.Plan, until: float, attempts: int, budget: int, begins: bool, paces: Array, v: Array, y: Array
+    plan: engine.Plan,
+    until: Any,
+    attempts: int,
+    budget: int,
+    begins: bool,
+    paces: Array,
+    v: Array,
+    y: Array,
+    jumps: Array | None = None,
 ) -> Attempts:
     """Make attempts one by one, of each member until it is at or past a time.
 
@@ -52,14 +59,16 @@ def attempted(
         paces: where they stand, shape (numbers of a ``Pace``, members) or (numbers,).
         v: velocities, shape (*block, members).
         y: coordinates, likewise.
+        jumps: times that no step crosses, the same for all or shape (jumps, members).
     """
     if plan.backend == "numpy":
-        return _by_numpy(plan, until, attempts, budget, begins, paces, v, y)
+        return _by_numpy(plan, until, attempts, budget, begins, paces, v, y, jumps)
     rows, members = attempts + 1, plan.members
     states = tuple(np.empty((rows, *a.shape)) for a in (v, y))
     last = np.empty((prod(plan.system.v_shape) + prod(plan.system.y_shape), members))
-    trail, last_paces = np.empty((2, rows, members)), np.empty((engine.PACE_NUMBERS, members))
-    before = paces.reshape(engine.PACE_NUMBERS, paces.size // engine.PACE_NUMBERS)
+    numbers = engine.pace_numbers(plan)
+    trail, last_paces = np.empty((2, rows, members)), np.empty((numbers, members))
+    before = paces.reshape(numbers, paces.size // numbers)
     arrays = engine.AdaptiveArrays(
         v=rows_of(v, plan.batch),
         y=rows_of(y, plan.batch),
@@ -71,26 +80,41 @@ def attempted(
         status=np.empty(members, dtype=np.int64),
         trail=trail,
     )
-    model, pacing = engine.model(plan), engine.Pacing(np.full(rows, until), budget, begins)
-    if not _core.adapt(model, plan, pacing, arrays):  # an attempt is not one tape: the reference finds the start
-        begun = np.array(engine.begun(plan, paces, v, y)).reshape(engine.PACE_NUMBERS, members)
-        _core.adapt(model, plan, pacing._replace(begins=False), arrays._replace(paces=begun))
+    model, plan_of_core = engine.model(plan), plan._replace(t0=0.0)
+    pacing = engine.pacing_of_core(plan, engine.Pacing(np.broadcast_to(until, (rows, *np.shape(until))), budget, begins, jumps))
+    if not _core.adapt(model, plan_of_core, pacing, arrays):  # an attempt is not one tape: the reference finds the start
+        begun = engine.numbers_of(engine.begun(plan, paces, v, y)).reshape(numbers, members)
+        _core.adapt(model, plan_of_core, pacing._replace(begins=False), arrays._replace(paces=begun))
     return Attempts(trail[0], trail[1], states[0], states[1], last_paces)
 
 
 def _by_numpy(
-    plan: engine.Plan, until: float, attempts: int, budget: int, begins: bool, paces: Array, v: Array, y: Array
+    plan: engine.Plan,
+    until: Any,
+    attempts: int,
+    budget: int,
+    begins: bool,
+    paces: Array,
+    v: Array,
+    y: Array,
+    jumps: Array | None,
 ) -> Attempts:
     """The same by the reference."""
-    pace = engine.begun(plan, paces, v, y) if begins else engine.pace_of(paces, plan.batch)
-    pace = adaptive.Pace(*np.broadcast_arrays(*pace))._replace(held=np.zeros(plan.batch))
-    attempt = engine.attempt_by_numpy(plan, budget)
+    pace = engine.begun(plan, paces, v, y) if begins else engine.pace_of(plan, paces)
+    pace = engine.pace_of(plan, engine.numbers_of(pace))._replace(held=np.zeros(plan.batch))
+    walls = engine.jumps_of(plan, engine.Pacing(np.atleast_1d(until), budget, begins, jumps))
+    if walls is not None:
+        pace = pace._replace(wall=walls.wall(pace.t))
+    attempt, series = engine.attempt_by_numpy(plan, budget), plan.method.has_series
     rows = []
     with np.errstate(all="ignore"):
         for done in range(attempts + 1):
             pace = pace._replace(target=where(less(pace.t, until), np.inf, pace.t))
-            rows.append((pace.t, pace.h, v, y))
+            length = where(less(pace.wall, pace.t + pace.h), pace.wall - pace.t, pace.h)
+            rows.append((pace.t, length, v, y))
             if done < attempts and pace.outlook(budget).runs.any():
                 pace, v, y = attempt(pace, budget, v, y)
+                if walls is not None:
+                    pace = walls.crossed(pace, series=series)
     t, h, all_v, all_y = (np.stack(each) for each in zip(*rows, strict=True))
-    return Attempts(t, h, all_v, all_y, np.array(np.broadcast_arrays(*pace)))
+    return Attempts(t, h, all_v, all_y, engine.numbers_of(pace))

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import engine
 from .._checks import Array
-from ..reference.events import located, width_at
+from ..reference.events import Parts, located, may_change, parted
 from ..reference.types import Whole
 from .event import Event
 from .members import Members
@@ -21,7 +21,10 @@ from .trials import Trials
 #: So many changes of sign are located together: enough that the calls of NumPy take less time than its work.
 LOCATED_AT_ONCE = 1 << 12
 
-#: Makes the changes of sign of one event, in these steps of these members.
+#: What stands for the slope of a quantity that begins at zero without one, on the side from which it came.
+LEAST_SLOPE = float(np.finfo(float).tiny)
+
+#: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
 Known = Callable[[int, Whole, Whole], Changes]
 
 
@@ -43,7 +46,11 @@ class Collected:
         self.members = Members(plan)
         self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
         self.trials = trials(plan, self.members)
+        #: Times of a plan that goes backward are negated until they are told.
+        self.sign = -1.0 if plan.backward else 1.0
         self.stopped_at = np.full(plan.members, np.nan)
+        #: Each quantity one state before those that are looked at next; NaN where that is not known.
+        self.before = np.full((len(events), plan.members), np.nan)
         self.clear()
 
     def clear(self) -> None:
@@ -52,52 +59,108 @@ class Collected:
         self.found: list[list[Found]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]
 
-    def take(self, index: Whole, steps: int, changes: list[Any], known: Known) -> Stops | None:
+    def changes(self, e: int, may: Any, known: Known) -> Changes:
+        """Where one event changes its sign in those steps, of shape (steps, members), in which it may."""
+        return self.within(e, known(e, *np.nonzero(may)))[0]
+
+    def within(self, e: int, steps: Changes, at: Array | None = None) -> tuple[Changes, Whole]:
+        """The parts of whole steps in which one event changes its sign, and which steps return to it within roundings.
+
+        ``at`` is not zero for steps that begin at the event, since it changed the state there: the side from which it came.
+        """
+        member, t, h = steps.member, steps.t, steps.h
+
+        def look(which: Any, share: Array) -> tuple[Array, Array, Array, Array]:
+            index, part = member[which], share * h[which]
+            v, y = self.trials.step(index, t[which], part, steps.v[..., which], steps.y[..., which])
+            there = t[which] + part
+            g = self.quantity(e, there, v, y, self.members.numbers(index))
+            return g, self._slope(e, index, there, h[which], v, y), v, y
+
+        if not len(member):
+            return steps, member
+        slope, slope_end = (
+            self._slope(e, member, at_time, h, *state)
+            for at_time, state in ((t, (steps.v, steps.y)), (t + h, (steps.v_end, steps.y_end)))
+        )
+        g = steps.g
+        if at is not None:
+            g, slope = np.where(at != 0.0, 0.0, g), np.where((at != 0.0) & (slope == 0.0), at * LEAST_SLOPE, slope)
+        whole = Parts(np.arange(len(t)), steps.low, steps.high, g, steps.g_end, slope, slope_end, steps.v_end, steps.y_end)
+        parts, stuck = parted(look, whole)
+        if at is not None:
+            stuck = stuck[at[stuck] != 0.0]
+        if direction := self.events[e].direction:
+            parts = parts.some(parts.g_low * direction < 0.0)
+        of = steps.some(parts.of)._replace(low=parts.low, high=parts.high, g=parts.g_low, g_end=parts.g_high)
+        return of._replace(v_end=parts.v, y_end=parts.y), stuck
+
+    def quantity(self, e: int, t: Array, v: Array, y: Array, numbers: dict[str, Any]) -> Array:
+        """The quantity of one event at times of the plan."""
+        return self.quantities[e](self.sign * t, v, y, numbers)
+
+    def may_change(self, e: int, index: Whole, g: Array) -> Any:
+        """In which of some steps of these members an event may change its sign, from its values at all of their ends."""
+        may = may_change(self.before[e, index], g)
+        self.before[e, index] = g[-2]
+        return may
+
+    def _slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
+        """By how much the quantity would change in a step that goes on as the states do."""
+        rates = self.trials.rates(index, t, h, v, y)
+        return self.quantities[e].slope(self.sign * t, v, y, self.members.numbers(index), self.sign * h, *rates)
+
+    def take(self, index: Whole, steps: int, changes: list[Changes]) -> Stops | None:
         """Count and keep changes of sign, up to the first terminal event of each member; None if no member stops.
 
         Args:
             index: the members.
             steps: how many there are.
-            changes: of each event, in which steps it is, shape (steps, members).
-            known: what is known of such changes; members are counted among these.
+            changes: of each event, in the order of time of each member.
         """
         # The step in which a member stops; later ones do not count.
         last = np.full(len(index), steps)
-        for each, event in zip(changes, self.events, strict=True):
-            if event.terminal:
-                last = np.minimum(last, np.where(each.any(axis=0), each.argmax(axis=0), steps))
+        for e, each in enumerate(changes):
+            ends = each.some(self.ends(e, each.member))
+            np.minimum.at(last, ends.place, ends.row)
         stops = last < steps
-        if stops.any():
-            changes = [each & (np.arange(steps)[:, np.newaxis] <= last) for each in changes]
         in_last: list[tuple[Found, Whole]] = []
         for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
-            step, member = np.nonzero(each)
             if stops.any():
-                mine = step == last[member]
-                in_last.append((self.located(e, known(e, step[mine], member[mine])), member[mine]))
-                step, member = step[~mine], member[~mine]
-            if len(step):
-                kept = ordinals(member) + self.count[e, index[member]] <= event.most
-                self.count[e, index] += np.bincount(member, minlength=len(index))
-                self._put_off(e, known(e, step[kept], member[kept]))
+                mine = each.some(each.row == last[each.place])
+                in_last.append((self.located(e, mine), mine.place))
+                each = each.some(each.row < last[each.place])
+            if len(each.row):
+                kept = ordinals(each.member) + self.count[e, each.member] <= event.most
+                self.count[e, index] += np.bincount(each.place, minlength=len(index))
+                self._put_off(e, each.some(kept))
         return self._stopped(index, in_last, last, stops) if stops.any() else None
+
+    def ends(self, e: int, member: Whole) -> Any:
+        """Which of these further occurrences, in the order of time of each member, end its run."""
+        terminal = self.events[e].terminal
+        return ordinals(member) + self.count[e, member] >= terminal if terminal else np.zeros(len(member), dtype=bool)
 
     def _stopped(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any) -> Stops:
         """Let members stop at the first terminal event of their last step."""
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
-        for (each, member), event in zip(in_last, self.events, strict=True):
-            if event.terminal:
-                first = each.share < end[member]
-                ends, who = each.some(first), member[first]
-                end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
-        for e, ((each, member), event) in enumerate(zip(in_last, self.events, strict=True)):
-            before_it = each.share <= end[member]  # what comes after the end of a member is not there
-            kept = each.some(before_it)
-            self.count[e, kept.member] += 1
-            self.found[e].append(kept.some(self.count[e, kept.member] <= event.most))
+        for e, (each, member) in enumerate(in_last):
+            first = np.flatnonzero(self.ends(e, each.member))
+            first = first[np.unique(member[first], return_index=True)[1]]
+            first = first[each.share[first] < end[member[first]]]
+            ends, who = each.some(first), member[first]
+            end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
+        for e, (each, member) in enumerate(in_last):
+            self.note(e, each.some(each.share <= end[member]))  # what comes after the end of a member is not there
         self.stopped_at[index[stops]] = times[stops]
         return Stops(stops, last, times, v, y)
+
+    def note(self, e: int, found: Found) -> None:
+        """Count and keep these."""
+        few = ordinals(found.member) + self.count[e, found.member] <= self.events[e].most
+        np.add.at(self.count[e], found.member, 1)
+        self.found[e].append(found.some(few))
 
     def _put_off(self, e: int, changes: Changes) -> None:
         """Locate these with others, as many at once as are quick together."""
@@ -120,14 +183,16 @@ class Collected:
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
             index, h = member[which], share * length[which]
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
-            return self.quantities[e](t[which] + h, v, y, self.members.numbers(index)), v, y
+            return self.quantity(e, t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        share, v, y = located(trial, changes.g, changes.g_end, changes.v_end, changes.y_end, width_at(t, length))
+        ends = changes.low, changes.high, changes.g, changes.g_end
+        share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
         return Found(member, changes.step, share, t + share * length, v, y)
 
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""
-        return self.stopped_at.reshape(self.plan.batch) if any(event.terminal for event in self.events) else None
+        ends = any(event.terminal or event.then for event in self.events)
+        return self.sign * self.stopped_at.reshape(self.plan.batch) if ends else None
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Those of each event, by name."""
@@ -135,9 +200,9 @@ class Collected:
         for e, (event, count) in enumerate(zip(self.events, self.count, strict=True)):
             self.locate_waiting(e)
             found = self.found[e]
-            member, step, _, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            order = np.lexsort((step, member))
+            member, step, share, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
+            order = np.lexsort((share, step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
-            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], t[order], v, y)
+            made[event.name] = Occurrences(event.name, numbers, member[order], step[order], self.sign * t[order], v, y)
         return made

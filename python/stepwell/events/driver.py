@@ -10,12 +10,13 @@ import numpy as np
 
 from .. import _checks, engine
 from .._checks import Array
-from ..reference.events import crosses
+from ..reference.events import near
 from ..reference.types import Whole
 from ..result import Status
-from .collected import Collected
+from .collected import Collected, Known
 from .event import Event
 from .parts import At, Changes
+from .resets import Resets, Stretch, warn_of_rest
 from .traced import watched
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
@@ -38,7 +39,7 @@ LEAST_BETWEEN_SAVES = 32
 def check_room(events: Sequence[Event], plan: engine.Plan) -> None:
     """Raise if what may be kept of the events would not fit in memory."""
     numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    rows = sum(numbers * (1 if event.terminal else min(event.most, plan.steps)) for event in events)
+    rows = sum(numbers * min(event.most, int(event.terminal) or plan.steps) for event in events)
     _checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
 
 
@@ -60,7 +61,7 @@ class Run:
     def made(self, plan: engine.Plan) -> engine.Outcome:
         """Make it."""
         check_room(self._events, plan)
-        self._driver = _Driver(plan, self._events)
+        self._driver = (_Resetting if any(event.then for event in self._events) else _Driver)(plan, self._events)
         return self._driver.run(*self._start)
 
     def tell(self, run: Any) -> None:
@@ -70,6 +71,7 @@ class Run:
         if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
             run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
             run.encounter = run.overshoots = None  # these go through all of the steps
+        self._driver.tell_of_rest(run)
 
 
 class _Driver(Collected):
@@ -84,6 +86,8 @@ class _Driver(Collected):
         self.slot = np.empty((*blocks[0], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.done = 0
+        #: Members one of whose quantities is near to zero where the steps end that were made last.
+        self.close = np.zeros(total, dtype=bool)
         self.watched: engine.Watched | None = None
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
@@ -151,9 +155,13 @@ class _Driver(Collected):
         if done + now.steps == self._next_save(done):
             self._save(done + now.steps, 0, index, out.v, out.y)
         end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
-        noticed = out.noticed[-1] > 0.0
-        for quantity, event, before in zip(self.quantities, self.events, out.noticed, strict=False):
-            noticed |= crosses(before, quantity(np.array(end), out.v[-1], out.y[-1], given), event.direction)
+        noticed = (out.noticed[-1] > 0.0) | self.close[index]
+        self.close[index] = False
+        for e, (quantity, before) in enumerate(zip(self.quantities, out.noticed, strict=False)):
+            g = quantity(np.array(end), out.v[-1], out.y[-1], given)
+            self.close[index] |= near(g, before)
+            noticed |= near(g, before) | near(before, g)
+            self.before[e, index] = before
         stopped, where = np.zeros(len(index), dtype=bool), np.flatnonzero(noticed)
         size = max(1, most // now.steps)
         for first in range(0, len(where), size):
@@ -162,7 +170,10 @@ class _Driver(Collected):
             again = now._replace(system=again.system, batch=again.batch, force=again.force, every=1, watched=None)
             then = at.some(these)
             states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
+            last = self.before[:, index[these]]
+            self.before[:, index[these]] = np.nan
             stopped[these] = self._look(again, index[these], states, done)
+            self.before[:, index[these]] = last
         return stopped, len(where) / len(index)
 
     def _next_save(self, done: int) -> int:
@@ -181,20 +192,31 @@ class _Driver(Collected):
             else:
                 kept[first:last][..., index] = state[where]
 
-    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
-        """Find the events within these steps; which of the members stop."""
+    def _may(self, now: engine.Plan, index: Whole, out: engine.Outcome) -> tuple[Known, list[Any]]:
+        """What is known of these steps, and in which of them an event may change its sign."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
         g = [quantity(t, v, y, given) for quantity in self.quantities]
-        changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
+        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
         if (out.first_bad >= 0).any():
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
-            finite = (out.first_bad < 0) | (ends < out.first_bad)
-            changes = [each & finite for each in changes]
-        stops = self.take(
-            index, now.steps, changes, lambda e, step, member: self._changes(now, index, g[e], states, step, member)
-        )
+            may = [each & ((out.first_bad < 0) | (ends < out.first_bad)) for each in may]
+
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
+            number = now.first + row
+            low, high, h = np.zeros(len(row)), np.ones(len(row)), np.full(len(row), now.dt)
+            begin: Any = now.t0 + number * now.dt
+            values = g[e][row, place], g[e][row + 1, place]
+            return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
+
+        return known, may
+
+    def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
+        """Find the events within these steps; which of the members stop."""
+        known, may = self._may(now, index, out)
+        stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         after = np.searchsorted(self.saves, done + stops.step, "right")
@@ -204,13 +226,8 @@ class _Driver(Collected):
                 kept_states[place:][..., index[these]] = state[..., these]
         return stops.which
 
-    def _changes(self, now: engine.Plan, index: Whole, g: Array, states: Any, step: Whole, member: Whole) -> Changes:
-        """What is known of the changes of sign of these members in these steps."""
-        begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
-        numbers = now.first + step
-        t: Any = now.t0 + numbers * now.dt
-        h = np.full(len(step), now.dt)
-        return Changes(index[member], numbers, t, h, g[step, member], g[step + 1, member], *begins, *ends)
+    def tell_of_rest(self, run: Any) -> None:
+        """Tell of members that came to rest at an event."""
 
     def _outcome(self) -> engine.Outcome:
         """As that of a run without events, without what a control added up."""
@@ -219,3 +236,102 @@ class _Driver(Collected):
         first_bad = self.first_bad.reshape(batch)
         diverged = bool((first_bad >= 0).any())
         return engine.Outcome(v, y, self.slot.reshape((*blocks[0], *batch)), first_bad, {}, None, diverged)
+
+
+class _Resetting(_Driver):
+    """A run with events that change the state: where the first of a group is, the group's steps end, and go on from there."""
+
+    def __init__(self, plan: engine.Plan, events: Sequence[Event]) -> None:
+        super().__init__(plan, events)
+        self.resets = Resets(self)
+        self.rests = np.full(plan.members, -1)
+
+    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+        plan = self.plan
+        if not carried:
+            states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
+            self.resets.begin(np.array(plan.t0 + plan.first * plan.dt), *states)
+        return super().run(v, y, before, carried)
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+        plan, piece, some = self.plan, FIRST_STEPS, self.members.plan(index)
+        while done < plan.steps and len(index):
+            size = max(1, most // LEAST_STEPS)
+            if len(index) > size:
+                for first in range(0, len(index), size):
+                    these = np.arange(first, min(first + size, len(index)))
+                    self._group(index[these], at.some(these), most, done)
+                return
+            steps = min(max(1, min(piece, most // len(index), MOST_STEPS)), plan.steps - done)
+            now = some._replace(first=plan.first + done, steps=steps, every=1, record=(), progress=None)
+            out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+            before = self.before[:, index]
+            known, may = self._may(now, index, out)
+            changes = [self.changes(e, each, known) for e, each in enumerate(may)]
+            # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
+            rows = [each.row[self.resets.end(e, each.member)] for e, each in enumerate(changes)]
+            row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
+            at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
+            for e, each in enumerate(changes):
+                ends = self.resets.end(e, each.member) & (each.row == row)
+                at_event[each.place[ends]] = True
+            now = now._replace(steps=min(row + 1, steps))
+            if now.steps < steps:
+                self.before[:, index] = before
+                out = engine.advance(now, at.slot, at.y, at.bad, carried=at.carried)
+                known, _ = self._may(now, index, out)
+            self.take(
+                index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]
+            )
+            slot: Array = out.slot
+            gone: Any = np.zeros(len(index), dtype=bool)
+            if row < steps:
+                slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
+            self._save(done, now.steps, index, out.v, out.y)
+            at = At(slot, out.y[-1], out.first_bad, True)
+            self.slot[..., index], self.first_bad[index] = at.slot, at.bad
+            if gone.any():
+                self._stay(index, gone, out, done + row)
+                self.done += int(gone.sum()) * (plan.steps - done - now.steps)
+                index, at = index[~gone], at.some(~gone)
+                some = self.members.plan(index) if len(index) else some
+            self.done += now.steps * len(gone)
+            done, piece = done + now.steps, 2 * now.steps if row < steps else 4 * piece
+            if plan.progress is not None:
+                plan.progress(self.done / (plan.steps * plan.members))
+
+    def _through(
+        self, now: engine.Plan, index: Whole, out: engine.Outcome, known: Known, which: Whole, row: int
+    ) -> tuple[Array, Any]:
+        """Take some members through the last of these steps; what all carry then, and which of them stop."""
+        step = known(0, np.full(len(which), row), which)
+        member = index[which]
+        end = now.t0 + (step.step + 1) * now.dt
+        states = step.v, step.y, step.v_end, step.y_end
+        arrived = self.resets.through(Stretch(member, step.step, step.t, end - step.t, *states, self.resets.at[:, member]))
+        out.v[-1][..., which], out.y[-1][..., which] = arrived.v, arrived.y
+        self.resets.at[:, member], self.before[:, member] = arrived.at, np.nan
+        gone, self.rests[member] = ~np.isnan(arrived.t), arrived.rests
+        self.stopped_at[member[gone]] = arrived.t[gone]
+        slot = out.slot
+        if now.method.carry is not None:
+            anew = self.members.plan(member)._replace(first=now.first + now.steps)
+            slot[..., which] = engine.to_slot(anew, arrived.v, arrived.y)
+        else:
+            slot = out.v[-1]
+        stops = np.zeros(len(index), dtype=bool)
+        stops[which[gone]] = True
+        return slot, stops
+
+    def _stay(self, index: Whole, gone: Any, out: engine.Outcome, step: int) -> None:
+        """Keep the states of members that stop in this step."""
+        place = int(np.searchsorted(self.saves, step, "right"))
+        for kept, state in zip(self.kept, (out.v[-1], out.y[-1]), strict=True):
+            kept[place:][..., index[gone]] = state[..., gone]
+        self.first_bad[index[gone]], self.slot[..., index[gone]] = -1, np.nan
+
+    def tell_of_rest(self, run: Any) -> None:
+        rests = (self.rests >= 0).reshape(self.plan.batch)
+        if rests.any():
+            run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
+            warn_of_rest([event.name for event in self.events], self.rests, self.stopped_at, self.plan.batch)

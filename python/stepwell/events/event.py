@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from .. import _checks
 from .._value import Fixed, Value
 from ..errors import ArgumentError, DTypeError
+
+if TYPE_CHECKING:
+    from .._words import Direction
 
 #: Default of ``most``: so many occurrences of an event are kept for each member.
 MOST_KEPT = 1000
@@ -20,8 +25,12 @@ class Event(Fixed, Value):
     Args:
         function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
             in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
-        direction: 1 for changes from below zero to above, −1 for those from above to below, 0 for both.
-        terminal: whether a member stops at the first such change.
+        direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
+            If None, as an attribute ``direction`` of the function says, as SciPy reads it; 0 without one.
+        terminal: whether a member stops at the first such change; a whole number stops it at so many. If None, as an attribute
+            ``terminal`` of the function says; False without one.
+        then: ``then(t, v, y)``, which returns the state (v, y) from which a member goes on at each such change; for a system
+            without velocities ``then(t, y)``, which returns y. It is written as ``function`` is, and may take parameters too.
         most: so many occurrences are kept for each member, the first ones; all are counted.
         name: its name in ``run.events``; if None, that of the function.
 
@@ -39,8 +48,9 @@ class Event(Fixed, Value):
         self,
         function: Callable[..., Any],
         *,
-        direction: int = 0,
-        terminal: bool = False,
+        direction: int | Direction | None = None,
+        terminal: bool | int | None = None,
+        then: Callable[..., Any] | None = None,
         most: int = MOST_KEPT,
         name: str | None = None,
     ) -> None:
@@ -52,15 +62,54 @@ class Event(Fixed, Value):
         if name is not None and not isinstance(name, str):
             raise DTypeError(f"name: expected a name or None, got {_checks.short(name)} ({type(name).__name__})")
         self.function = function
-        self.direction = _checks.count("direction", direction, -1, 1)
-        self.terminal = _checks.flag("terminal", terminal)
+        self.direction = _agreed("direction", function, direction, _sign, 0)
+        self.terminal = _agreed("terminal", function, terminal, _stops, False)
+        if then is not None and not inspect.isfunction(then):
+            raise DTypeError(
+                f"then: expected a Python function such as then(t, v, y), got {_checks.short(then)} ({type(then).__name__})"
+            )
+        if then is not None and self.terminal:
+            raise ArgumentError("then, terminal: a member that stops at an event does not go on from a new state; leave one out")
+        self.then = then
         self.most = _checks.count("most", most, 1)
         self.name = function.__name__ if name is None else name
 
     def __repr__(self) -> str:
         options = {"direction": self.direction, "terminal": self.terminal}
+        if self.then is not None:
+            options["then"] = self.then.__name__
         told = "".join(f", {name}={value}" for name, value in options.items() if value)
         return f"Event({self.name}{told})"
+
+
+def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], Any], otherwise: Any) -> Any:
+    """What the argument says, or the function's attribute of that name, which may not say another thing."""
+    attribute = getattr(function, name, None)
+    its_own = None if attribute is None else read(f"{function.__name__}.{name}", attribute)
+    if argument is None:
+        return otherwise if its_own is None else its_own
+    asked = _checks.direction(name, argument) if name == "direction" else read(name, argument)
+    if its_own is not None and its_own != asked:
+        raise ArgumentError(
+            f"{name}: got {asked!r}, but the function {function.__name__} has an attribute {name} = {attribute!r}; leave one out"
+        )
+    return asked
+
+
+def _sign(name: str, value: Any) -> int:
+    """A direction as SciPy reads it: by its sign."""
+    if isinstance(value, str):
+        return _checks.direction(name, value)
+    number = _checks.number(name, value)
+    return (number > 0.0) - (number < 0.0)
+
+
+def _stops(name: str, value: Any) -> bool | int:
+    """Whether an event stops a member, or at the how many-th change: True for the first, False for none."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    number = _checks.count(name, value, 0)
+    return number if number > 1 else number == 1
 
 
 def several(events: Any) -> list[Event]:

@@ -10,7 +10,6 @@ import numpy as np
 from .. import _checks, engine
 from .._checks import Array
 from ..errors import UnsupportedError
-from ..reference.events import crosses
 from ..reference.types import Whole
 from .collected import Collected
 from .event import Event
@@ -46,6 +45,11 @@ class Frames(Collected):
                 f"events: no event stops a member of a world, got {stops[0]!r}; read world.events after a step, and write "
                 f"into world.v and world.y"
             )
+        if changing := [each for each in events if each.then is not None]:
+            raise UnsupportedError(
+                f"events: no event changes the state of a world by then=, got {changing[0]!r}; "
+                f"integrate(…, dt=…, steps=…) takes it"
+            )
         super().__init__(plan, events)
         self._blocks, self._steps, self._number = (v, y), steps, number
         self._told: dict[str, Occurrences] | None = None
@@ -57,13 +61,14 @@ class Frames(Collected):
         self.clear()
         self._told = None
         g = self._quantities(self._number())
+        self.before[:] = np.nan
         for _ in range(n):
             step, before = self._number(), [each.copy() for each in self._blocks]
             self._steps(1)
             after = self._quantities(self._number())
-            changes = [crosses(one, other, event.direction) for one, other, event in zip(g, after, self.events, strict=True)]
-            if np.any(changes):
-                self._found(step, changes, g, after, before)
+            may = [self.may_change(e, self._all, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
+            if np.any(may):
+                self._found(step, may, g, after, before)
             g = after
         for e in range(len(self.events)):
             self.locate_waiting(e)
@@ -87,7 +92,7 @@ class Frames(Collected):
         shapes = self.plan.system.v_shape, self.plan.system.y_shape
         return tuple(each.reshape(*shape, len(self._all)) for each, shape in zip(blocks, shapes, strict=True))
 
-    def _found(self, step: int, changes: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> None:
+    def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> None:
         """Take what happened in a step."""
         if self.plan.force is not None:  # which may be another one than in the last call
             force = np.array(self.plan.force)
@@ -97,10 +102,10 @@ class Frames(Collected):
         finite = np.logical_and.reduce([np.isfinite(each).all(axis=tuple(range(each.ndim - 1))) for each in states[2:]])
         t = self.plan.t0 + step * self.plan.dt
 
-        def known(e: int, row: Whole, member: Whole) -> Changes:
-            number = np.full(len(member), step)
-            times, lengths = np.full(len(member), t), np.full(len(member), self.plan.dt)
-            v, y, v_end, y_end = (each[..., member] for each in states)
-            return Changes(member, number, times, lengths, g[e][member], after[e][member], v, y, v_end, y_end)
+        def known(e: int, row: Whole, place: Whole) -> Changes:
+            number, times, lengths = (np.full(len(place), each) for each in (step, t, self.plan.dt))
+            low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][place], after[e][place])
+            v, y, v_end, y_end = (each[..., place] for each in states)
+            return Changes(row, place, place, number, times, lengths, low, high, *values, v, y, v_end, y_end)
 
-        self.take(self._all, 1, [(each & finite)[np.newaxis] for each in changes], known)
+        self.take(self._all, 1, [self.changes(e, each & finite, known) for e, each in enumerate(may)])

@@ -10,7 +10,7 @@ import numpy as np
 from .. import engine
 from .._checks import Array, Shape
 from .._value import changed, complete
-from ..reference.signal import Constant, Held, Sine
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
 from ..systems.own import OwnSystem
 
 #: From numbers, and how many axes of their own they have (None if as many as the batch leaves), to others.
@@ -28,6 +28,8 @@ def each(value: Any, change: Change) -> Any:
             return Constant(change(np.asarray(value.value), None))
         case Sine():
             return Sine(*(change(np.asarray(part), None) for part in (value.amplitude, value.omega, value.phase)))
+        case Stepped() | Curve():
+            return type(value)(*(each(part, change) for part in value.parts().values()))
         case Held():
             return Held(change(value.values, 1), value.interval, value.start)
         case _:
@@ -42,6 +44,17 @@ def in_a_row(values: Array, own: int | None, batch: Shape) -> Array:
         return np.array(values[(slice(None),) * own + (0,) * len(over)])[..., np.newaxis]
     wide = values.reshape((*values.shape[:own], *(1,) * (len(batch) - len(over)), *over))
     return np.broadcast_to(wide, (*values.shape[:own], *batch)).reshape((*values.shape[:own], -1))
+
+
+def for_batch(given: dict[str, Any], batch: Shape) -> dict[str, Any]:
+    """Parameters with one batch axis, for a batch of which that is the last."""
+    if len(batch) == 1:
+        return given
+
+    def wide(values: Array, own: int | None) -> Array:
+        return values.reshape((*values.shape[:-1], *(1,) * (len(batch) - 1), values.shape[-1]))
+
+    return {name: each(value, wide) for name, value in given.items()}
 
 
 class Members:
@@ -86,8 +99,8 @@ class Members:
         complete(
             taken,
             batch=batch,
-            given=lambda _batch: given,
-            given_contacts=lambda _batch: contacts,
+            given=lambda wanted: for_batch(given, wanted),
+            given_contacts=lambda wanted: for_batch(contacts, wanted),
             control=control,
             rubbing=None if self._rubbing is None else some(self._rubbing),
         )

@@ -24,15 +24,35 @@ class At(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """Changes of sign of one event that are yet to be located: whose, in which step, and what is known at both ends of that.
+    """Parts of steps in which one event changes its sign, or may do so: whose, in which step, and what is known at both ends.
 
-    A step begins at ``t`` and is as long as ``h``.
+    A step begins at ``t`` and is as long as ``h``; the part goes from the share ``low`` of it to ``high``.
+
+    Attributes:
+        row: the number of the step among those that are looked at together.
+        place: the number of the member among those.
+        member: the member.
+        step: the number of the step.
+        t: the time at its start.
+        h: its length.
+        low: the share of the step where the part begins.
+        high: where it ends.
+        g: the quantity where the part begins.
+        g_end: where it ends.
+        v: velocities at the start of the step.
+        y: coordinates there.
+        v_end: velocities where the part ends.
+        y_end: coordinates there.
     """
 
+    row: Whole
+    place: Whole
     member: Whole
     step: Whole
     t: Array
     h: Array
+    low: Array
+    high: Array
     g: Array
     g_end: Array
     v: Array

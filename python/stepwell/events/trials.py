@@ -12,6 +12,7 @@ from ..reference import contact, series_pace, tableau
 from ..reference.adaptive import Attempted
 from ..reference.replayed import Operations
 from ..reference.series import coefficients
+from ..reference.signal import of_slot, over
 from ..reference.traced import Tracer
 from ..systems.own import OwnSystem
 from .members import Members
@@ -45,6 +46,8 @@ class Trials:
         self._is_traced = not isinstance(plan.system, OwnSystem)
         self._by_core = plan.backend == "rust"
         self._plans: dict[int, engine.Plan] = {}
+        self._rates: tuple[Operations, list[Array]] | None = None
+        self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, of another time and length for each."""
@@ -61,6 +64,49 @@ class Trials:
             made = self._operations(state, numbers)
         n = len(made) - y[..., 0].size
         return _block(made[:n], v), _block(made[n:], y)
+
+    def rates(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
+        """How much v and y of these members would change in a step of the length if they went on as they do here."""
+        if not self._rates_traced:
+            self._rates, self._rates_traced = self._traced_rates(), True
+        if self._rates is None:
+            s = self._scaled(self._members.plan(index), h)
+            with np.errstate(all="ignore"):
+                dv, dy = s.dv(t, v, y), s.dy(t, v, y)
+            return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)
+        operations, numbers = self._rates
+        state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
+        with np.errstate(all="ignore"):
+            changes = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
+        n = len(changes) - y[..., 0].size
+        return _block(changes[:n], v), _block(changes[n:], y)
+
+    def _traced_rates(self) -> tuple[Operations, list[Array]] | None:
+        """Rates of an own system as operations, likewise."""
+        plan = self._members.plan(np.arange(self._plan.members))
+        if not isinstance(plan.system, OwnSystem):
+            return None
+        tape = _core.Tape()
+        tracer = Tracer(plan.system, tape, plan.force)
+        t, h = tape.state(0), tape.state(1)
+        leaves = (tape.state(i) for i in range(2, 1 << 30))
+        v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
+        s = self._scaled_symbols(tracer, h)
+        if tracer.tables:
+            return None
+        wide = (np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape))
+        operations = Operations(*tape.operations(tracer.flat(*wide)))
+        if len(operations.lines) > MOST_OPERATIONS:
+            return None
+        return operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        """The system of these members, scaled to steps of another length for each."""
+        return plan.system.scaled(h, plan.batch, plan.force)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        """The same with symbols."""
+        return tracer.scaled(h)
 
     def _one_by_one(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """The same by the core."""
@@ -111,14 +157,20 @@ class AdaptiveTrials(Trials):
         self._always_traced = plan.method.has_series
         self._is_traced = self._is_traced and not self._always_traced
 
+    def _scaled(self, plan: engine.Plan, h: Any) -> Any:
+        return Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control).rates(h)
+
+    def _scaled_symbols(self, tracer: Tracer, h: Any) -> Any:
+        return tracer.attempted(backward=self._plan.backward).rates(h)
+
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
-        system = Attempted(plan.system.alone(1.0, plan.batch), plan.system.control)
+        system = Attempted(engine.of_unit_step(plan, plan.batch), plan.system.control)
         with np.errstate(all="ignore"):
             v, y = within(plan, system, t, h, v, y)
         return np.asarray(v), np.asarray(y)
 
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-        return within(plan, tracer.attempted(), t, h, v, y)
+        return within(plan, tracer.attempted(backward=plan.backward), t, h, v, y)
 
 
 def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
@@ -132,9 +184,13 @@ def one_step(plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple
 def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
     """A step of a method from v and y: what it carries in place of v is made anew for this length."""
     steps, carries = plan.method.steps, plan.method.carry is not None
-    slot = steps.start(s, plan.choice, t, v, y) if carries else v
+    if not carries:
+        return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
+    with over(of_slot(t, h)):
+        slot = steps.start(s, plan.choice, t, v, y)
     slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
-    return (steps.finish(s, plan.choice, t + h, slot, y) if carries else slot), y
+    with over(of_slot(t + h, h)):
+        return steps.finish(s, plan.choice, t + h, slot, y), y
 
 
 def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:

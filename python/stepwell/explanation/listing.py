@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _core
+from .. import _core, engine
 from .._checks import Shape
 from ..engine import Plan
 from ..reference import adaptive, increments
-from ..reference.signal import Constant, Held, Sine
+from ..reference.acceptance import Acceptance
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
 from ..reference.tape import Operation, in_order, needed
 from ..reference.traced import Tracer
 from .formula import ATOM, PRODUCT, SUM, Formula, Notation, formula, number, number_of
@@ -82,8 +83,8 @@ class Section(NamedTuple):
 class Named(Tracer):
     """Traces a step and notes what its values are called, by their numbers on the tape."""
 
-    def __init__(self, system: Any, tape: Any) -> None:
-        super().__init__(system, tape)
+    def __init__(self, system: Any, tape: Any, force: Any = None) -> None:
+        super().__init__(system, tape, force)
         self.names: dict[int, str] = {}
         self.called: list[tuple[Any, str]] = []
         self._taken: set[str] = set()
@@ -107,11 +108,11 @@ class Named(Tracer):
         s.dv, s.dy = noting("v", s.dv), noting("y", s.dy)
         return s
 
-    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+    def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state and the pace after an attempt, whose increments are as long as its step."""
         _, _, more = self.state()
-        self._length = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields)).outlook(self.tape.budget()).step
-        return super().attempt(method, order)
+        self._length = self.pace(acceptance, more).outlook(self.tape.budget()).step
+        return super().attempt(method, order, acceptance, backward=backward)
 
     def _note(self, name: str, block: Any) -> None:
         block = np.asarray(block, dtype=object)
@@ -165,6 +166,9 @@ def named_numbers(plan: Plan, given: Mapping[str, Any]) -> tuple[list[str], list
             case Sine():
                 for part in ("amplitude", "omega", "phase"):
                     add(f"{name}.{part}", getattr(value, part))
+            case Stepped() | Curve():
+                for behind, table in value.parts().items():
+                    add(name + behind, table)
             case Held():
                 tables.append(named(name, ()))
             case np.ndarray():
@@ -180,7 +184,11 @@ def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     """What the numbers of a state are called, with a mark behind the names."""
     blocks = [(plan.method.carry or "v", plan.system.v_shape), ("y", plan.system.y_shape)]
     names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
-    beside = adaptive.Pace._fields if attempts else () if plan.system.control is None else ("work",)
+    beside: list[str] = [] if plan.system.control is None else ["work"]
+    if attempts:
+        each = ("longest", "relative", "absolute") if plan.acceptance.own else ("longest",)
+        groups = range(engine.groups_of(plan))
+        beside = [*adaptive.Pace._fields[: engine.PACE_NUMBERS], *(indexed(name, (group,)) for name in each for group in groups)]
     return names + [name + mark for name in beside]
 
 
@@ -229,7 +237,7 @@ def again(tape: Any, name: str, of: Sequence[Any], given: int, bits: Sequence[in
             return of[0].shift_down(given)
         case "sample":
             return tape.sample(given, of[0])
-        case "copy":
+        case "copy" | "same":
             return of[0]
         case _:
             return None
@@ -251,7 +259,7 @@ def _leaf(tape: Any, name: str, given: int, single: bool) -> Any:
     match name:
         case "state":
             return tape.state(given)
-        case "parameter":
+        case "parameter" | "force":
             return tape.param(given)
         case "constant":
             return tape.number(number_of(given, single))
@@ -325,6 +333,29 @@ class Writer:
         self._numbers: Counter[str] = Counter()
         self._used: set[str] = set()
 
+    def symbol(self, name: str, of: Sequence[Any], given: int, bits: Sequence[int | None]) -> Any:
+        """An operation on the tape, which has a name there; None if the tape has none."""
+        if name in self.notation.called:
+            return None if of[0] is None else self.notation.called[name](of[0])
+        return again(self.tape, name, of, given, bits, self.notation.single)
+
+    def source(self, name: str, given: int) -> Any:
+        """What a tape has without an operation."""
+        return _leaf(self.tape, name, given, self.notation.single)
+
+    def called(self, symbol: Any) -> str:
+        """The name of a value in the method's text if it is free, which it then no longer is; else ""."""
+        known = "" if symbol is None else self.names.get(symbol.id, "")
+        if not known or known.startswith("−") or known in self._used:
+            return ""
+        self._used.add(known)
+        return known
+
+    def unused(self, letter: str) -> str:
+        """The next name by a letter."""
+        self._numbers[letter] += 1
+        return f"{letter}{self._numbers[letter]}"
+
     def section(
         self,
         when: str,
@@ -334,12 +365,10 @@ class Writer:
         letter: str,
         results: Sequence[str] | None = None,
     ) -> tuple[Section, list[Leaf]]:
-        """A body as a section, with its results, which are named by ``results`` if given, and else by the letter."""
+        """A body as a section, with its results, which are named by ``results`` if given and not "", and else by the letter."""
         operations, places = body
         reads = Counter(place for _, of, _ in operations for place in of)
-        wanted = {
-            place: None if results is None else name for place, name in zip(places, results or [""] * len(places), strict=True)
-        }
+        wanted = {place: name or None for place, name in zip(places, results or [""] * len(places), strict=True)}
         lines: list[Line] = []
         values: list[_Value] = []
 
@@ -349,9 +378,8 @@ class Writer:
                 return given, known if known.lstrip("−").startswith("d") else ""
             if known and not known.startswith("−") and known not in self._used:
                 return known, ""
-            self._numbers[letter] += 1
             note = known if known.startswith("−") else "" if value.symbol is None else self.notes.get(value.symbol.id, "")
-            return f"{letter}{self._numbers[letter]}", note
+            return self.unused(letter), note
 
         def write(place: int) -> None:
             value = values[place]
@@ -362,11 +390,7 @@ class Writer:
 
         def made(name: str, of: list[int], given: int) -> _Value:
             parts = [values[place] for place in of]
-            symbols = [each.symbol for each in parts]
-            if name in self.notation.called:
-                symbol = None if symbols[0] is None else self.notation.called[name](symbols[0])
-            else:
-                symbol = again(self.tape, name, symbols, given, [each.bits for each in parts], self.notation.single)
+            symbol = self.symbol(name, [each.symbol for each in parts], given, [each.bits for each in parts])
             if name.startswith("multiply") or name == "subtract multiply":  # what changes least stands first
                 parts[:2] = sorted(parts[:2], key=lambda each: (each.rank, each.text.holds != PRODUCT))
             elif name == "add" and all(each.text.holds == ATOM for each in parts):  # and here last
@@ -421,7 +445,7 @@ def _traced(tracer: Tracer, plan: Plan, attempts: bool) -> list[Any]:
     if plan.form == "matrix":
         inputs = [each.signal() for each in plan.system.given_inputs().values()]
         n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-        return tracer.matrix(plan.method.nodes, n, inputs)
+        return tracer.matrix(plan.method.nodes, n, inputs, plan.method.carry is not None)
     return tracer.attempt(plan.method) if attempts else tracer.step(plan.method)
 
 

@@ -197,7 +197,7 @@ class Explanation(Value):
             rates = PARTS[self.parts].format(lanes=_members(self.lanes))
             if self.parts == "matrix":
                 return f"A step of about {self.about} operations is not one tape: {rates}."
-            between = "is interpreted" if self.level == "baseline" else f"is machine code for {self.level}"
+            between = "is interpreted" if self.level == "interpret" else f"is machine code for {self.level}"
             return (
                 f"A step of about {self.about} operations is not one tape: {rates}; what the method does between them {between}."
             )

@@ -79,7 +79,7 @@ def energy(system: Any) -> dict[str, Any] | None:
             return {"kind": "falling", "masses": numbers(system.masses), "gravity": down}
         case "springs":
             free = [float(i not in set(np.asarray(system.fixed).tolist())) for i in range(system.n)]
-            pull = {"gravity": np.zeros(system.y_shape[1]) if system.gravity is None else system.gravity}
+            pull = {"gravity": np.zeros(system.y_shape[1]) if system.gravity is None else system.acceleration}
             springs = {"stiffness": _each(system.stiffness, len(system.pairs)), "rest": _each(system.rest, len(system.pairs))}
             return {
                 "kind": "springs",

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import _checks, _single, engine
 from .._checks import Array, Shape
-from ..compatible import fits_together
+from ..compatible import fits_together, forced
 from ..control import AnyControl, ConstraintControl, EnergyControl, a_control
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..method_records import Method
@@ -51,6 +51,7 @@ def export(
     member: int | tuple[int, ...] | None = None,
     start: str | None = None,
     control: AnyControl | None = None,
+    force: Any = None,
     fused: bool = False,
     name: str | None = None,
     dtype: Any = "float64",
@@ -73,6 +74,9 @@ def export(
         member: which trajectory of a batch, by its index, or a tuple of one index for each axis of the batch.
         start: how a method with a choice starts; see ``method(…).starts``.
         control: the control of the energy, as in ``integrate``.
+        force: True for a step with an argument ``force``, which is added to v̇ in every stage and may be another in each step, as
+            that of ``World``; an array of the shape of v is that of the example at the head of the file, and gives its shape
+            in the batch. A method that carries something other than v needs it in its start and finish, too.
         fused: with fused multiply-adds, as ``integrate(fused=True)``. JavaScript has none, Python has them from 3.13 on.
         name: the name of functions and types, or its beginning; from the system and the method if None.
         dtype: ``"float64"`` or ``"float32"``, as ``integrate`` takes it. In float32 numbers are those of C's ``float`` and Rust's
@@ -115,12 +119,18 @@ def export(
         None if block is None else _checks.block(argument, block, shape, system.axes)
         for argument, block, shape in (("v", v, system.v_shape), ("y", y, system.y_shape))
     ]
+    push = _force(force, system)
     shapes = {"system": system.batch, "control": () if control is None else control.batch}
-    for argument, block, shape in (("v", blocks[0], system.v_shape), ("y", blocks[1], system.y_shape)):
+    for argument, block, shape in (
+        ("v", blocks[0], system.v_shape),
+        ("y", blocks[1], system.y_shape),
+        ("force", push, system.v_shape),
+    ):
         if block is not None:
             shapes[argument] = block.shape[len(shape) :]
     if single:
         blocks = [None if each is None else _rounded(name, each) for name, each in zip("vy", blocks, strict=True)]
+        push = None if push is None else _rounded("force", push)
     batch = _checks.batch_shape(shapes)
     index = _member(member, batch)
     if control is not None:
@@ -129,14 +139,23 @@ def export(
         system = system.stepped_by(how)
         if single:
             _single.check_control(system)
-    example = _example(system, blocks, batch, index)
-    plan = engine.Plan(system, how, batch, dt, t0, choice=choice, fused=fused, single=single)
+    push = None if push is None else _wide(push, system.v_shape, batch)
+    stepped = system.over_steps(how, t0, dt)
+    plan = engine.Plan(stepped, how, batch, dt, t0, choice=choice, fused=fused, force=push, single=single)
     traced = Traced(plan, index)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
-    text = writer.file(written, writer.remark(head(written, *example)))
+    text = writer.file(written, writer.remark(head(written, *_example(system, blocks, batch, index))))
     of = "float32" if single else "float64"
     return ExportedStep(text, called, kind.title, kind.endings, system, how, index, fused, traced.count, of)
+
+
+def _force(force: Any, system: System) -> Array | None:
+    """The force of the example, or None without one."""
+    if force is None or force is False:
+        return None
+    forced(system)
+    return _checks.block("force", 0.0 if force is True else force, system.v_shape, system.axes)
 
 
 def _rounded(name: str, block: Array) -> Array:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from .language import Assignment, Language, indented
+from .language import FORCE, Assignment, Language, indented, listed
 from .written import Written
 
 TYPES = {"number": "double", "truth": "int", "bits": "uint64_t", "wide": "double"}
 SINGLE_TYPES = {"number": "float", "truth": "int", "bits": "uint32_t", "wide": "double"}
+
+#: Values of FLT_EVAL_METHOD (C23, TS 18661-3) under which doubles, and floats, are computed in their own precision: 16, 32 and 64
+#: widen what is narrower than _Float16, float and double, and 1 widens floats to double.
+OWN_PRECISION = {"double": (0, 1, 16, 32, 64), "float": (0, 16, 32)}
 
 BEGIN = """
 #include <float.h>
@@ -16,11 +21,39 @@ BEGIN = """
 #include <stdint.h>
 #include <string.h>
 
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math: it computes other numbers"
+// Options that compute other numbers.
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
+#error "compile without -ffast-math, -Ofast and /fp:fast: they compute other numbers"
+#elif defined(__ASSOCIATIVE_MATH__)
+#error "compile without -fassociative-math and -funsafe-math-optimizations: they compute other numbers"
+#elif defined(__RECIPROCAL_MATH__)
+#error "compile without -freciprocal-math: it computes other numbers"
+#elif defined(__NO_SIGNED_ZEROS__)
+#error "compile without -fno-signed-zeros: it computes other numbers"
+#elif defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "compile without -ffinite-math-only: it computes other numbers"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "compile for arithmetic in the precision of its numbers, on x86 with -msse2 -mfpmath=sse"
+#if defined(FLT_EVAL_METHOD) && ALL_OTHERS
+#error "compile with -msse2 -mfpmath=sse: -mfpmath=387 and -mfpmath=both compute a NUMBER in other precision than its own"
+#endif
+typedef char PREFIX_needs_no_fsingle_precision_constant[sizeof 0.1 == sizeof(double) ? 1 : -1];
+
+// No product is fused with a sum, whatever -ffp-contract says.
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+"""
+
+END = """
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__GNUC__)
+#pragma GCC pop_options
 #endif
 """
 
@@ -43,7 +76,7 @@ static inline double PREFIX_turn_sign(double x, double y) {
 
 SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
 static double PREFIX_sample(const double *samples, int count, double start, double interval, double t) {
-    double i = floor((t - start) / interval + 1e-06); // t may miss a sample's time by rounding
+    double i = floor((t - start) / interval * 1.0000000000000568); // t may miss a sample's time by rounding
     if (!(i > 0.0)) i = 0.0;
     if (i > count - 1.0) i = count - 1.0;
     return samples[(int)i];
@@ -83,7 +116,7 @@ class C(Language):
 
     title = "C"
     endings = (".c", ".h")
-    infinity, root, floor, fma = "INFINITY", "sqrt", "floor", "fma"
+    infinity, root, floor, magnitude, fma = "INFINITY", "sqrt", "floor", "fabs", "fma"
     bits_literal = "UINT64_C({})"
     truths = ("0", "1")
     me = "m->"
@@ -93,6 +126,7 @@ class C(Language):
     of_single: ClassVar[dict[str, Any]] = {
         "root": "sqrtf",
         "floor": "floorf",
+        "magnitude": "fabsf",
         "fma": "fmaf",
         "bits_literal": "UINT32_C({})",
         "time": "(float)(m->t0 + (double)s->step * (double)m->dt)",
@@ -112,10 +146,29 @@ class C(Language):
         """A value that gets a name."""
         return f"const {self.types[line.kind]} {line.name} = {line.text};{note}"
 
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+        return f"{self.types['number']} w[{size}];"
+
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+        return f"for (int i = 0; i < {count}; i++) {line}"
+
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+        return listed(f"static const int {self.table_name(name)}[{len(places)}] = {{", list(map(str, places)), "};", "")
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"{self.types[line.kind]} {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
+
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+        number = (
+            f"{self.helper('sample')}({self.prefix}_{of.name}_samples, {len(of.values)}, m->{of.start}, m->{of.interval}, {t})"
+        )
+        return of.time("m->", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
@@ -124,14 +177,17 @@ class C(Language):
 
     def how(self, w: Written) -> list[str]:
         """How to compile and call it."""
-        p, blocks = self.prefix, "".join(f", {of}" for _, of, _ in w.blocks)
+        p, blocks, force = self.prefix, "".join(f", {of}" for of, _ in w.given), ", force" * w.forced("step")
         lines = [
             "Compile a program that includes it, such as the example, with: cc -O2 -ffp-contract=off example.c -lm",
             f"{p}_defaults(&m) sets the parameters; change any of them and call {p}_prepare(&m).",
-            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s) makes one step.",
+            f"{p}_start(&m, &s{blocks}) makes the state at step 0, {p}_step(&m, &s{force}) makes one step.",
         ]
         if w.carries:
-            lines.append(f"{p}_finish(&m, &s, velocities) finds the velocities; in the state {w.slot} stands in their place.")
+            force = ", force" * w.forced("finish")
+            lines.append(
+                f"{p}_finish(&m, &s{force}, velocities) finds the velocities; in the state {w.slot} stands in their place."
+            )
         if w.evaluations:
             lines.append(f"{p}_work(&m, &s) is the energy that the control has given since the start.")
         return lines
@@ -139,6 +195,8 @@ class C(Language):
     def example(self, w: Written, v: list[float], y: list[float], steps: int) -> list[str]:
         """A program that makes some steps and prints a number of the state."""
         p, blocks = self.prefix, [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
+        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
         return [
             "#include <stdio.h>",
             f'#include "{p}.c"',
@@ -148,13 +206,13 @@ class C(Language):
             f"    {p}_state s;",
             *(
                 line
-                for n, a in blocks
+                for n, a in arrays
                 for line in self.listed(f"const {self.types['number']} {n}[{len(a)}] = {{", a, "};", "    ")
             ),
             "",
             f"    {p}_defaults(&m);",
-            f"    {p}_start(&m, &s{''.join(f', {name}' for name, _ in blocks)});",
-            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s);",
+            f"    {p}_start(&m, &s{''.join(f', {name}' for name in start)});",
+            f"    for (int k = 0; k < {steps}; k++) {p}_step(&m, &s{', force' * w.forced('step')});",
             f'    printf("%.17g\\n", s.{w.shown}[0]);',
             "    return 0;",
             "}",
@@ -162,15 +220,29 @@ class C(Language):
 
     def file(self, w: Written, head: list[str]) -> str:
         """The whole text after the comment at the head."""
-        parts = [self._structures(w), *self._tables(w), self._prepare(w), self._defaults(w), self._start(w), self._step(w)]
+        tables = ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] if w.places else []
+        parts = [
+            self._structures(w),
+            *self._tables(w),
+            *tables,
+            self._prepare(w),
+            self._defaults(w),
+            self._start(w),
+            self._step(w),
+        ]
         if w.carries:
             parts.append(self._finish(w))
         if w.evaluations:
             parts.append(self._work(w))
         functions = self.functions("\n".join(parts))
-        return "\n".join(head) + "\n" + BEGIN + "\n" + "\n\n".join([*functions, *parts]) + "\n"
+        return "\n".join(head) + "\n" + self._begin() + "\n" + "\n\n".join([*functions, *parts]) + "\n" + END
 
     # ---- parts of it
+
+    def _begin(self) -> str:
+        number = self.types["number"]
+        others = " && ".join(f"FLT_EVAL_METHOD != {each}" for each in OWN_PRECISION[number])
+        return BEGIN.replace("ALL_OTHERS", others).replace("NUMBER", number).replace("PREFIX", self.prefix)
 
     def _structures(self, w: Written) -> str:
         p = self.prefix
@@ -183,6 +255,9 @@ class C(Language):
         if w.made:
             lines += ["", f"    // Made of these by {p}_prepare."]
             lines += [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.made]
+        lines += ["", f"    // Made of these by {p}_prepare.", f"    {self.types['number']} {w.array}[{w.made_size}];"] * bool(
+            w.made_size
+        )
         lines += [f"}} {p};", "", "// A state.", "typedef struct {"]
         lines += [f"    {self.types['number']} {name}[{n}];" for name, _, n in w.blocks]
         lines += [f"    {self.types['number']} tally; // what the control has added up"] * bool(w.evaluations)
@@ -204,7 +279,9 @@ class C(Language):
         ]
 
     def _prepare(self, w: Written) -> str:
-        lines = [f"{each.name} = {each.text};" for each in w.made] or ["(void)m;"]
+        lines = [f"{each.name} = {each.text};" for each in w.made]
+        lines += [line for each in w.loops for line in self.statement(each)]
+        lines = lines or ["(void)m;"]
         about = "// What does not change from step to step. To be called after a change of a parameter."
         return "\n".join([about, f"void {self.prefix}_prepare({self.prefix} *m) {{", *indented(lines), "}"])
 
@@ -223,7 +300,7 @@ class C(Language):
 
     def _start(self, w: Written) -> str:
         p, start = self.prefix, w.functions.get("start")
-        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for _, of, n in w.blocks)
+        arguments = "".join(f", const {self.types['number']} {of}[{n}]" for of, n in w.given)
         lines = ["s->step = 0;"] + [f"s->tally = {self.literal(0.0)};"] * bool(w.evaluations)
         lines += [f"memcpy(s->{name}, {of}, sizeof s->{name});" for name, of, _ in w.blocks if name != w.slot or not start]
         if start:
@@ -240,13 +317,19 @@ class C(Language):
         p, f = self.prefix, w.functions["step"]
         of = {name: f"s->{name}" for name in (w.slot, "y", "tally")}
         lines = ["(void)m;"] * (not f.needs_fields) + [*self.body(f, of, of), "s->step += 1;"]
-        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s) {{", *indented(lines), "}"])
+        force = self._force(w, "step")
+        return "\n".join(["// One step.", f"void {p}_step(const {p} *m, {p}_state *s{force}) {{", *indented(lines), "}"])
+
+    def _force(self, w: Written, function: str) -> str:
+        """The argument of a function for a force from outside."""
+        return f", const {self.types['number']} {FORCE}[{w.n_v}]" * w.forced(function)
 
     def _finish(self, w: Written) -> str:
         p, f = self.prefix, w.functions["finish"]
         lines = ["(void)m;"] * (not f.needs_fields)
         lines += self.body(f, {name: f"s->{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities.")
-        begin = f"void {p}_finish(const {p} *m, const {p}_state *s, {self.types['number']} velocities[{w.n_v}]) {{"
+        force = self._force(w, "finish")
+        begin = f"void {p}_finish(const {p} *m, const {p}_state *s{force}, {self.types['number']} velocities[{w.n_v}]) {{"
         return "\n".join(["// The velocities at a state.", begin, *indented(lines), "}"])
 
     def _work(self, w: Written) -> str:

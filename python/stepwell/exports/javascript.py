@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..explanation.formula import Formula
-from .language import Assignment, Language, indented
+from .language import FORCE, Assignment, Language, indented, listed
 from .names import camel
 from .written import Written
 
@@ -53,7 +53,7 @@ function turn_sign(x, y) {
 
 SAMPLE = """// The sample that holds at a time: the last that is not after it; before all the first.
 function sample(samples, start, interval, t) {
-  let i = Math.floor((t - start) / interval + 1e-6); // t may miss a sample's time by rounding
+  let i = Math.floor((t - start) / interval * 1.0000000000000568); // t may miss a sample's time by rounding
   if (!(i > 0)) i = 0;
   return samples[Math.min(i, samples.length - 1)];
 }"""
@@ -71,11 +71,12 @@ class JavaScript(Language):
     """A class in an ES module, for browsers and Node; bits by views of a typed array, whole numbers of 64 bits as BigInt."""
 
     title = "JavaScript"
-    array = "Float64Array"
+    array_type = "Float64Array"
     endings = (".js", ".mjs")
-    infinity, root, floor, fma = "Infinity", "Math.sqrt", "Math.floor", None
+    infinity, root, floor, magnitude, fma = "Infinity", "Math.sqrt", "Math.floor", "Math.abs", None
     bits_literal = "{}n"
     me = "this."
+    step_in = "  "
     time = "this.t0 + s.step * this.dt"
     helpers: ClassVar[dict[str, str]] = {
         "number": VIEWS,
@@ -93,7 +94,7 @@ class JavaScript(Language):
         "sample": SAMPLE,
     }
     of_single: ClassVar[dict[str, Any]] = {
-        "array": "Float32Array",
+        "array_type": "Float32Array",
         "bits_literal": "{}",
         "time": "fround(this.t0 + s.step * this.dt)",
         "helpers": {
@@ -127,10 +128,31 @@ class JavaScript(Language):
         """A value that gets a name."""
         return f"const {line.name} = {line.text};{note}"
 
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+        return f"const w = new {self.array_type}({size});"
+
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+        return f"for (let i = 0; i < {count}; i++) {line}"
+
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+        return listed(f"const {self.table_name(name)} = [", list(map(str, places)), "];", "")
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"let {line.name}{' = ' * bool(line.text)}{line.text};{note}"]
+
+    def given(self, text: str) -> str:
+        """A number of an argument in the precision of the file."""
+        return f"fround({text})" if self.single else text
+
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
+        number = f"sample({of.name}_samples, this.{of.start}, this.{of.interval}, {t})"
+        return of.time("this.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
@@ -138,14 +160,16 @@ class JavaScript(Language):
 
     def how(self, w: Written) -> list[str]:
         """How to call it."""
-        p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
+        p, blocks, force = camel(self.prefix), ", ".join(of for of, _ in w.given), ", force" * w.forced("step")
         lines = [
             "A module for browsers and Node.",
             f"const m = new {p}({{ dt: ... }}) sets the parameters that are given; call m.prepare() after a change of one.",
-            f"const s = m.start({blocks}) is the state at step 0, m.step(s) makes one step.",
+            f"const s = m.start({blocks}) is the state at step 0, m.step(s{force}) makes one step.",
         ]
         if w.carries:
-            lines.append(f"m.finish(s) finds the velocities; in the state {w.slot} stands in their place.")
+            lines.append(
+                f"m.finish(s{', force' * w.forced('finish')}) finds the velocities; in the state {w.slot} stands in their place."
+            )
         if w.evaluations:
             lines.append("m.work(s) is the energy that the control has given since the start.")
         return lines
@@ -154,13 +178,15 @@ class JavaScript(Language):
         """A program that makes some steps and prints a number of the state."""
         p = camel(self.prefix)
         blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
+        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
         return [
             f'import {{ {p} }} from "./{self.prefix}.mjs";',
             "",
-            *(line for name, each in blocks for line in self.listed(f"const {name} = [", each, "];")),
+            *(line for name, each in arrays for line in self.listed(f"const {name} = [", each, "];")),
             f"const m = new {p}();",
-            f"const s = m.start({', '.join(name for name, _ in blocks)});",
-            f"for (let k = 0; k < {steps}; k++) m.step(s);",
+            f"const s = m.start({', '.join(start)});",
+            f"for (let k = 0; k < {steps}; k++) m.step(s{', force' * w.forced('step')});",
             f"console.log(s.{w.shown}[0]);",
         ]
 
@@ -175,6 +201,7 @@ class JavaScript(Language):
             "\n".join([f"// The samples of {each.about}.", *self.listed(f"const {each.name}_samples = [", each.values, "];")])
             for each in w.tables
         ]
+        tables += ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] * bool(w.places)
         inside = "\n\n".join("\n".join(indented(each, "  ")) for each in [self._constructor(w), *parts])
         whole = f"export class {camel(self.prefix)} {{\n{inside}\n}}"
         return "\n".join(head) + "\n\n" + "\n\n".join([*self.functions(whole), *tables, whole]) + "\n"
@@ -189,6 +216,7 @@ class JavaScript(Language):
                 lines += self.nested(f"this.{each.name} = ", each.values, each.shape, ";")
             else:
                 lines.append(f"this.{each.name} = {self.value(each)};{about}")
+        lines += [f"this.{w.array} = new {self.array_type}({w.made_size});"] * bool(w.made_size)
         lines += [
             "for (const name of Object.keys(given)) {",
             "  if (!Object.prototype.hasOwnProperty.call(this, name)) throw new RangeError(`there is no parameter ${name}`);",
@@ -202,20 +230,21 @@ class JavaScript(Language):
         rounded = [each.name for each in w.parameters if self.single and not each.wide]
         lines = [f"this.{name} = single(this.{name});" for name in rounded]
         lines += [f"{each.name} = {each.text};" for each in w.made]
+        lines += [line for each in w.loops for line in self.statement(each)]
         about = "// What does not change from step to step. To be called after a change of a parameter."
         return [about, "prepare() {", *indented(lines, "  "), "}"]
 
     def _start(self, w: Written) -> list[str]:
         start = w.functions.get("start")
         lines = []
-        for _, of, n in w.blocks:
+        for of, n in w.given:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines.append(f"if ({of}.length !== {n}) throw new RangeError(`{of}: expected {numbers}, got ${{{of}.length}}`);")
         lines.append("const s = { step: 0 };")
         lines += ["s.tally = 0; // what the control has added up"] * bool(w.evaluations)
         for name, of, n in w.blocks:
             carried = start and name == w.slot
-            lines.append(f"s.{name} = new {self.array}({n});" if carried else f"s.{name} = {self.array}.from({of});")
+            lines.append(f"s.{name} = new {self.array_type}({n});" if carried else f"s.{name} = {self.array_type}.from({of});")
         if start:
             lines += [
                 "",
@@ -223,19 +252,24 @@ class JavaScript(Language):
             ]
         lines += ["return s;"]
         about = "// The state at step 0, of velocities and coordinates."
-        return [about, f"start({', '.join(of for _, of, _ in w.blocks)}) {{", *indented(lines, "  "), "}"]
+        return [about, f"start({', '.join(of for of, _ in w.given)}) {{", *indented(lines, "  "), "}"]
 
     def _step(self, w: Written) -> list[str]:
         of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
         lines = [*self.body(w.functions["step"], of, of), "s.step += 1;"]
-        return ["// One step.", "step(s) {", *indented(lines, "  "), "}"]
+        return ["// One step.", f"step(s{', force' * w.forced('step')}) {{", *indented(lines, "  "), "}"]
 
     def _finish(self, w: Written) -> list[str]:
-        lines = [f"const velocities = new {self.array}({w.n_v});"]
+        lines = [f"const velocities = new {self.array_type}({w.n_v});"]
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )
-        return ["// The velocities at a state.", "finish(s) {", *indented([*lines, "return velocities;"], "  "), "}"]
+        return [
+            "// The velocities at a state.",
+            f"finish(s{', force' * w.forced('finish')}) {{",
+            *indented([*lines, "return velocities;"], "  "),
+            "}",
+        ]
 
     def _work(self, w: Written) -> list[str]:
         about = "// The energy that the control has given since the start."

@@ -17,12 +17,15 @@ from .._checks import Shape
 from ..errors import UnsupportedError
 from ..explanation import formula as plain
 from ..explanation.formula import ATOM, BOTH, CHOICE, COMPARISON, EITHER, NOT, SIGN, SUM, Formula, Notation
-from ..explanation.listing import Leaf, Writer
+from ..explanation.listing import Leaf, Line, Writer
 from .functions import FUNCTIONS, operations_of
 from .names import Field, Names
 
 if TYPE_CHECKING:
     from .written import Table, Written
+
+#: The block of a force from outside, and the argument.
+FORCE = "force"
 
 #: Characters of a line of numbers.
 WIDTH = 100
@@ -33,6 +36,9 @@ ARITHMETIC = ("add", "subtract", "multiply", "divide", "negate")
 #: Operations that become calls of functions on bits.
 BIT_FUNCTIONS = {"and": "and_bits", "or": "or_bits", "exclusive or": "xor_bits", "add bits": "add_bits"}
 BIT_FUNCTIONS |= {"shift up": "shift_up", "shift down": "shift_down"}
+
+#: Values that are named after a rate evaluation: the state at which it is made, and the increments.
+EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
 #: The shift that moves the last bit of a number to its sign, by as many places: it sets the sign of a sine.
 LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), (\d+)\)")
@@ -47,6 +53,7 @@ class Assignment(NamedTuple):
         text: its formula.
         note: its meaning in the method, if the name does not say it.
         evaluation: the rate evaluation to which it belongs, counted from 1; 0 if that is not known.
+        role: "new"; "variable" if it is set again in a branch, without a text if in both; "set" there.
     """
 
     name: str
@@ -54,6 +61,29 @@ class Assignment(NamedTuple):
     text: str
     note: str = ""
     evaluation: int = 0
+    role: str = "new"
+
+
+class Conditional(NamedTuple):
+    """What is computed if something holds, and if not."""
+
+    condition: str
+    then: list[Statement]
+    other: list[Statement]
+
+
+class Loop(NamedTuple):
+    """So many equal operations: what element i of an array is.
+
+    Of the state, ``@y[i]`` is an element before the step, ``#y[i]`` one after it.
+    """
+
+    times: int
+    target: str
+    text: str
+
+
+Statement = Assignment | Conditional | Loop
 
 
 class Place(NamedTuple):
@@ -74,14 +104,16 @@ class Function(NamedTuple):
         of_time: the values that depend on the time alone.
         lines: the values that depend on the state.
         writes: the numbers that it writes.
+        work: the length of the array in which loops compute; 0 without loops.
     """
 
     reads: list[Place]
     needs_time: bool
     needs_fields: bool
     of_time: list[Assignment]
-    lines: list[Assignment]
+    lines: list[Statement]
     writes: list[Place]
+    work: int = 0
 
 
 class Language(Notation, ABC):
@@ -106,6 +138,7 @@ class Language(Notation, ABC):
     infinity: ClassVar[str]
     root: ClassVar[str]
     floor: ClassVar[str]
+    magnitude: ClassVar[str]
     fma: ClassVar[str | None]
     types: ClassVar[dict[str, str]] = {}
     of_single: ClassVar[dict[str, Any]]
@@ -117,6 +150,8 @@ class Language(Notation, ABC):
     #: The expression for the time of the present step.
     time: ClassVar[str]
     tables: list[Table]
+    #: By how much what is within something is indented.
+    step_in: ClassVar[str] = "    "
     longest = 88
     called = FUNCTIONS
 
@@ -192,6 +227,8 @@ class Language(Notation, ABC):
         match name:
             case "copy":
                 return numbers[0]
+            case "same":
+                return of[0]
             case "less" | "at most" | "equal":
                 sign = {"less": "<", "at most": "<=", "equal": "=="}[name]
                 a, b = numbers
@@ -203,7 +240,7 @@ class Language(Notation, ABC):
             case "divide":
                 return self.quotient(numbers[0], numbers[1], bits[1])
             case "sample":
-                return Formula(self.sample(given, numbers[0].text))
+                return Formula(self.sample(given, numbers[0].text), SUM if self.tables[given].times else ATOM)
             case "multiply add" | "multiply subtract" | "subtract multiply":
                 made = plain.formula(name, numbers, given, bits)
                 return Formula(f"{self.fma}{made.text.removeprefix('fma')}")
@@ -223,6 +260,11 @@ class Language(Notation, ABC):
         if not truth.is_truth:
             mask, a, b = (self.as_bits(each, known) for each, known in zip(of, bits, strict=True))
             return Formula(self.call("choose_bits", mask.text, a.text, b.text), is_bits=True)
+        if a.is_truth != b.is_truth:  # one may be a truth that is known
+            a, b = (
+                Formula(self.truths[known == self.all_bits], is_truth=True) if known in (0, self.all_bits) else each
+                for each, known in zip((a, b), bits[1:], strict=True)
+            )
         if a.is_bits or b.is_bits or a.is_truth != b.is_truth:
             a, b = (self.as_bits(each, known) for each, known in zip((a, b), bits[1:], strict=True))
         return Formula(self.choice(truth, a, b), CHOICE, a.is_truth, a.is_bits)
@@ -239,6 +281,10 @@ class Language(Notation, ABC):
             for x, turning in (of, of[::-1]):
                 if (last := LAST_BIT.fullmatch(turning.text)) and int(last[2]) == self.sign_place and not x.is_truth:
                     return Formula(self.call("turn_sign", self.as_number(x).text, last[1]))
+        if name == "and":
+            for value, known in zip(of, reversed(bits), strict=True):
+                if known == self.all_bits >> 1 and not (value.is_bits or value.is_truth):
+                    return Formula(f"{self.magnitude}({value.text})")
         operands = [self.as_bits(each, known).text for each, known in zip(of, bits, strict=True)]
         more = [str(given)] if name.startswith("shift") else []
         return Formula(self.call(BIT_FUNCTIONS[name], *operands, *more), is_bits=True)
@@ -259,6 +305,19 @@ class Language(Notation, ABC):
         return Formula(f"{a.within(SIGN)} != {b.within(SIGN)}", COMPARISON, True)
 
     # ---- texts
+
+    def assignment(self, line: Line, role: str = "new") -> Assignment:
+        """A line of a section."""
+        word = self.me + self.fields(line.name, f"made {line.name}") if self.before else self.names(line.name)
+        evaluation = EVALUATION.match(line.note or line.name)
+        return Assignment(
+            word,
+            self.kinds.get(word, "number"),
+            self.text(line.formula),
+            line.note.replace("−", "-"),
+            int(evaluation[1]) if evaluation else 0,
+            role,
+        )
 
     def text(self, formula: str) -> str:
         """A formula with the language's signs."""
@@ -330,24 +389,79 @@ class Language(Notation, ABC):
         def place(block: str, index: int, of: Mapping[str, str]) -> str:
             return of[block] if index < 0 else f"{of[block]}[{index}]"
 
-        groups = [
-            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads]),
+        groups: list[tuple[str, Sequence[Statement]]] = [
+            ("The state.", [Assignment(p.name, "number", place(p.block, p.at, read)) for p in f.reads if p.block != FORCE]),
+            ("The force.", [Assignment(p.name, "number", self.given(f"{FORCE}[{p.at}]")) for p in f.reads if p.block == FORCE]),
             ("What depends on the time alone.", f.of_time),
             ("What depends on the state.", f.lines),
         ]
         out = [self.declare(Assignment("t", "number", self.time), "")] if f.needs_time else []
+        out += [self.array(f.work)] * bool(f.work)
         for title, lines in groups:
             if lines:
                 out += ["", f"{self.comment} {title}"]
             evaluation = 1
             for each in lines:
-                if each.evaluation > evaluation:
+                if isinstance(each, Assignment) and each.evaluation > evaluation:
                     evaluation = each.evaluation
                     out += ["", f"{self.comment} Evaluation {evaluation} of the rates."]
-                out.append(self.declare(each, f" {self.comment} {each.note}" if each.note else ""))
+                out += [self._placed(line, read, write) for line in self.statement(each)]
+        if f.work:
+            return out
         out += ["", f"{self.comment} {after}"]
         out += [f"{place(p.block, p.at, write)} = {p.name}{self.end}" for p in f.writes]
         return out if out[0] else out[1:]
+
+    def given(self, text: str) -> str:
+        """A number of an argument in the precision of the file."""
+        return text
+
+    def _placed(self, line: str, read: Mapping[str, str], write: Mapping[str, str]) -> str:
+        """A line with the names of the blocks that are read and written."""
+        line = re.sub(rf"@{FORCE}(\[.*?\]+)", lambda found: self.given(FORCE + found[1]), line)
+        line = re.sub(r"@(\w+)", lambda found: read[found[1]], line)
+        return re.sub(r"#(\w+)(?=[\[ ])", lambda found: write.get(found[1], found[0]), line)
+
+    @abstractmethod
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+
+    @abstractmethod
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+
+    @abstractmethod
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+
+    def table_name(self, name: str) -> str:
+        """The name of such a table."""
+        return self.helper(name)
+
+    def statement(self, each: Statement) -> list[str]:
+        """Lines of what is computed."""
+        if isinstance(each, Loop):
+            line = f"{each.target} = {each.text}{self.end}"
+            return [line if each.times == 1 else self.loop(each.times, line)]
+        if isinstance(each, Conditional):
+            then = [line for inner in each.then for line in self.statement(inner)]
+            other = [line for inner in each.other for line in self.statement(inner)]
+            if then:
+                return self.conditional(each.condition, then, other)
+            return self.conditional(f"{self.words[0]}{each.condition}", other, [])
+        note = f" {self.comment} {each.note}" if each.note else ""
+        if each.role == "new":
+            return [self.declare(each, note)]
+        return self.variable(each, note) if each.role == "variable" else [f"{each.name} = {each.text}{self.end}"]
+
+    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
+        """What is computed if something holds, and if not."""
+        behind = ["} else {", *indented(other, self.step_in)] if other else []
+        return [f"if ({condition}) {{", *indented(then, self.step_in), *behind, "}"]
+
+    @abstractmethod
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
 
     @abstractmethod
     def declare(self, line: Assignment, note: str) -> str:
@@ -368,6 +482,19 @@ class Language(Notation, ABC):
     @abstractmethod
     def file(self, w: Written, head: list[str]) -> str:
         """The whole text after the comment at the head."""
+
+
+def texts(statements: Iterable[Statement]) -> list[str]:
+    """All formulas of these."""
+    found: list[str] = []
+    for each in statements:
+        if isinstance(each, Conditional):
+            found += [each.condition, *texts(each.then), *texts(each.other)]
+        elif isinstance(each, Loop):
+            found += [each.target, each.text]
+        else:
+            found.append(each.text)
+    return found
 
 
 def indented(lines: Iterable[str], by: str = "    ") -> list[str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..explanation import formula as plain
 from ..explanation.formula import CHOICE, EITHER, Formula
-from .language import Assignment, Language, indented, listed
+from .language import FORCE, Assignment, Language, indented, listed
 from .names import camel
 from .written import Written
 
@@ -49,7 +50,7 @@ TURN_SIGN = '''def turn_sign(x, y):
 
 SAMPLE = '''def sample(samples, start, interval, t):
     """The sample that holds at a time: the last that is not after it; before all the first."""
-    i = floor((t - start) / interval + 1e-06)  # t may miss a sample's time by rounding
+    i = floor((t - start) / interval * 1.0000000000000568)  # t may miss a sample's time by rounding
     return samples[int(min(i, len(samples) - 1.0)) if i > 0.0 else 0]'''
 
 ALL_BITS = "0xFFFFFFFFFFFFFFFF"
@@ -82,7 +83,7 @@ class Python(Language):
     title = "Python"
     endings = (".py",)
     comment = "#"
-    infinity, root, floor, fma = "math.inf", "square_root", "floor", "fused"
+    infinity, root, floor, magnitude, fma = "math.inf", "square_root", "floor", "abs", "fused"
     bits_literal = "{}"
     truths = ("False", "True")
     words = ("not ", "and", "or")
@@ -136,10 +137,36 @@ class Python(Language):
         """A value that gets a name."""
         return f"{line.name} = {line.text}{' ' if note else ''}{note}"
 
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+        return f"w = [{self.literal(0.0)}] * {size}"
+
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+        return f"for i in range({count}): {line}"
+
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+        return listed(f"{self.table_name(name)} = [", list(map(str, places)), "]", "")
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [self.declare(line, note)] * bool(line.text)
+
+    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
+        """What is computed if something holds, and if not."""
+        behind = ["else:", *indented(other)] if other else []
+        return [f"if {condition}:", *indented(then), *behind]
+
+    def given(self, text: str) -> str:
+        """A number of an argument in the precision of the file."""
+        return f"float32({text})" if self.single else text
+
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
+        number = f"sample({of.name}_samples, self.{of.start}, self.{of.interval}, {t})"
+        return of.time("self.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
@@ -147,7 +174,7 @@ class Python(Language):
 
     def how(self, w: Written) -> list[str]:
         """How to call it."""
-        p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
+        p, blocks, force = camel(self.prefix), ", ".join(of for of, _ in w.given), ", force" * w.forced("step")
         needs = (
             "Needs Python 3.13, which has a fused multiply-add." if w.traced.plan.fused else "Needs only the standard library."
         )
@@ -155,10 +182,12 @@ class Python(Language):
         lines = [
             needs,
             f"m = {p}(dt=...) sets the parameters that are given; call m.prepare() after a change of one.",
-            f"s = m.start({blocks}) is the state at step 0, m.step(s) makes one step.",
+            f"s = m.start({blocks}) is the state at step 0, m.step(s{force}) makes one step.",
         ]
         if w.carries:
-            lines.append(f"m.finish(s) finds the velocities; in the state {w.slot} stands in their place.")
+            lines.append(
+                f"m.finish(s{', force' * w.forced('finish')}) finds the velocities; in the state {w.slot} stands in their place."
+            )
         if w.evaluations:
             lines.append("m.work(s) is the energy that the control has given since the start.")
         return lines
@@ -167,14 +196,16 @@ class Python(Language):
         """A program that makes some steps and prints a number of the state."""
         p = camel(self.prefix)
         blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
+        start = [name for name, _ in blocks] + [FORCE] * w.forced("start")
         return [
             f"from {self.prefix} import {p}",
             "",
-            *(line for name, each in blocks for line in listed(f"{name} = [", list(map(repr, each)), "]", "")),
+            *(line for name, each in arrays for line in listed(f"{name} = [", list(map(repr, each)), "]", "")),
             f"m = {p}()",
-            f"s = m.start({', '.join(name for name, _ in blocks)})",
+            f"s = m.start({', '.join(start)})",
             f"for _ in range({steps}):",
-            "    m.step(s)",
+            f"    m.step(s{', force' * w.forced('step')})",
             f"print(s.{w.shown}[0])",
         ]
 
@@ -190,6 +221,7 @@ class Python(Language):
             "\n".join([f"# The samples of {each.about}.", *self.listed(f"{each.name}_samples = [", each.values, "]")])
             for each in w.tables
         ]
+        tables += ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] * bool(w.places)
         step = f'class {p}:\n    """What a step is described by, and the step."""\n\n'
         step += "\n\n".join("\n".join(indented(each)) for each in parts)
         state = [f"class {p}State:", '    """A state."""', "", *indented(self._state(w))]
@@ -216,6 +248,7 @@ class Python(Language):
                 lines += self.nested(f"self.{each.name} = ", each.values, each.shape, "")
             else:
                 lines.append(f"self.{each.name} = {self.value(each)}{about}")
+        lines += [f"self.{w.array} = [{self.literal(0.0)}] * {w.made_size}"] * bool(w.made_size)
         lines += [
             "for name, value in given.items():",
             "    if name not in vars(self):",
@@ -228,13 +261,16 @@ class Python(Language):
     def _prepare(self, w: Written) -> list[str]:
         lines = ['"""What does not change from step to step. To be called after a change of a parameter."""']
         rounded = [each.name for each in w.parameters if self.single and not each.wide]
+        loops = [line for each in w.loops for line in self.statement(each)]
         lines += [f"self.{name} = single(self.{name})" for name in rounded]
-        return self.decorated(["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made)])])
+        return self.decorated(
+            ["def prepare(self):", *indented([*lines, *(f"{each.name} = {each.text}" for each in w.made), *loops])]
+        )
 
     def _start(self, w: Written) -> list[str]:
         start = w.functions.get("start")
         lines = ['"""The state at step 0, of velocities and coordinates."""']
-        for _, of, n in w.blocks:
+        for of, n in w.given:
             numbers = f"{n} number{'s' * (n > 1)}"
             lines += [f"if len({of}) != {n}:", f'    raise ValueError(f"{of}: expected {numbers}, got {{len({of})}}")']
             lines.append(f"{of} = [{'float32' if self.single else 'float'}(each) for each in {of}]")
@@ -245,19 +281,19 @@ class Python(Language):
                 "",
                 *self.body(start, {"v": "velocities", "y": "coordinates"}, {w.slot: f"s.{w.slot}"}, "The carry, in place of v."),
             ]
-        return self.decorated([f"def start(self, {', '.join(of for _, of, _ in w.blocks)}):", *indented([*lines, "return s"])])
+        return self.decorated([f"def start(self, {', '.join(of for of, _ in w.given)}):", *indented([*lines, "return s"])])
 
     def _step(self, w: Written) -> list[str]:
         of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
         lines = ['"""One step."""', *self.body(w.functions["step"], of, of), "s.step += 1"]
-        return self.decorated(["def step(self, s):", *indented(lines)])
+        return self.decorated([f"def step(self, s{', force' * w.forced('step')}):", *indented(lines)])
 
     def _finish(self, w: Written) -> list[str]:
         lines = ['"""The velocities at a state."""', f"velocities = [{self.literal(0.0)}] * {w.n_v}"]
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )
-        return self.decorated(["def finish(self, s):", *indented([*lines, "return velocities"])])
+        return self.decorated([f"def finish(self, s{', force' * w.forced('finish')}):", *indented([*lines, "return velocities"])])
 
     def _work(self, w: Written) -> list[str]:
         about = '    """The energy that the control has given since the start."""'

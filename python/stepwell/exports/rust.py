@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from .._checks import Shape
-from .language import Assignment, Language, indented
+from .language import FORCE, Assignment, Language, indented, listed
 from .names import camel
 from .written import Written
 
@@ -20,7 +21,7 @@ fn turn_sign(x: f64, y: f64) -> f64 {
 
 SAMPLE = """/// The sample that holds at a time: the last that is not after it; before all the first.
 fn sample(samples: &[f64], start: f64, interval: f64, t: f64) -> f64 {
-    let i = ((t - start) / interval + 1e-06).floor(); // t may miss a sample's time by rounding
+    let i = ((t - start) / interval * 1.0000000000000568).floor(); // t may miss a sample's time by rounding
     let last = samples.len() - 1;
     if i > 0.0 { samples[(i as usize).min(last)] } else { samples[0] }
 }"""
@@ -57,7 +58,7 @@ class Rust(Language):
 
     title = "Rust"
     endings = (".rs",)
-    infinity, root, floor, fma = "f64::INFINITY", "f64::sqrt", "f64::floor", "f64::mul_add"
+    infinity, root, floor, magnitude, fma = "f64::INFINITY", "f64::sqrt", "f64::floor", "f64::abs", "f64::mul_add"
     bits_literal = "{}u64"
     me = "self."
     time = "self.t0 + s.step as f64 * self.dt"
@@ -67,6 +68,7 @@ class Rust(Language):
         "infinity": "f32::INFINITY",
         "root": "f32::sqrt",
         "floor": "f32::floor",
+        "magnitude": "f32::abs",
         "fma": "f32::mul_add",
         "bits_literal": "{}u32",
         "time": "(self.t0 + s.step as f64 * self.dt as f64) as f32",
@@ -82,10 +84,35 @@ class Rust(Language):
         """One of two values."""
         return f"if {truth.text} {{ {a.text} }} else {{ {b.text} }}"  # type: ignore[attr-defined]
 
+    def array(self, size: int) -> str:
+        """The array in which loops compute."""
+        return f"let mut w = [0.0; {size}];"
+
+    def loop(self, count: int, line: str) -> str:
+        """A line for each i from 0 on."""
+        return f"for i in 0..{count} {{ {line} }}"
+
+    def table_name(self, name: str) -> str:
+        """The name of such a table."""
+        return name.upper()
+
+    def table(self, name: str, places: Sequence[int]) -> list[str]:
+        """A table of places in arrays."""
+        return listed(f"static {self.table_name(name)}: [usize; {len(places)}] = [", list(map(str, places)), "];", "")
+
+    def variable(self, line: Assignment, note: str) -> list[str]:
+        """A value that is set again in a branch; with no text if it is set in both."""
+        return [f"let mut {line.name} = {line.text};{note}" if line.text else f"let {line.name};{note}"]
+
+    def conditional(self, condition: str, then: list[str], other: list[str]) -> list[str]:
+        """What is computed if something holds, and if not."""
+        return [f"if {condition} {{", *super().conditional(condition, then, other)[1:]]
+
     def sample(self, table: int, t: str) -> str:
         """The sample of a table that holds at a time."""
         of = self.tables[table]
-        return f"sample(&{of.name.upper()}_SAMPLES, self.{of.start}, self.{of.interval}, {t})"
+        number = f"sample(&{of.name.upper()}_SAMPLES, self.{of.start}, self.{of.interval}, {t})"
+        return of.time("self.", number)
 
     def function(self, name: str, lines: list[str]) -> str:
         """A function of one number x."""
@@ -95,14 +122,16 @@ class Rust(Language):
 
     def how(self, w: Written) -> list[str]:
         """How to call it."""
-        p, blocks = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks)
+        p, blocks, force = camel(self.prefix), ", ".join(of for _, of, _ in w.blocks), ", &force" * w.forced("step")
+        blocks += ", &force" * w.forced("start")
         lines = [
             "Needs no other crate.",
             f"let mut m = {p}::new() sets the parameters; change any of them and call m.prepare().",
-            f"let mut s = m.start({blocks}) is the state at step 0, m.step(&mut s) makes one step.",
+            f"let mut s = m.start({blocks}) is the state at step 0, m.step(&mut s{force}) makes one step.",
         ]
         if w.carries:
-            lines.append(f"m.finish(&s) finds the velocities; in the state {w.slot} stands in their place.")
+            force = ", &force" * w.forced("finish")
+            lines.append(f"m.finish(&s{force}) finds the velocities; in the state {w.slot} stands in their place.")
         if w.evaluations:
             lines.append("m.work(&s) is the energy that the control has given since the start.")
         return lines
@@ -111,16 +140,18 @@ class Rust(Language):
         """A program that makes some steps and prints a number of the state."""
         p = camel(self.prefix)
         blocks = [(name, each) for name, each in (("v", v), ("y", y)) if each]
+        arrays = [*blocks, (FORCE, w.traced.force)] if w.traced.force else blocks
+        start = [name for name, _ in blocks] + [f"&{FORCE}"] * w.forced("start")
         return [
             f"mod {self.prefix};",
             f"use {self.prefix}::{p};",
             "",
             "fn main() {",
-            *(line for name, each in blocks for line in self.listed(f"let {name} = [", each, "];", "    ")),
+            *(line for name, each in arrays for line in self.listed(f"let {name} = [", each, "];", "    ")),
             f"    let m = {p}::new();",
-            f"    let mut s = m.start({', '.join(name for name, _ in blocks)});",
+            f"    let mut s = m.start({', '.join(start)});",
             f"    for _ in 0..{steps} {{",
-            "        m.step(&mut s);",
+            f"        m.step(&mut s{', &force' * w.forced('step')});",
             "    }",
             f'    println!("{{:?}}", s.{w.shown}[0]);',
             "}",
@@ -139,6 +170,7 @@ class Rust(Language):
         for each in w.tables:
             begin = f"static {each.name.upper()}_SAMPLES: [{self.types['number']}; {len(each.values)}] = ["
             tables.append("\n".join([f"/// The samples of {each.about}.", *self.listed(begin, each.values, "];")]))
+        tables += ["\n".join(line for name, places in w.places.items() for line in self.table(name, places))] * bool(w.places)
         allowed = "#[allow(clippy::all, dead_code)]\n"
         default = f"impl Default for {p} {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}"
         parts = [*tables, self._structures(w), f"{allowed}impl {p} {{\n{inside}\n}}", default]
@@ -160,6 +192,9 @@ class Rust(Language):
         if w.made:
             lines += ["", "    // Made of these by `prepare`."]
             lines += [f"    {each.name.removeprefix(self.me)}: {self.types[each.kind]}," for each in w.made]
+        lines += ["", "    // Made of these by `prepare`.", f"    {w.array}: [{self.types['number']}; {w.made_size}],"] * bool(
+            w.made_size
+        )
         lines += ["}", "", "/// A state.", "#[allow(dead_code)]", "#[derive(Clone, Debug)]", f"pub struct {p}State {{"]
         of = self.types["number"]
         lines += [f"    pub {name}: [{of}; {n}]," for name, _, n in w.blocks]
@@ -175,18 +210,20 @@ class Rust(Language):
                 lines.append(f"{each.name}: {self.value(each)},")
         zero = {"number": "0.0", "truth": "false", "bits": "0"}
         lines += [f"{each.name.removeprefix(self.me)}: {zero[each.kind]}," for each in w.made]
+        lines += [f"{w.array}: [0.0; {w.made_size}],"] * bool(w.made_size)
         inside = ["let mut m = Self {", *indented(lines), "};", "m.prepare();", "m"]
         return ["/// With the parameters with which it was exported.", "pub fn new() -> Self {", *indented(inside), "}"]
 
     def _prepare(self, w: Written) -> list[str]:
         lines = [f"{each.name} = {each.text};" for each in w.made]
+        lines += [line for each in w.loops for line in self.statement(each)]
         about = "/// What does not change from step to step. To be called after a change of a parameter."
         return [about, "pub fn prepare(&mut self) {", *indented(lines), "}"]
 
     def _start(self, w: Written) -> list[str]:
         p, start = camel(self.prefix), w.functions.get("start")
         number = self.types["number"]
-        arguments = "".join(f", {of}: [{number}; {n}]" for _, of, n in w.blocks)
+        arguments = "".join(f", {of}: [{number}; {n}]" for _, of, n in w.blocks) + self._force(w, "start")
         given = [f"{name}: [0.0; {n}]" if start and name == w.slot else f"{name}: {of}" for name, of, n in w.blocks]
         given += ["tally: 0.0"] * bool(w.evaluations) + ["step: 0"]
         state = f"{p}State {{ {', '.join(given)} }}"
@@ -205,14 +242,20 @@ class Rust(Language):
     def _step(self, w: Written) -> list[str]:
         of = {name: f"s.{name}" for name in (w.slot, "y", "tally")}
         lines = [*self.body(w.functions["step"], of, of), "s.step += 1;"]
-        return ["/// One step.", f"pub fn step(&self, s: &mut {camel(self.prefix)}State) {{", *indented(lines), "}"]
+        begin = f"pub fn step(&self, s: &mut {camel(self.prefix)}State{self._force(w, 'step')}) {{"
+        return ["/// One step.", begin, *indented(lines), "}"]
+
+    def _force(self, w: Written, function: str) -> str:
+        """The argument of a function for a force from outside."""
+        return f", {FORCE}: &[{self.types['number']}; {w.n_v}]" * w.forced(function)
 
     def _finish(self, w: Written) -> list[str]:
         lines = [f"let mut velocities = [0.0; {w.n_v}];"]
         lines += self.body(
             w.functions["finish"], {name: f"s.{name}" for name in (w.slot, "y")}, {"v": "velocities"}, "The velocities."
         )
-        begin = f"pub fn finish(&self, s: &{camel(self.prefix)}State) -> [{self.types['number']}; {w.n_v}] {{"
+        force = self._force(w, "finish")
+        begin = f"pub fn finish(&self, s: &{camel(self.prefix)}State{force}) -> [{self.types['number']}; {w.n_v}] {{"
         return ["/// The velocities at a state.", begin, *indented([*lines, "velocities"]), "}"]
 
     def _work(self, w: Written) -> list[str]:

@@ -19,6 +19,9 @@ from .functions import named
 #: The most operations that are written out one by one; a longer text is too long for compilers and for people.
 MAX_OPERATIONS = 20_000
 
+#: The most that are written as loops: a few arrays of some megabytes.
+MAX_IN_LOOPS = 400_000
+
 #: How often a value changes: never, once a run, once a step by the time alone, with the state.
 NEVER, RUN, STEP, STATE = range(4)
 
@@ -56,12 +59,15 @@ class Table(NamedTuple):
 class Operations:
     """Operations of several functions in one list, each once.
 
+    From some parameter on they are the force, which may change with every step.
+
     Attributes:
         all: name, operands and other arguments of each; operands come before the operations that use them.
         rank: how often the value of each changes.
     """
 
     def __init__(self) -> None:
+        self.first_of_force: int | None = None
         self.all: list[tuple[str, tuple[int, ...], int]] = []
         self.rank: list[int] = []
         self._places: dict[tuple[str, tuple[int, ...], int], int] = {}
@@ -70,11 +76,21 @@ class Operations:
         """Add operations; returns the numbers of the roots here."""
         place: list[int] = []
         for name, of, given in operations:
+            if name == "parameter" and self.first_of_force is not None and given >= self.first_of_force:
+                name = "force"
             key = name, tuple(place[each] for each in of), given
             if key not in self._places:
                 self._places[key] = len(self.all)
                 self.all.append(key)
-                own = {"constant": NEVER, "step": RUN, "parameter": RUN, "sample": STEP, "time": STEP, "state": STATE}
+                own = {
+                    "constant": NEVER,
+                    "step": RUN,
+                    "parameter": RUN,
+                    "sample": STEP,
+                    "time": STEP,
+                    "state": STATE,
+                    "force": STATE,
+                }
                 self.rank.append(max([own.get(name, NEVER), *(self.rank[each] for each in key[1])]))
             place.append(self._places[key])
         return [place[each] for each in roots]
@@ -128,6 +144,7 @@ class Traced:
         parts: its functions, by name: "step", and "start" and "finish" for a method that carries something other than v.
         numbers: name and value of each parameter, in the tape's order.
         tables: the sampled inputs.
+        force: the numbers of a force from outside; none without one.
         count: the number of arithmetic operations of a step, including those before the steps.
     """
 
@@ -136,29 +153,31 @@ class Traced:
         model = engine.model(plan)
         _core.check(model)
         parts = _core.in_parts(engine.model(plan._replace(fused=False)), 1)
-        if parts is not None and parts[1] > 4 * MAX_OPERATIONS:  # an estimate, too high for short methods
+        if parts is not None and parts[1] > 4 * MAX_IN_LOOPS:  # an estimate, too high for short methods
             raise too_long(plan, f"about {parts[1]}")
+        names, tables = parameters(plan)
         self.operations = Operations()
+        self.operations.first_of_force = None if plan.force is None else len(names)
         self.parts: dict[str, Part] = {}
         for which in ("step", "start", "finish") if plan.method.carry else ("step",):
             self.parts[which], tracer = self._part(which)
             if which == "step":
                 of_step = tracer
         self.count = sum(bool(of) for _, of, _ in self.operations.all)
-        if self.count > MAX_OPERATIONS:
+        if self.count > MAX_IN_LOOPS:
             raise too_long(plan, str(self.count))
         if not plan.fused:  # else their products would be fused with the sums around them
             named(self.operations.all, plan.single)
-        names, tables = parameters(plan)
 
         def own(values: Any, before: int = 0) -> Any:
             values = np.asarray(values)
             wide = aligned(values, before, plan.batch)
             return np.broadcast_to(wide, (*values.shape[:before], *plan.batch))[(slice(None),) * before + member]
 
-        self.numbers = [(name, float(own(value))) for name, value in zip(names, of_step.numbers, strict=True)]
-        if plan.single:
-            self.numbers = [(name, float(np.float32(value))) for name, value in self.numbers]
+        kind = np.float32 if plan.single else np.float64
+        numbers = [float(kind(own(value))) for value in of_step.numbers]
+        self.numbers = list(zip(names, numbers, strict=False))
+        self.force = numbers[len(names) :]
         held: list[Held] = of_step.tables
         self.tables = [
             Table(name, [float(each) for each in own(table.values, 1)], float(table.interval), float(table.start))
@@ -167,7 +186,7 @@ class Traced:
 
     def _part(self, which: str) -> tuple[Part, Named]:
         plan, tape = self.plan, _core.Tape(single=self.plan.single)
-        tracer = Named(plan.system, tape)
+        tracer = Named(plan.system, tape, plan.force)
         method, v_shape = plan.method, plan.system.v_shape
         symbols = (
             tracer.step(method, plan.choice) if which == "step" else tracer.slot(method, which, plan.choice)[: prod(v_shape)]
@@ -201,9 +220,9 @@ def _fused(tape: Any, symbols: list[Any]) -> Any:
     return fused.operations(roots)
 
 
-def too_long(plan: engine.Plan, count: str) -> UnsupportedError:
+def too_long(plan: engine.Plan, count: str, most: int = MAX_IN_LOOPS) -> UnsupportedError:
     """The error for a step that is not written out."""
     return UnsupportedError(
         f"system: a step of {_checks.short(plan.system)} by {plan.method.name} has {count} operations, and at most "
-        f"{MAX_OPERATIONS} are written out; export a smaller system"
+        f"{most} are written{' out one by one' * (most < MAX_IN_LOOPS)}; export a smaller system"
     )

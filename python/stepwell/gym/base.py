@@ -68,6 +68,9 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         if render_mode is not None:
             raise ArgumentError(f"render_mode: expected None, for there are no pictures, got {_checks.short(render_mode)}")
         self.num_envs = _checks.count("num_envs", num_envs, 1)
+        # Bounds of the observations, states, forces, draws, rewards, and the results of a step.
+        seen = int(np.prod(self.one_observation.shape or (1,)))
+        _checks.fits("num_envs: states and observations", 8 * seen + 16, (self.num_envs,), "take fewer")
         self.substeps = _checks.count("substeps", substeps, 1)
         self.max_episode_steps = None if max_episode_steps is None else _checks.count("max_episode_steps", max_episode_steps, 1)
         self.render_mode = render_mode
@@ -117,7 +120,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         """Begin anew; see Gymnasium. ``options={"reset_mask": mask}`` does so for some of them only."""
         super().reset(seed=seed)
         mask = (options or {}).get("reset_mask")
-        which = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask)
+        which = np.ones(self.num_envs, dtype=np.bool_) if mask is None else _checks.as_array("reset_mask", mask)
         if which.shape != (self.num_envs,) or which.dtype != np.bool_:
             raise ShapeError(f"reset_mask: expected {self.num_envs} booleans, got {which.dtype} of shape {which.shape}")
         self._begin(which)
@@ -128,7 +131,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         """Act, and make ``substeps`` steps; see Gymnasium."""
         if not self._begun:
             raise ArgumentError("step: expected after reset(), which draws the states to begin with")
-        actions = np.asarray(actions)
+        actions = _checks.as_array("actions", actions)
         if actions.shape != self.action_space.shape or actions.dtype.kind not in "biuf":
             raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
         before = self.rewards_before(actions)
@@ -187,5 +190,5 @@ class WorldEnv(gymnasium.Env):  # type: ignore[misc]
     def step(self, action: Any) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
         """Act; see Gymnasium. After the end of an episode it goes on until ``reset``."""
         self.many._over[:] = False
-        observations, rewards, terminated, truncated, told = self.many.step(np.asarray(action)[np.newaxis])
+        observations, rewards, terminated, truncated, told = self.many.step(_checks.as_array("action", action)[np.newaxis])
         return observations[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), told

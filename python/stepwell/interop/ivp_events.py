@@ -12,8 +12,11 @@ from .._checks import Array
 from ..errors import DTypeError
 from .ivp_function import takes
 
-#: A zero is located to so much, relative to its time, and absolutely where the time is about zero: four roundings.
+#: A zero is located to four roundings of its time, or of the time since the start of its step, whichever are more.
 ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
+
+#: Shorter brackets have no roundings of their own.
+LEAST = float(np.finfo(float).tiny)
 
 #: The most values of an event function for one zero; bisection alone needs fewer than this many for any interval of floats.
 MAX_VALUES = 2200
@@ -47,7 +50,7 @@ class Event:
 
     def value(self, t: float, y: Array) -> float:
         """The value of the function."""
-        made = np.asarray(self._function(t, y, *self._args))
+        made = _checks.as_array("events", self._function(t, y, *self._args))
         if made.size != 1 or made.dtype.kind not in "biuf":
             raise DTypeError(f"events: expected a function that returns one real number, got {_checks.short(made)}")
         return float(made.reshape(-1)[0])
@@ -61,8 +64,10 @@ class Event:
 def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float) -> float:
     """A zero of g between a and b, at which it has values of different signs or zero (Brent 1973).
 
-    The zero is bracketed to ``ROOT_TOLERANCE``. If g is continuous, the end of the bracket with the smaller value is returned.
+    The zero is bracketed to ``ROOT_TOLERANCE``; the step begins at a. If g is continuous, the end of the bracket with the smaller
+    value is returned.
     """
+    begin = a
     if g_a == 0.0:
         return a
     if g_b == 0.0:
@@ -72,7 +77,7 @@ def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float
     for _ in range(MAX_VALUES):
         if abs(g_c) < abs(g_b):
             a, b, c, g_a, g_b, g_c = b, c, b, g_b, g_c, g_b
-        least = 0.5 * ROOT_TOLERANCE * (1.0 + abs(b))
+        least = max(0.5 * ROOT_TOLERANCE * max(abs(b), abs(b - begin)), LEAST)
         half = 0.5 * (c - b)
         if abs(half) <= least or g_b == 0.0:
             break

@@ -102,7 +102,7 @@ def arguments(args: Any) -> tuple[Any, ...]:
     if args is None:
         return ()
     if isinstance(args, (tuple, list)) or (isinstance(args, np.ndarray) and args.ndim):
-        return tuple(args)
+        return tuple(_checks.several("args", args, "arguments"))
     raise ArgumentError(f"args: expected a tuple such as args=(a,), got {_checks.short(args)}")
 
 

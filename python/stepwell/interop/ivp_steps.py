@@ -11,6 +11,7 @@ from .._checks import Array
 from ..errors import ArgumentError, ShapeError
 from ..method_records import Method
 from ..reference import adaptive
+from ..reference.acceptance import Acceptance
 
 #: How many attempts at steps a run may make in one go: as many as are exact in the controller's numbers.
 MAX_ATTEMPTS = 2**53 - 1
@@ -33,26 +34,27 @@ class Trajectory:
         extra_steps: how many extra steps were made for states between the ends of steps.
     """
 
-    def __init__(self, system: Any, method: Method, span: tuple[float, float], y: Array, tolerance: tuple[float, float]) -> None:
-        self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1)
+    def __init__(self, system: Any, method: Method, span: tuple[float, float], y: Array, tolerance: tuple[Array, Array]) -> None:
+        relative, absolute = tolerance
+        of_groups = relative.ndim > 0 or absolute.ndim > 0
+        if of_groups:
+            relative, absolute = (np.broadcast_to(each, (len(y),)) for each in tolerance)
+        acceptance = Acceptance(tuple(range(len(y))), own=of_groups)
+        self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1, acceptance=acceptance)
         self._model = engine.model(self._plan)
         self._method, self.begin, self.end = method, *span
         self._v = np.empty(0)
         self.times, self.states = [span[0]], [y]
-        relative, absolute = (np.asarray(each) for each in tolerance)
-        self.pace: Any = engine.begun(self._plan, engine.paces(self._plan, None, relative, absolute), self._v, y)
+        tolerances = engine.Tolerances(relative, absolute, of_groups)
+        pacing = engine.Pacing(np.array([span[1]]), MAX_ATTEMPTS)
+        self.pace: Any = engine.begun(self._plan, engine.paces(self._plan, None, tolerances, None, pacing), self._v, y)
         self.status = adaptive.BUDGET
         self.extra_steps = 0
 
     def limited(self, first_step: float | None, max_step: float) -> None:
         """Set the step to try first, and the longest."""
         first = self.pace.h if first_step is None else np.asarray(first_step)
-        # A step is limited where inputs change from sample to sample; here that is so for ever.
-        self.pace = self.pace._replace(
-            h=np.minimum(first, max_step),
-            interval=np.asarray(max_step),
-            until=np.asarray(np.inf if max_step < np.inf else -np.inf),
-        )
+        self.pace = self.pace._replace(h=np.minimum(first, max_step), most_step=np.asarray(max_step))
 
     @property
     def evaluations(self) -> int:
@@ -120,11 +122,11 @@ class Trajectory:
         n = len(y)
         saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
         last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
-        paces = np.array(pace, dtype=np.float64).reshape(engine.PACE_NUMBERS, 1)
+        paces = engine.numbers_of(pace).reshape(-1, 1)
         last_paces = np.empty_like(paces)
         arrays = engine.AdaptiveArrays(np.empty((0, 1)), y.reshape(n, 1), paces, saved_v, saved_y, last, last_paces, status)
-        _core.adapt(self._model, self._plan, engine.Pacing(times, attempts), arrays)
-        self.pace, self.status = adaptive.Pace(*last_paces.reshape(-1)), int(status[0])
+        _core.adapt(self._model, self._plan, engine.pacing_of_core(self._plan, engine.Pacing(times, attempts)), arrays)
+        self.pace, self.status = engine.pace_of(self._plan, last_paces.reshape(-1)), int(status[0])
         return saved_y, last.reshape(n)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core, _encounters, engine
+from .. import _checks, _core, _encounters, engine
 from .._value import Fixed, FixedDict
 from ..control import Projection
 from ..equations.definition import Definition
@@ -133,8 +133,7 @@ class Writer:
         key = (array.__array_interface__["data"][0], array.shape, array.strides, array.dtype.str)
         if key not in self._known:
             self._known[key] = name, array  # which keeps its memory, so that no other array can have its address
-            once = tuple(slice(None) if stride else slice(0, 1) for stride in array.strides)
-            self.arrays[name] = array[once] if array.size else array
+            self.arrays[name] = _checks.once_of(array)
         made: dict[str, Any] = {KIND: "array", "of": self._known[key][0]}
         if self.arrays[made["of"]].shape != array.shape:
             made["over"] = list(array.shape)

@@ -91,9 +91,10 @@ def solve_ivp(
     ``fun`` is run at the start, with symbols, and not at every step; what cannot be traced (``if`` on a state, ``np.random``) is
     an error that names the line. Results have the same bits on every machine.
 
-    What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. The error of a step is that of the whole
-    state, its length, and not that of each number; see ``rtol``. ``sol`` and events use no interpolation, but short steps of the
-    method. The state is real. For many trajectories, use ``stepwell.system`` and ``integrate``.
+    What is not as in SciPy: there is no RK45, so without ``method`` it is ``"dop853"``. Of a step the largest error of a
+    component counts, over what is tolerated of it, and not the root of their mean square. ``sol`` and events use no
+    interpolation, but short steps of the method. The state is real. For many trajectories, use ``stepwell.system`` and
+    ``integrate``.
 
     Args:
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.
@@ -113,10 +114,9 @@ def solve_ivp(
         args: a tuple of further arguments of ``fun`` and of the events.
         first_step: the step to try first; None for a hundredth of the time in which the state changes at the start.
         max_step: the longest step.
-        rtol: tolerated error of a step, relative to the length of the state, √(Σ yᵢ²), before and after the step. Of several
-            numbers the least is taken.
-        atol: in addition, the tolerated error of one number of the state: of all n together it is √n times that. Of several
-            numbers the least is taken.
+        rtol: tolerated error of a component in a step, relative to its size before and after the step; a number, or one for each
+            component, shape (n,).
+        atol: in addition, the tolerated error of a component, likewise.
         jac: what methods for stiff equations need, of which there are none here; a warning, as in SciPy. So are the next.
         jac_sparsity: likewise.
         lband: likewise.
@@ -234,15 +234,11 @@ def _span(t_span: Any) -> tuple[float, float]:
 
 
 def _start(y0: Any) -> Array:
-    try:
-        state = _checks.numbers("y0", y0)
-    except DTypeError:
-        readable = isinstance(y0, np.ndarray) or not hasattr(y0, "__dlpack__")
-        if readable and np.asarray(y0).dtype.kind == "c":
-            raise DTypeError(
-                "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
-            ) from None
-        raise
+    if _checks.as_array("y0", y0).dtype.kind == "c":
+        raise DTypeError(
+            "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
+        )
+    state = _checks.numbers("y0", y0)
     if state.ndim != 1 or not state.size:
         raise ShapeError(f"y0: expected a state of shape (n,), got shape {state.shape}")
     return np.array(state)
@@ -274,8 +270,8 @@ def _longest(max_step: Any) -> float:
     return _checks.number("max_step", max_step, positive=True, unit="units of time")
 
 
-def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[float, float]:
-    """The relative and the absolute tolerance of the length of a state."""
+def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
+    """The relative and the absolute tolerance, of each component where they are several numbers."""
     relative = _checks.numbers("rtol", rtol, positive=True)
     absolute = _checks.not_negative("atol", atol)
     for name, given in (("rtol", relative), ("atol", absolute)):
@@ -286,8 +282,7 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[float, float]:
         warnings.warn(
             f"rtol: {least:g} is too small for numbers of 53 bits, so it is {LEAST_RELATIVE:.3g}", ToleranceWarning, stacklevel=3
         )
-    with np.errstate(over="ignore"):
-        return max(least, LEAST_RELATIVE), float(np.sqrt(n) * absolute.min())
+    return np.maximum(relative, LEAST_RELATIVE), absolute
 
 
 def _is_several(events: Any) -> bool:

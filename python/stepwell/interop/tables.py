@@ -46,7 +46,7 @@ def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, 
         raise ArgumentError(f"coords: expected names of their own, got {', '.join(clash)}, which the run has")
     try:
         return xarray.Dataset(variables, coords={TIME: run.t, **given}, attrs=_attributes(run))
-    except (ValueError, TypeError) as error:  # of the run itself it has no doubt
+    except (ValueError, TypeError, RuntimeError) as error:  # of the run itself it has no doubt
         raise ArgumentError(f"coords: expected coordinates that fit the axes {', '.join((TIME, *members))}: {error}") from None
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import bits
 from .around import whole_step
+from .signal import of_step, over
 
 #: A distance is known to within so many times the numbers that it is computed from: eight roundings.
 ROUNDING = 2.0**-50
@@ -384,7 +385,8 @@ def around(s: Any, h: Any, given: dict[str, Any]) -> Any:
 def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any) -> Any:
     """One step by a method, with projection and contact. What a method carries begins anew where a point met a surface."""
     before = v, y
-    after = whole_step(steps.step, s, t, h, v, y)
+    with over(of_step(t, h, hasattr(steps, "finish"))):
+        after = whole_step(steps.step, s, t, h, v, y)
     if not getattr(s, "met", None):
         return after
     if not hasattr(steps, "finish"):

@@ -94,7 +94,10 @@ class Controlled(Kept):
 
 
 class Projected(Kept):
-    """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient."""
+    """Back onto the energy: all velocities by one factor, or the least change of the state along the energy's gradient.
+
+    At rest there is nothing to scale, and where the gradient is zero no way to go: the state stays as it is.
+    """
 
     def __init__(self, s: Conserving, h: Any, way: str, target: Array) -> None:
         super().__init__(s, h, target)
@@ -106,9 +109,11 @@ class Projected(Kept):
         off = energy - self.target
         if self.way == "scaling":
             factor = np.sqrt(bits.held(1.0 - off / kinetic, MIN_SQUARE, MAX_SQUARE))
+            factor = bits.where(bits.at_most(kinetic, 0.0), 1.0, factor)
             self.work = self.work + (factor * factor - 1.0) * kinetic
             return v * factor, y
         along_v, along_y, square = self.s.gradient(v, y, dv)  # Nacozy
-        step = (off / self.h) / square
-        self.work = self.work - off
+        flat = bits.at_most(square, 0.0)
+        step = bits.where(flat, 0.0, (off / self.h) / square)
+        self.work = self.work - bits.where(flat, 0.0, off)
         return v - step * along_v, y - step * along_y

@@ -2,61 +2,207 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .types import Array
+from .types import Array, Whole
 
-#: A change of sign is located to this share of its step, or to the distance of two numbers at its time, whichever is longer.
-SHARE, SPACING = 2.0**-48, 2.0**-52
-#: The most trials for one change of sign: bisection needs 48, and may be left behind by one.
-MOST_TRIALS = 49
-#: By what multiple of its squared width a trial is moved towards the middle of the bracket, so that both ends come nearer.
+#: A change of sign is located to this share of the time since the start of its step: to the roundings of a trial's length.
+SPACING = 2.0**-52
+#: It is looked for in rounds, the first down to this share of the step, in so many trials: bisection needs 48, and may be left
+#: behind by one. Each later round begins with the bracket of the last, since an event may be ever so near to the step's start.
+SHARE, MOST_TRIALS = 2.0**-48, 49
+#: Brackets shorter than this share of a step are not cut any further.
+LEAST_SHARE = 2.0**-1000
+#: By what multiple of its squared width, over the width at first, a trial is moved towards the middle of the bracket, so that
+#: both ends come nearer.
 TRUNCATION = 0.02
+
+#: A step in which g keeps its sign is looked into where g at one of its ends is no more than so many times the bend there: by how
+#: much its change differs from that of the step before. There and back to zero a parabola is at an eighth of that.
+REACH = 4.0
+#: How much further than at its ends g may bend within a step, as a share of the control points of the cubic with the same values
+#: and slopes at both ends, which lie a third of the step from them. Of a step in which it changes its sign such a share is less:
+#: of a straight line, which has one zero, both points must not seem to be across.
+BENDS, BENDS_TWICE = 1.4, 1.25
+#: A part of a step is halved so many times, to find two zeros in it: a smooth g that touches zero is then within its roundings.
+MOST_HALVINGS = 26
+#: The same where g begins at zero and is known to leave it: a bracket begins where it has done so.
+MOST_HALVINGS_FROM_ZERO = 60
 
 #: From some members and shares of their steps to g, v and y there; the axis of the members comes last.
 Trial = Callable[[Any, Array], tuple[Array, Array, Array]]
+#: The same with the slope of g along the motion, over the time of the whole step, behind g.
+Look = Callable[[Any, Array], tuple[Array, Array, Array, Array]]
 
 
-def crosses(before: Array, after: Array, direction: int) -> Any:
-    """Whether g changes its sign from one state to the next: rising (direction 1), falling (−1), or either (0).
+class Parts(NamedTuple):
+    """Parts of steps, from the share ``low`` of a step to ``high``, with what is known at both ends.
 
-    A state at which g is 0 belongs to the step that ends there, and not to the one that begins there. NaN has no sign.
+    Attributes:
+        of: the number of the step among those that are looked into.
+        low: the share of the step where the part begins.
+        high: and where it ends.
+        g_low: g there.
+        g_high: likewise.
+        slope_low: the rate of change of g there, along the motion, over the time of the whole step.
+        slope_high: likewise.
+        v: velocities at the end of the part, shape (*block, n).
+        y: coordinates there.
     """
-    rising = (before < 0.0) & (after >= 0.0) if direction >= 0 else None
-    falling = (before > 0.0) & (after <= 0.0) if direction <= 0 else None
-    if rising is None or falling is None:
-        return falling if rising is None else rising
-    return rising | falling
+
+    of: Whole
+    low: Array
+    high: Array
+    g_low: Array
+    g_high: Array
+    slope_low: Array
+    slope_high: Array
+    v: Array
+    y: Array
+
+    def some(self, which: Any) -> Parts:
+        """Some of them."""
+        parts: Any = (each[..., which] for each in self)
+        return Parts(*parts)
 
 
-def located(trial: Trial, before: Array, after: Array, v: Array, y: Array, width: Array) -> tuple[Array, Array, Array]:
+def joined(parts: Sequence[Parts]) -> Parts:
+    """All of them."""
+    return Parts(*(np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)))
+
+
+def may_change(before: Array, g: Array) -> Any:
+    """In which of some steps g may change its sign, once or there and back: shape (steps, members).
+
+    Args:
+        before: g one state before the first, NaN where it is not known, shape (members,).
+        g: its values at both ends of all steps, shape (steps + 1, members).
+    """
+    with np.errstate(all="ignore"):
+        bend, size, above = np.empty((len(g) - 1, *g.shape[1:])), np.abs(g), g > 0.0
+        change = g[1:] - g[:-1]
+        np.subtract(change[1:], change[:-1], out=bend[1:])
+        np.subtract(change[0], g[0] - before, out=bend[0])
+        bend[0, np.isnan(before)] = np.inf
+        np.abs(bend, out=bend)
+        bend *= REACH
+        may: Any = np.minimum(size[1:], size[:-1], out=change) <= bend
+        may |= above[1:] != above[:-1]
+    return may
+
+
+def near(g: Array, before: Array) -> Any:
+    """Whether g is so near to zero, against its change from another state, that it may be there within a step or two."""
+    with np.errstate(all="ignore"):
+        return ~(np.abs(g) > REACH * np.abs(g - before))
+
+
+def sides(parts: Parts) -> tuple[Array, Array]:
+    """The sign of g just behind the beginning of each part and just before its end: where g is zero, its slope tells.
+
+    So a state at which g is 0 belongs to the step that ends there, and not to the one that begins there. NaN has no sign.
+    """
+    begin = np.where(parts.g_low == 0.0, np.sign(parts.slope_low), np.sign(parts.g_low))
+    end = np.where(parts.g_high == 0.0, -np.sign(parts.slope_high), np.sign(parts.g_high))
+    return begin, np.where(end == 0.0, begin, end)
+
+
+def bends(parts: Parts) -> Any:
+    """Whether there may be more zeros in these parts than the signs at both ends say.
+
+    The cubic with the same values and slopes has none where its control points are on one side of zero.
+    """
+    begin, end = sides(parts)
+    third = (parts.high - parts.low) / 3.0
+    with np.errstate(all="ignore"):
+        into, back = third * parts.slope_low, -third * parts.slope_high
+        one = (begin * (parts.g_low + BENDS * into) < 0.0) | (begin * (parts.g_high + BENDS * back) < 0.0)
+        both = (begin * (parts.g_low + BENDS_TWICE * into) < 0.0) & (end * (parts.g_high + BENDS_TWICE * back) < 0.0)
+    return np.where(begin * end < 0.0, both, one)
+
+
+def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
+    """The parts of steps in which g changes its sign once, ascending in each step, and those steps whose start g cannot leave.
+
+    Args:
+        look: g, its slope and the state at a share of these steps.
+        parts: whole steps.
+
+    Returns:
+        Those parts, at whose end g may be 0; and the steps at whose start g is zero and returns to it within roundings.
+    """
+    brackets, stuck = [], np.zeros(0, dtype=np.int64)
+    for halving in range(MOST_HALVINGS_FROM_ZERO + 1):
+        begin, end = sides(parts)
+        changes = begin * end < 0.0
+        leaves_zero = changes & (parts.g_low * begin <= 0.0)  # a bracket begins where g has left it
+        zero_at_end = (parts.g_high == 0.0) & (end != 0.0)
+        split = leaves_zero | ((bends(parts) | (changes & zero_at_end)) & (halving < MOST_HALVINGS))
+        brackets.append(parts.some(changes & ~split))
+        at_end = zero_at_end & ~changes & ~split
+        brackets.append(parts.some(at_end)._replace(low=parts.high[at_end], g_low=end[at_end]))
+        if halving == MOST_HALVINGS_FROM_ZERO:
+            stuck = parts.of[split]
+            break
+        parts = parts.some(split)
+        if not len(parts.of):
+            break
+        middle = np.where(leaves_zero[split] & (halving % 3 < 2), _return(parts), 0.5 * (parts.low + parts.high))
+        g, slope, v, y = look(parts.of, middle)
+        first_half = parts._replace(high=middle, g_high=g, slope_high=slope, v=v, y=y)
+        parts = joined([first_half, parts._replace(low=middle, g_low=g, slope_low=slope)])
+    once = joined(brackets)
+    return once.some(np.lexsort((once.high, once.of))), stuck
+
+
+def _return(parts: Parts) -> Array:
+    """Where to cut parts in which g leaves zero and returns: at first behind its return, then between both.
+
+    The parabola with the same slope at zero tells, if it returns within the part; else it is the middle.
+    """
+    width = parts.high - parts.low
+    with np.errstate(all="ignore"):
+        back = parts.slope_low * width / (parts.slope_low * width - parts.g_high)
+        cut = np.where(1.5 * back < 0.75, 1.5 * back, 0.5 * back)
+    return parts.low + width * np.where((cut > 0.0) & (cut < 0.75), cut, 0.5)
+
+
+def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, v: Array, y: Array) -> tuple[Array, Array, Array]:
     """Where in its step g changes its sign, and the state there, which is one that is known to be at or past the change.
 
     Each trial is a step of the method from the step's own start, of another length. The lengths are chosen by the ITP method
-    (Oliveira and Takahashi 2020), a secant that never takes more than one trial more than bisection would.
+    (Oliveira and Takahashi 2020), a secant that in each round never takes more than one trial more than bisection would.
 
     Args:
         trial: makes steps of these shares of the full ones.
-        before: g at the start of each step, shape (n,).
-        after: g at its end, likewise, of the other sign or 0.
-        v: velocities at its end, shape (*block, n).
-        y: coordinates at its end, likewise.
-        width: to which share of each step it is located, shape (n,), ``SHARE`` or more.
+        low: the share of each step behind which the change is, shape (n,).
+        high: the share before which it is, likewise, or at which.
+        g_low: g there, likewise.
+        g_high: g there, likewise, of the other sign or 0.
+        v: velocities at the higher share, shape (*block, n).
+        y: coordinates there, likewise.
 
     Returns:
         The share of each step, above 0 and at most 1, and v and y there.
     """
-    v, y, n = v.copy(), y.copy(), len(before)
-    sign = np.where(before < 0.0, 1.0, -1.0)
-    low, high, g_low, g_high = np.zeros(n), np.ones(n), sign * before, sign * after
-    for done in range(MOST_TRIALS):
-        live = np.flatnonzero((high - low > width) & (g_high != 0.0))
+    low, high, v, y, n = low.copy(), high.copy(), v.copy(), y.copy(), len(low)
+    sign = np.where(g_low < 0.0, 1.0, -1.0)
+    g_low, g_high = sign * g_low, sign * g_high
+    within, left, unit = np.full(n, SHARE), np.full(n, MOST_TRIALS), high - low
+    while True:
+        width = high - low
+        live = np.flatnonzero((width > np.maximum(SPACING * high, LEAST_SHARE)) & (g_high != 0.0))
         if not len(live):
-            break
-        share = _next(low[live], high[live], g_low[live], g_high[live], width[live], done)
+            return high, v, y
+        again = live[(width[live] <= within[live]) | (left[live] == 0)]
+        within[again], unit[again] = SPACING * high[again], width[again]
+        left[again] = np.frexp(width[again])[1] - np.frexp(within[again])[1] + 2
+        ends = low[live], high[live], g_low[live], g_high[live]
+        share = _next(*ends, within[live], unit[live], left[live])
+        left[live] -= 1
         g, v_there, y_there = trial(live, share)
         g = sign[live] * g
         past = g >= 0.0
@@ -64,23 +210,21 @@ def located(trial: Trial, before: Array, after: Array, v: Array, y: Array, width
         low[before_it], g_low[before_it] = share[~past], g[~past]
         high[after_it], g_high[after_it] = share[past], g[past]
         v[..., after_it], y[..., after_it] = v_there[..., past], y_there[..., past]
-    return high, v, y
 
 
-def width_at(t: Array, h: Array) -> Array:
-    """To which share of the steps from these times, of these lengths, a change of sign is located."""
-    return np.maximum(SHARE, SPACING * (np.abs(t) / h))
+def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, unit: Array, left: Whole) -> Array:
+    """The next trial within brackets: the secant's, a little towards the middle, and not too far from the middle.
 
-
-def _next(low: Array, high: Array, g_low: Array, g_high: Array, within: Array, done: int) -> Array:
-    """The next trial within brackets: the secant's, a little towards the middle, and not too far from the middle."""
+    The brackets come down from ``unit`` to ``within`` in so many trials as are left.
+    """
     width, middle = high - low, 0.5 * (low + high)
     with np.errstate(all="ignore"):
         secant = (g_high * low - g_low * high) / (g_high - g_low)
         towards = np.where(secant <= middle, 1.0, -1.0)
-        moved = TRUNCATION * (width * width)
+        moved = TRUNCATION * (width / unit) * width
         near = np.where(moved <= np.abs(middle - secant), secant + towards * moved, middle)
-    # Both ends must be able to move: a trial at an end would change nothing.
-    near = np.minimum(np.maximum(near, low + 0.5 * within), high - 0.5 * within)
-    most = np.ldexp(0.5 * SHARE, MOST_TRIALS - done) - 0.5 * width
-    return np.asarray(np.where(np.abs(near - middle) <= most, near, middle - towards * most))
+    edge = SPACING * high  # both ends must be able to move
+    near = np.minimum(np.maximum(near, low + edge), high - edge)
+    most = np.ldexp(0.5 * within, left) - 0.5 * width
+    share = np.where(np.abs(near - middle) <= most, near, middle - towards * most)
+    return np.where((low < share) & (share < high), share, middle)  # a trial at an end would change nothing

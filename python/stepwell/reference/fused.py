@@ -205,9 +205,9 @@ class Evaluated:
                 case "parameter":
                     made = self.numbers[given]
                 case "step":
-                    made = h
+                    made = np.asarray(h)  # by which Python's numbers would refuse to divide if it is zero
                 case "time":
-                    made = t
+                    made = np.asarray(t)
                 case "sample":
                     made = self.tables[given].sample(*operands)
                 case _:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .product import times
+from .signal import of_step, over
 from .types import Array, Blocks, Signal, Whole
 
 Step = Callable[[float, Array, Array], Blocks]
@@ -54,13 +55,14 @@ def run(
 
 
 def linear_step(
-    p: Array, q: Array, inputs: Sequence[Signal], nodes: Sequence[float], h: float
+    p: Array, q: Array, inputs: Sequence[Signal], nodes: Sequence[float], h: float, carries: bool = False
 ) -> Callable[[float, Array], Array]:
     """One step of s ← P·s + Σ Q·u, with s the rows of v and y; the sums run over s, then over the nodes and their inputs."""
     columns = [(node * h, signal) for node in nodes for signal in inputs]
     pq = np.concatenate([p, np.moveaxis(q, 0, 1)], axis=1)
 
     def step(t: float, s: Array) -> Array:
-        return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)])
+        with over(of_step(t, h, carries)):
+            return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)])
 
     return step

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,31 @@ from .marks import Mark
 Term = Any
 
 
+class Branch(NamedTuple):
+    """A function with several branches, such as a root, and the bounds of the values of the one that the rates take."""
+
+    value: Series
+    least: float
+    most: float
+
+
+#: The values of functions that are one branch of several: beyond these their series goes on to the next. A root is not below 0.
+BRANCHES = {
+    "hypot": (0.0, np.inf),
+    "arctan2": (-np.pi, np.pi),
+    "arctan": (-np.pi / 2, np.pi / 2),
+    "arcsin": (-np.pi / 2, np.pi / 2),
+    "arccos": (0.0, np.pi),
+}
+
+
 class Book:
-    """The numbers that change with time, each after those that it is made of, and the functions among them."""
+    """The numbers that change with time, each after those that it is made of, and the functions and branches among them."""
 
     def __init__(self) -> None:
         self.made: list[Series] = []
         self.functions: dict[Any, Series] = {}
+        self.branches: list[Branch] = []
 
     def advance(self, k: int) -> None:
         """The coefficients of order k of all, from those of lower orders and that of the state. Derivatives of functions join."""
@@ -139,6 +158,7 @@ class Series:
             return None if rest is None else rest * over[0]
 
         made = Series(self.book, root, rule)
+        self.book.branches.append(Branch(made, 0.0, np.inf))
         return made
 
     def __lt__(self, other: Any) -> Any:
@@ -290,11 +310,20 @@ def function(name: str, of_numbers: Callable[..., Any], plain: Callable[..., Any
     book = next((each.book for each in given if isinstance(each, Series)), None)
     if book is None:
         return of_numbers(*given)
-    key = name, *(id(each) if isinstance(each, Series) else each for each in given)
+    key = name, *map(_identity, given)
     if key not in book.functions:
         start = np.asarray(of_numbers(*map(_start, given)))[()]
         book.functions[key] = of_function(Mark(name, tuple(given), plain), start, book)
+        if name in BRANCHES:
+            book.branches.append(Branch(book.functions[key], *BRANCHES[name]))
     return book.functions[key]
+
+
+def _identity(x: Any) -> Any:
+    """What tells an argument of a function from others: symbols cannot be hashed, and 0 and −0 are equal but not the same."""
+    if hasattr(x, "xor_bits"):
+        return "symbol", x.id
+    return repr(x) if isinstance(x, (int, float, complex, np.number)) else id(x)
 
 
 def has_rule(mark: Mark) -> bool:
@@ -355,13 +384,21 @@ def of_function(mark: Mark, start: Any, book: Book) -> Series:
 
 def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tuple[Any, Any]]:
     """The Taylor coefficients of v and y around t, from the first to that order, in powers of the share of the step h."""
-    book = Book()
+    return expanded(s, order, t, (h, 1.0), v, y)[0]
+
+
+def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any) -> tuple[list[tuple[Any, Any]], list[Branch]]:
+    """The same coefficients, and the branches of functions that the rates are on.
+
+    ``lengths`` are the unit of time in powers of which the coefficients are, and this over the step to which ``s`` is scaled.
+    """
+    book, (h, unit) = Book(), lengths
     v, y = np.asarray(v), np.asarray(y)
     blocks = [_filled([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
     # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
     each_its_own = np.broadcast_arrays(t, h)[0] if np.ndim(h) else t
     times = np.frompyfunc(lambda t: Series(book, t, None), 1, 1)(each_its_own)
-    lengths = [(each, length) for each, length in np.broadcast(times, h)]
+    clocks = [(each, length) for each, length in np.broadcast(times, h)]
     rates = s.dv(times, *blocks), s.dy(times, *blocks)
     seeds = [each for block in blocks for each in block.flat]
     found = [
@@ -371,16 +408,17 @@ def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tup
     made = []
     for k in range(order):
         book.advance(k)
+        by = None if k == 0 and _is(unit, 1.0) else unit * (1.0 / (k + 1))
         terms = []
         for seed, rate in zip(seeds, found, strict=True):
             known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
-            terms.append(known if known is None or k == 0 else (1.0 / (k + 1)) * known)
+            terms.append(known if known is None or by is None else by * known)
             seed.terms.append(terms[-1])
-        for time, length in lengths:
+        for time, length in clocks:
             time.terms.append(length if k == 0 else None)
         numbers = [zero if term is None else term for term in terms]
         made.append((_filled(numbers[: v.size], v.shape), _filled(numbers[v.size :], y.shape)))
-    return made
+    return made, book.branches
 
 
 def _objects(x: Any) -> Any:

@@ -1,30 +1,39 @@
 """Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 
-The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the
-length of a block of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The
-step is the least of these for j = p − 1 and p and both blocks, times exp(−0.7/(p − 1)).
+The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
+coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of
+these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected
+only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from .adaptive import Attempted, Pace, length2, longer
-from .bits import add_bits, at_most, held, less, shift_up, where
+from .acceptance import Acceptance
+from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
+from .bits import add_bits, and_bits, at_most, held, less, shift_up, where
 from .log import split
-from .series import coefficients
+from .series import Branch, expanded
 from .types import Array
 
 #: The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 MAX_GROWTH = 1024.0
-#: The squared length of the last terms over the tolerated one, between bounds whose logarithms exist.
+#: The size of the last terms over the tolerated one, between bounds whose logarithms exist.
 BOUNDS = (1e-280, 1e280)
 #: The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
 MARGIN = 0.7 * 1.4426950408889634
+#: The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
+SHARE = 0.5
+#: A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first
+#: twofold: so many are left before what it met.
+SHRINK = 0.25
 
 #: The orders between which a tolerance chooses, and by how much they grow with its logarithm.
 LEAST_ORDER, MOST_ORDER = 4, 20
@@ -36,7 +45,8 @@ MAGIC = 6755399441055744.0
 #: 2.9e-5.
 ROUGH_EXP2 = (1.0, 0.693121045203, 0.24022349038, 0.0559219758423, 0.00966636851538)
 ROUGH_LOG2 = (1.44264046428, -0.72062921586, 0.485737842443, -0.389675223792, 0.250287846961)
-#: The exponent of 1.
+#: The bits of an exponent, and that of 1.
+EXPONENT = 0x7FF << 52
 ONE = 1023 << 52
 
 
@@ -49,28 +59,45 @@ def order_of(tolerance: float) -> int:
 
 
 def attempt(
-    order: int, system: Attempted, block_axes: tuple[int, int], pace: Pace, budget: Any, v: Array, y: Array
+    order: int,
+    system: Attempted,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    pace: Pace,
+    budget: Any,
+    v: Array,
+    y: Array,
 ) -> tuple[Pace, Array, Array]:
     """One step, or one extra step, which leaves the pace as it is."""
-    outlook = pace.outlook(budget)
-    terms = coefficients(system.s, order, pace.t, 1.0, v, y)
-    far = reach(order, pace, block_axes, v, y, terms)
-    step = where(outlook.is_extra, pace.extra, far)
-    v1, y1 = (value(start, [term[i] for term in terms], step) for i, start in enumerate((v, y)))
-    new = [length2(block, axes) for block, axes in zip((v1, y1), block_axes, strict=True)]
+    outlook, groups = pace.outlook(budget), acceptance.groups
+    unit = unit_of(pace.before)
+    terms, branches = expanded(system.s, order, pace.t, (unit, unit), v, y)
+    far, moved = reach(order, pace, unit, block_axes, acceptance, v, y, terms)
+    bound = pace.wall - pace.t
+    ends = less(bound, far)
+    step = where(ends, bound, far)
+    share = where(outlook.is_extra, pace.extra, step) * (1.0 / unit)
+    v1, y1 = (value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
+    new = sizes(v1, y1, block_axes, groups)
     v1, y1, work = system.project(v1, y1)
-    following, goes_on = decided(pace, far, new, outlook.is_extra, outlook.runs)
+    stays = on_branches(branches, share, moved) if branches else None
+    following, goes_on = decided(pace, step, ends, new, stays, 0.5 / moved * unit, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
-def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
+def unit_of(step: Any) -> Any:
+    """The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's."""
+    return and_bits(step, EXPONENT)
+
+
+def value(start: Array, terms: Sequence[Array], share: Any) -> Array:
     """The sum of a series at a distance: odd and even powers apart, by Horner's rule.
 
     The start comes last, so that it is rounded once.
     """
-    square = step * step
+    square = share * share
 
     def summed(powers: Sequence[Array]) -> Any:
         total = powers[-1]
@@ -79,40 +106,79 @@ def value(start: Array, terms: Sequence[Array], step: Any) -> Array:
         return total
 
     odd, even = summed(terms[::2]), summed(terms[1::2])
-    end: Array = start + step * (odd + step * even)
+    end: Array = start + share * (odd + share * even)
     return end
 
 
-def reach(order: int, pace: Pace, block_axes: tuple[int, int], v: Array, y: Array, terms: Sequence[tuple[Array, Array]]) -> Any:
-    """How far the series is as good as is tolerated.
+def reach(
+    order: int,
+    pace: Pace,
+    unit: Any,
+    block_axes: tuple[int, int],
+    acceptance: Acceptance,
+    v: Array,
+    y: Array,
+    terms: Sequence[tuple[Array, Array]],
+) -> tuple[Any, Any]:
+    """How far the series is as good as is tolerated, and the motion in one unit of time over the tolerated error.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
     """
+    groups, counts = acceptance.groups, acceptance.counts(*numbers_in(v, y, block_axes))
+    present, first, second, last_but_one, last = (
+        sizes(*blocks, block_axes, groups) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
+    )
+    relative, absolute = pace.tolerances()
+    # A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    standing = []
+    for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
+        longest, now = pace.longest[block], present[block]
+        onset = ONSET * longer(largest(longest), largest(now)) if len(now) > 1 else 0.0
+        standing += [where(less(0.0, size), size, onset) if len(now) > 1 else size for size in longest]
+    counts_as = longer(where(less(0.0, pace.lasts), stacked(standing), present), first * (pace.before * (1.0 / unit)))
+    tolerated = absolute + relative * counts_as
+    # What begins at zero, where nothing else has been, tolerates no error: it does not count.
+    bound = where(less(0.0, tolerated), tolerated, np.inf)
 
-    def lengths(blocks: Sequence[Array]) -> list[Any]:
-        return [length2(block, axes) for block, axes in zip(blocks, block_axes, strict=True)]
+    def logarithm(size: Any) -> Any:
+        return rough_log2(held(size, *BOUNDS))
 
-    present, first = lengths((v, y)), lengths(terms[0])
-    # Squares of what is tolerated: of the absolute part and of the relative one, added.
-    tolerated = []
-    # A block at zero counts as long as its rate would have made it in the last step.
-    for longest, now, rate in zip((pace.longest_v, pace.longest_y), present, first, strict=True):
-        counts = where(less(0.0, pace.lasts), longest, now)
-        square = longer(counts, rate * (pace.before * pace.before))
-        tolerated.append(pace.absolute * pace.absolute + (pace.relative * pace.relative) * square)
-    per = [1.0 / square for square in tolerated]
+    moved, lost = over(first, bound), ROUNDING * counts_as
+    one, other = over(last_but_one, bound), over(last, bound)
+    by_one, by_other = logarithm(one) * (-1.0 / (order - 1)), logarithm(other) * (-1.0 / order)
+    by_error = where(less(by_one, by_other), by_one, by_other) - MARGIN / (order - 1)
+    motion = longer(longer(moved, over(second, bound)), over(lost, bound))
+    falls = logarithm(longer(one, other)) - logarithm(motion)
+    by_radius = falls * (-1.0 / (order - 2)) + (math.log2(SHARE) - math.log2(order - 1) / (order - 2))
+    # A motion that is lost in rounding has no radius: it goes on as before.
+    is_lost = functools.reduce(operator.and_, at_most(first, lost), less(by_radius, 0.0))
+    by_radius = where(is_lost, 0.0, by_radius)
+    far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error)) * unit
+    limited = where(less(1.0, pace.most), pace.most, 1.0)
+    most = where(less(pace.most, MAX_FACTOR), limited, MAX_GROWTH) * pace.before
+    return pace.shortened(where(less(most, far), most, far), pace.t), moved
 
-    def logarithm(k: int) -> Any:
-        of_v, of_y = (
-            where(at_most(square, 0.0), 0.0, square * weight) for square, weight in zip(lengths(terms[k - 1]), per, strict=True)
-        )
-        return rough_log2(held(longer(of_v, of_y), *BOUNDS)) * (-0.5 / k)
 
-    one, other = logarithm(order - 1), logarithm(order)
-    far = rough_exp2(where(less(one, other), one, other) - MARGIN / (order - 1))
-    most = MAX_GROWTH * pace.before
-    return where(less(most, far), most, far)
+def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
+    """Whether all functions stay on their branch within a step, or all its motion is tolerated as an error."""
+    symbols = {each.value.terms[0].id: each for each in branches if hasattr(each.value.terms[0], "id")}
+    stays = []
+    for value, least, most in (symbols[place] for place in sorted(symbols)) if symbols else branches:
+        if least > -np.inf:
+            stays.append(at_most(least, furthest(value.terms, share, lambda term: where(less(term, 0.0), term, 0.0))))
+        if most < np.inf:
+            stays.append(at_most(furthest(value.terms, share, lambda term: where(less(0.0, term), term, 0.0)), most))
+    return at_most(moved * share, 1.0) | functools.reduce(operator.and_, stays)
+
+
+def furthest(terms: Sequence[Any], share: Any, part: Callable[[Any], Any]) -> Any:
+    """How far the terms to one side alone would take a value within a step: no further can it be."""
+    total = None
+    for term in reversed(terms[1:]):
+        beyond = None if total is None else share * total
+        total = beyond if term is None else part(term) if beyond is None else part(term) + beyond
+    return terms[0] if total is None else terms[0] + share * total
 
 
 def rough_exp2(x: Any) -> Any:
@@ -134,23 +200,32 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
     return (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
 
 
-def decided(pace: Pace, far: Any, new: Sequence[Any], is_extra: Any, runs: Any) -> tuple[Pace, Any]:
-    """The pace after a step, and whether the state advances; ``new`` are squares of the new lengths."""
-    good = less(new[0] + new[1], np.inf)  # NaN is not
-    reached = pace.t + far
+def decided(pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
+    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
+
+    ``stays`` is whether functions stay on their branch, None without any; ``tolerable`` a step that may leave it.
+    """
+    finite = less(total(new), np.inf)  # NaN is not
+    # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
+    fits = finite & (ends | less(pace.t, pace.t + 0.25 * step))
+    good = fits if stays is None else fits & stays
+    shorter = SHRINK * where(less(step, pace.before), step, pace.before)
+    if stays is not None:
+        shorter = where(stays, shorter, longer(shorter, tolerable))
+    reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good
     following = pace._replace(
         t=where(takes, reached, pace.t),
-        h=where(takes | holds, far, where(fails, 0.0, pace.h)),
+        h=where(takes | holds, step, where(fails, shorter, pace.h)),
         extra=where(is_extra, 0.0, pace.extra),
         held=where(holds, 1.0, pace.held),
-        before=where(takes, far, pace.before),
-        longest_v=where(takes & less(pace.longest_v, new[0]), new[0], pace.longest_v),
-        longest_y=where(takes & less(pace.longest_y, new[1]), new[1], pace.longest_y),
+        longest=where(takes & less(pace.longest, new), new, pace.longest),
+        before=where(takes & ~ends, step, where(fails, shorter, pace.before)),
+        most=where(takes & less(pace.most, MAX_FACTOR), 2.0 * pace.most, where(fails, SHRINK, pace.most)),
         accepted=pace.accepted + where(takes, 1.0, 0.0),
         rejected=pace.rejected + where(fails, 1.0, 0.0),
         extra_steps=pace.extra_steps + where(holds | is_extra, 1.0, 0.0),
-        error=where(fails, np.inf, pace.error),
+        error=where(takes, 0.0, where(fails, where(finite, 1.0, np.inf), pace.error)),
     )
     return following, takes | is_extra

@@ -1,14 +1,55 @@
 """Inputs: what drives a system from outside, as a function of time."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from copy import copy
+from typing import Any
 
 import numpy as np
 
-from . import trig
+from . import bits, trig
 from .types import Array
 
-#: A sample's instant may be missed by the rounding of t = t₀ + k·h; a time this fraction of an interval before it counts as it.
-HOLD_SLACK = 1e-6
+#: By this factor the number of intervals since the first sample is taken longer: rounding may put it just before a whole number.
+HOLD_SLACK = 1.0 + 2.0**-44
+
+#: The two ends of a stretch of time, and its length.
+Window = tuple[Any, Any, Any]
+
+#: Over what samples are averaged that are held; None where they are looked up at a time.
+_WINDOW: ContextVar[Window | None] = ContextVar("window", default=None)
+
+
+@contextmanager
+def over(window: Window) -> Iterator[None]:
+    """What is computed within sees the mean of held samples over a stretch of time."""
+    before = _WINDOW.set(window)
+    try:
+        yield
+    finally:
+        _WINDOW.reset(before)
+
+
+def _ways(h: Any) -> tuple[Any, Any]:
+    """What of a length leads back in time, and what leads on; one of them is zero."""
+    back = bits.where(bits.less(h, 0.0), h, 0.0)
+    return back, h - back
+
+
+def of_step(t: Any, h: Any, carries: bool) -> Window:
+    """That of a step from t. Rates of a method that carries something in place of v belong to the middle of their window."""
+    back, on = _ways(h)
+    length = on - back
+    return (t - 0.5 * length, t + 0.5 * length, length) if carries else (t + back, t + on, length)
+
+
+def of_slot(t: Any, h: Any) -> Window:
+    """That of half a kick at t, from what a method carries to velocities and back."""
+    back, on = _ways(0.5 * h)
+    return t - on, t - back, on - back
 
 
 class Constant:
@@ -21,7 +62,7 @@ class Constant:
         """The value."""
         return self.value
 
-    def scaled(self, factor: Array) -> "Constant":
+    def scaled(self, factor: Array) -> Constant:
         """The same input, times a factor."""
         return Constant(factor * self.value)
 
@@ -36,7 +77,7 @@ class Sine:
         """The value at time t."""
         return self.amplitude * trig.sin(self.omega * t + self.phase)
 
-    def scaled(self, factor: Array) -> "Sine":
+    def scaled(self, factor: Array) -> Sine:
         """The same input, times a factor."""
         return Sine(factor * self.amplitude, self.omega, self.phase)
 
@@ -58,7 +99,7 @@ class Held:
 
     def sample(self, t: float) -> Array:
         """The sample that holds at time t."""
-        i = np.floor((t - self.start) / self.interval + HOLD_SLACK)
+        i = np.floor((t - self.start) / self.interval * HOLD_SLACK)
         i = np.clip(i, 0, len(self.values) - 1).astype(np.int64)
         if i.ndim == 0:  # one time for all members
             return np.asarray(self.values[i])
@@ -67,11 +108,81 @@ class Held:
         )
         return np.asarray(np.take_along_axis(own, i[np.newaxis], axis=0)[0])
 
-    def scaled(self, factor: Array) -> "Held":
+    def scaled(self, factor: Array) -> Held:
         """The same input, times a factor."""
         held = copy(self)
         held.factor = factor
         return held
+
+
+class Stepped:
+    """Samples, of which a step of fixed length sees the mean over it, and all else the one that holds.
+
+    Args:
+        samples: the samples.
+        times: when each of them begins, likewise.
+    """
+
+    factor: Array | None = None
+
+    def __init__(self, samples: Held, times: Held) -> None:
+        self.samples, self.times = samples, times
+
+    def parts(self) -> dict[str, Held]:
+        """Its tables, by what is put behind its name."""
+        return {"": self.samples, ".times": self.times}
+
+    def at(self, t: Any) -> Array:
+        """The value at time t, or that of a step."""
+        window = _WINDOW.get()
+        value = self.samples.at(t) if window is None else self._mean(*window)
+        return value if self.factor is None else np.asarray(self.factor * value)
+
+    def _mean(self, start: Any, end: Any, length: Any) -> Any:
+        before, after = self.samples.sample(start), self.samples.sample(end)
+        share = (end - self.times.sample(end)) / length
+        share = bits.where(bits.less(0.0, share), share, 0.0)
+        share = bits.where(bits.less(share, 1.0), share, 1.0)
+        return np.asarray(before + share * (after - before))
+
+    def scaled(self, factor: Array) -> Stepped:
+        """The same input, times a factor."""
+        other = copy(self)
+        other.factor = factor
+        return other
+
+
+class Curve:
+    """A polynomial between each two samples, of the time since the first of them.
+
+    Args:
+        coefficients: those of each power, the constant terms first.
+        times: when each piece begins.
+    """
+
+    factor: Array | None = None
+
+    def __init__(self, *tables: Held) -> None:
+        *self.coefficients, self.times = tables
+
+    def parts(self) -> dict[str, Held]:
+        """Its tables, by what is put behind its name."""
+        return {f".{k}": each for k, each in enumerate(self.coefficients)} | {".times": self.times}
+
+    def at(self, t: Any) -> Any:
+        """The value at time t."""
+        since = t - self.times.at(t)
+        *others, value = self.coefficients
+        made: Any = value.at(t)
+        for each in reversed(others):
+            made = made * since + each.at(t)
+        return made if self.factor is None else np.asarray(self.factor * made)
+
+    def scaled(self, factor: Array) -> Curve:
+        """The same input, times a factor."""
+        other = copy(self)
+        other.factor = factor
+        return other
 
 
 def _aligned(values: Array, axes: int) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ Any tape will do that gives symbols for ``number``, ``state``, ``param``, ``step
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import count
 from math import prod
 from typing import Any
@@ -14,9 +14,10 @@ import numpy as np
 
 from .._value import changed
 from . import adaptive, contact, series_pace
+from .acceptance import Acceptance
 from .around import surrounded
 from .run import linear_step
-from .signal import Constant, Held, Sine
+from .signal import Constant, Curve, Held, Sine, Stepped, of_slot, over
 
 
 def _array(shape: tuple[int, ...], symbols: Any) -> Any:
@@ -66,6 +67,8 @@ class Tracer:
                 return Constant(self.symbols(value.value, batch))
             case Sine():
                 return Sine(*(self.symbols(each, batch) for each in (value.amplitude, value.omega, value.phase)))
+            case Stepped() | Curve():
+                return type(value)(*(self.symbols(each, batch) for each in value.parts().values()))
             case Held():
                 self.tables.append(value)
                 return Sampled(self.tape, next(self._tables))
@@ -110,48 +113,63 @@ class Tracer:
 
     def slot(self, method: Any, which: str, choice: int) -> list[Any]:
         """The state after a method's ``start`` or ``finish``."""
-        s, (v, y, _) = self.scaled(self.tape.step()), self.state()
-        return self.flat(getattr(method.steps, which)(s, choice, self.tape.time(), v, y), y)
+        h, t = self.tape.step(), self.tape.time()
+        s, (v, y, _) = self.scaled(h), self.state()
+        with over(of_slot(t, h)):
+            return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
 
-    def attempted(self) -> adaptive.Attempted:
+    def of_unit_step(self, *, backward: bool = False) -> Any:
+        """The system scaled to a step of 1, or of −1 where its time runs backward; without control."""
+        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        if backward:
+            return adaptive.Backward(self.system.reference(-1.0, **given))
+        return self.system.reference(1.0, **given)
+
+    def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
         """How an attempt at an adaptive step uses the system."""
-        batch = self.system.batch
-        given = {name: self.symbols(value, batch) for name, value in self.system.given(batch).items()}
-        return adaptive.Attempted(self.system.reference(1.0, **given), self._control())
+        return adaptive.Attempted(self.of_unit_step(backward=backward), self._control())
 
-    def attempt(self, method: Any, order: int = 0) -> list[Any]:
+    def pace(self, acceptance: Acceptance, more: Iterator[Any]) -> adaptive.Pace:
+        """The pace as a part of the state."""
+        groups = sum(acceptance.counts(prod(self.system.v_shape), prod(self.system.y_shape)))
+        numbers = len(adaptive.Pace._fields) - 2 + groups * (3 if acceptance.own else 1)
+        return adaptive.Pace.of([next(more) for _ in range(numbers)], groups)
+
+    def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
-        system = self.attempted()
+        system = self.attempted(backward=backward)
         v, y, more = self.state()
-        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        pace = self.pace(acceptance, more)
         axes = len(self.system.v_shape), len(self.system.y_shape)
         steps: Any = method.steps
         if method.has_series:
-            following, v, y = series_pace.attempt(order or steps.ORDER, system, axes, pace, self.tape.budget(), v, y)
+            order = order or steps.ORDER
+            following, v, y = series_pace.attempt(order, system, axes, acceptance, pace, self.tape.budget(), v, y)
         else:
-            following, v, y = adaptive.attempt(steps, system, method.error_order, axes, pace, self.tape.budget(), v, y)
-        return self.flat(v, y, *following)
+            order = method.error_order
+            following, v, y = adaptive.attempt(steps, system, order, axes, acceptance, pace, self.tape.budget(), v, y)
+        return self.flat(v, y, *following.numbers)
 
-    def begin(self, method: Any) -> list[Any]:
+    def begin(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state, and the pace at the start of a run with a tolerance."""
-        given = {name: self.symbols(value, self.system.batch) for name, value in self.system.given(self.system.batch).items()}
+        system = self.of_unit_step(backward=backward)
         v, y, more = self.state()
-        pace = adaptive.Pace(*(next(more) for _ in adaptive.Pace._fields))
+        pace = self.pace(acceptance, more)
         axes = len(self.system.v_shape), len(self.system.y_shape)
-        system = self.system.reference(1.0, **given)
-        return self.flat(v, y, *adaptive.begin(system, pace, v, y, axes, series=method.has_series))
+        begun = adaptive.begin(system, pace, v, y, axes, acceptance.groups, series=method.has_series)
+        return self.flat(v, y, *begun.numbers)
 
     def record(self, names: Sequence[str]) -> list[Any]:
         """Quantities of a state."""
         s, (v, y, _) = self.scaled(self.tape.step()), self.state()
         return self.flat(*(s.record(name, v, y) for name in names))
 
-    def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any]) -> list[Any]:
+    def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any], carries: bool = False) -> list[Any]:
         """The state after a step in transition-matrix form, with these inputs."""
         p, q = (_array(shape, self._params) for shape in ((n, n), (len(nodes), len(inputs), n)))
         inputs = self.symbols(inputs, self.system.batch)
         s = _array((n,), map(self.tape.state, count()))
-        step = linear_step(p, q.reshape(prod(q.shape[:2]), n), inputs, nodes, self.tape.step())
+        step = linear_step(p, q.reshape(prod(q.shape[:2]), n), inputs, nodes, self.tape.step(), carries)
         return self.flat(step(self.tape.time(), s))
 
     def flat(self, *blocks: Any) -> list[Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from .. import _checks
 from .._brief import facts
 from .._checks import Array, Shape
-from .._value import Value
+from .._value import Value, frozen
 from ..compatible import velocities
 from ..control import AnyControl, a_control
 from ..errors import ArgumentError, DTypeError, NotFiniteError, ShapeError
@@ -53,6 +53,9 @@ class Scene(Value):
         until: the last time for which ``exact`` is valid, in units of time; errors after it are NaN, since they are not known.
         control: the control with which ``run`` steps, or None.
         period: the period of the exact solution, in units of time, or None.
+        jumps: times at which rates jump, as ``integrate`` takes them, for adaptive steps; None if there are none.
+        max_step: the longest adaptive step, in units of time, or None.
+        positive: components that must not become negative in adaptive steps, as ``integrate`` takes them, or None.
         name: the name by which it is chosen.
         title: its title in a picture; the name if empty.
         section: section of the document, or a note that the scene is stepwell's own.
@@ -80,6 +83,9 @@ class Scene(Value):
     until: float = math.inf
     control: AnyControl | None = None
     period: float | None = None
+    jumps: Any = None
+    max_step: float | None = None
+    positive: Any = None
     name: str = "unnamed"
     title: str = ""
     section: str = ""
@@ -100,7 +106,7 @@ class Scene(Value):
             block = _checks.block(name, block, shape, system.axes)
             if block.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape} of a scene's one member, got {block.shape}")
-            found[name] = block
+            found[name] = frozen(name, block)
         until = math.inf if self.until is None else self.until
         forever = isinstance(until, float) and until == math.inf
         if not forever and (until := _checks.number("until", until, unit="units of time")) < 0.0:
@@ -114,6 +120,10 @@ class Scene(Value):
         if self.exact is not None and not callable(self.exact):
             raise DTypeError(f"exact: expected a function of times, or None, got {type(self.exact).__name__}")
         a_control(self.control)
+        if self.jumps is not None:
+            found["jumps"] = tuple(np.atleast_1d(_checks.numbers("jumps", self.jumps, unit="units of time")).ravel().tolist())
+        if self.max_step is not None:
+            found["max_step"] = _checks.number("max_step", self.max_step, positive=True, unit="units of time")
         for name, value in (found | {"title": self.title or self.name}).items():
             object.__setattr__(self, name, value)
 
@@ -125,7 +135,8 @@ class Scene(Value):
             dt: the step, in units of time; the scene's if None.
             steps: number of steps; if None, the least number that reaches the horizon.
             **options: further arguments of ``stepwell.integrate``, such as ``every`` or ``backend``. ``control`` is the
-                scene's own if it is not given; ``control=None`` leaves it out.
+                scene's own if it is not given; ``control=None`` leaves it out. With ``tolerance`` steps are adaptive, to ``at``,
+                or to the horizon; ``dt`` is then the first step to try.
 
         Returns:
             A ``Run`` with blocks of shape (saved, *block).
@@ -141,9 +152,18 @@ class Scene(Value):
             raise ArgumentError(
                 f"{', '.join(given)}: expected the scene's own, which need not be given; for others there is stepwell.integrate"
             )
+        if "tolerance" in options or "at" in options:
+            asked: dict[str, Any] = {"control": self.control, "at": [self.horizon]} | self.adaptive_options | options
+            return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **asked)
         dt = self.dt if dt is None else dt
         steps = self.steps_for(dt) if steps is None else steps
         return integrate(self.system, method, v=self.v, y=self.y, dt=dt, steps=steps, **({"control": self.control} | options))
+
+    @property
+    def adaptive_options(self) -> dict[str, Any]:
+        """Its arguments of ``integrate`` that go with a tolerance."""
+        options = {"jumps": self.jumps, "max_step": self.max_step, "positive": self.positive}
+        return {name: value for name, value in options.items() if value is not None}
 
     def explore(self, *, methods: Any = None, show: bool = True) -> Explorer:
         """Show the scene in the browser: two methods side by side, with sliders for the step and the parameters.

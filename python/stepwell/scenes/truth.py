@@ -13,7 +13,6 @@ import numpy as np
 from .._checks import Array
 from ..errors import AccuracyWarning, ArgumentError, ToleranceWarning
 from ..integration import integrate
-from ..reference.adaptive import Pace
 from ..result import Run
 from .base import Scene
 
@@ -52,8 +51,9 @@ class Tight:
 
     def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCES[0], part: float = 1.0) -> None:
         self.scene, self.tolerance, self.part = replace(scene, control=None), tolerance, part
-        start = self._run(np.zeros(1), {"v": scene.v, "y": scene.y, "tolerance": tolerance}).resume
-        start["carry"] = _held_short(start["carry"], part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon)))
+        longest = part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon))
+        options = scene.adaptive_options | {"max_step": min(longest, scene.max_step or math.inf)}
+        start = self._run(np.zeros(1), {"v": scene.v, "y": scene.y, "tolerance": tolerance, **options}).resume
         #: Arguments to continue the run, each with the time from which it continues.
         self._on: list[tuple[float, dict[str, Any]]] = [(0.0, start)]
 
@@ -95,16 +95,6 @@ class Tight:
 
     def __hash__(self) -> int:
         return hash(self._arguments)
-
-
-def _held_short(pace: Array, longest: float) -> Array:
-    """Where a run with a tolerance stands, its steps no longer than ``longest`` from there on."""
-    pace = pace.copy()
-    for name, bound in (("h", longest), ("interval", longest)):
-        place = Pace._fields.index(name)
-        pace[place] = np.minimum(pace[place], bound)
-    pace[Pace._fields.index("until")] = np.inf
-    return pace
 
 
 def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:

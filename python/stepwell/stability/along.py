@@ -25,7 +25,7 @@ from . import eigen, maps
 from .eigen import Complex
 from .limit import Mode, stability_limit
 from .limit_digits import LADDER
-from .limit_search import GROWTH_EXPONENT, NEVER_STABLE_STEP, NUMBERS_AT_ONCE, PAST_LIMIT, Search
+from .limit_search import ELEMENTS_AT_ONCE, GROWTH_EXPONENT, NEVER_STABLE_STEP, PAST_LIMIT, Search
 from .parts import function_of_rates
 
 #: A real part below the first fraction of a state's fastest rate counts as zero, and so does a rate below the second.
@@ -244,7 +244,7 @@ def _by_trying(method: Method, A: Array, n_v: int) -> _Found:
     limits, rates = np.full(A.shape[2], np.inf), np.full(A.shape[2], np.nan, dtype=np.complex128)
     if not states.size:
         return _Found(limits, rates)
-    at_once = max(1, NUMBERS_AT_ONCE // len(A) ** 2)
+    at_once = max(1, ELEMENTS_AT_ONCE // len(A) ** 2)
     for k in range(0, len(states), at_once):
         some = states[k : k + at_once]
         limits[some], rates[some] = _Trials(method, A[:, :, some], n_v).limits(fastest[some])
@@ -263,7 +263,7 @@ class _Trials:
         P = maps.transition(self.system, self.method, dt)
         finish = maps.finish(self.system, self.method, dt, dt.shape)
         found = eigen.eigen(P, eigen.slot_units(finish, self.true.units))
-        rates = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), self.true)
+        rates = eigen.matched(found.values, eigen.product("ij...,jk...->ik...", finish, found.own), self.true)
         size = np.abs(self.true.values).max(axis=0)
         grows = rates.real > REAL_ZERO * size
         still = np.abs(rates) <= RATE_ZERO * size
@@ -312,7 +312,7 @@ def _mode(system: System, method: Method, A: Array, limit: float, rate: complex)
     dt = np.array([past])
     P, finish = maps.transition(linear, method, dt)[:, :, 0], maps.finish(linear, method, dt, (1,))[:, :, 0]
     found = eigen.eigen(P, eigen.slot_units(finish, true.units))
-    shapes = np.einsum("ij,jk->ik", finish, found.own)
+    shapes = eigen.product("ij,jk->ik", finish, found.own)
     continues = eigen.matched(found.values, shapes, true)
     near = np.minimum(np.abs(continues - rate), np.abs(continues - rate.conjugate()))
     ours = near <= near.min() + RATE_ZERO * np.abs(true.values).max()

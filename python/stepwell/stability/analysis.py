@@ -98,7 +98,7 @@ class Analysis(Value):
         else:
             true = eigen.eigen(A)
             found = eigen.eigen(P, eigen.slot_units(finish, true.units))
-            exact = eigen.matched(found.values, np.einsum("ij...,jk...->ik...", finish, found.own), true)
+            exact = eigen.matched(found.values, eigen.product("ij...,jk...->ik...", finish, found.own), true)
             z, tolerances, single_vector = eigen.settled(found)
             if system.linear and n <= MAX_ROWS:
                 doubtful = (found.tolerance() > eigen.REFINE_ABOVE).any(axis=0) & np.isfinite(z).all(axis=0)
@@ -182,7 +182,7 @@ class Analysis(Value):
             raise ArgumentError(f"monodromy: expected a run of which every step was saved (every=1), got {self._run!r}")
         product = self.P[:, :, 0]
         for k in range(1, self._run.steps):  # the last saved state makes no step in the run
-            product = np.einsum("ij...,jk...->ik...", self.P[:, :, k], product)
+            product = eigen.product("ij...,jk...->ik...", self.P[:, :, k], product)
         return product
 
     def plot(self, path: str | Path | None = None) -> Figure:
@@ -304,6 +304,8 @@ def analyse(
     if isinstance(at, Run):
         return _along(system, how, step, at)
     v, y = state("at", system, at, "or a run")
+    batches = {"dt and system": members, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    _checks.fits("at: the matrices", 8 * n * n, _checks.batch_shape(batches), "ask for fewer")
     P = maps.jacobian(system, how, step, t, v, y)
     none = np.zeros((n, 0, *P.shape[2:]))
     Q = none if not system.linear else maps.response(system, how, step, P.shape[2:])

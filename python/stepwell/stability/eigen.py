@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._checks import Array
+from .._interrupts import heard
 
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
@@ -18,6 +19,9 @@ EPS = float(np.finfo(np.float64).eps)
 
 #: Operations on matrices at once: some hundredths of a second, so that Ctrl-C is noticed in between.
 OPERATIONS_AT_ONCE = 2e6
+
+#: Operations for eigenvalues and eigenvectors of a matrix of n rows, about, over n³.
+OPERATIONS_OF_EIG = 25
 
 #: Up to so many rows an eigenvector is found by a singular value decomposition, which then takes some milliseconds.
 SVD_MAX_ROWS = 40
@@ -107,7 +111,8 @@ def eigen(matrix: Array, units: Array | None = None) -> Eigen:
     n, members = len(matrix), stacked.shape[:-2]
     each = stacked.reshape(-1, n, n)
     at_once = max(1, int(OPERATIONS_AT_ONCE / (n**3 + 200)))
-    found = [np.linalg.eig(each[k : k + at_once]) for k in range(0, len(each), at_once)]
+    work = OPERATIONS_OF_EIG * n**3
+    found = [heard(work, np.linalg.eig, each[k : k + at_once]) for k in range(0, len(each), at_once)]
     values, vectors = (np.concatenate([f[i] for f in found]) for i in range(2))
     values, vectors = values.reshape(*members, n), vectors.reshape(*members, n, n)
     # The positive angle of a pair first: LAPACK gives it so, and what is sorted later keeps it.
@@ -124,13 +129,13 @@ def vector(matrix: Array, value: complex) -> Complex:
         found = np.cos(1.7 * np.arange(n)) + 0.5j * np.sin(2.3 * np.arange(n))
         try:
             for _ in range(3):
-                found = np.linalg.solve(less, found)
+                found = heard(n**3, np.linalg.solve, less, found)
                 found /= np.sqrt((np.abs(found) ** 2).sum())
         except np.linalg.LinAlgError:
             found[:] = np.nan
         if np.isfinite(found).all():
             return np.asarray(units * found)
-    return np.asarray(units * np.linalg.svd(less)[2][-1].conj())
+    return np.asarray(units * heard(OPERATIONS_OF_EIG * n**3, np.linalg.svd, less)[2][-1].conj())
 
 
 def units_of(matrix: Array) -> Array:
@@ -162,6 +167,11 @@ def units_of(matrix: Array) -> Array:
     return units
 
 
+def product(subscripts: str, a: Any, b: Any) -> Any:
+    """Matrices times matrices, by ``einsum``, of all members."""
+    return heard(len(a) * max(a.size, b.size), np.einsum, subscripts, a, b)
+
+
 def slot_units(finish: Array, units: Array) -> Array:
     """Units of the slots whose states have these units, shape (n, *members): in both, what a slot makes of a state is at most 1.
 
@@ -181,11 +191,11 @@ def _conditions(vectors: Complex) -> Array:
     at_once = max(1, int(OPERATIONS_AT_ONCE / (len(vectors) ** 3 + 200)))
     for k in range(0, len(flat), at_once):
         try:
-            left[k : k + at_once] = np.linalg.inv(flat[k : k + at_once])
+            left[k : k + at_once] = heard(len(vectors) ** 3, np.linalg.inv, flat[k : k + at_once])
         except np.linalg.LinAlgError:  # one of many is enough
             for i, each in enumerate(flat[k : k + at_once], k):
                 try:
-                    left[i] = np.linalg.inv(each)
+                    left[i] = heard(len(vectors) ** 3, np.linalg.inv, each)
                 except np.linalg.LinAlgError:
                     continue
     left = left.reshape(stacked.shape)
@@ -219,7 +229,7 @@ def matched(values: Complex, states: Complex, exact: Eigen) -> Complex:
     with np.errstate(all="ignore"):
         states = states / exact.units[:, np.newaxis]
         states = states / np.sqrt((np.abs(states) ** 2).sum(axis=0))
-        overlap = np.abs(np.einsum("ij...,ik...->jk...", states.conj(), exact.vectors))
+        overlap = np.abs(product("ij...,ik...->jk...", states.conj(), exact.vectors))
     same_side = np.sign(values.imag)[:, np.newaxis] * np.sign(exact.values.imag)[np.newaxis]
     score = overlap + 1e-6 * same_side
     score = np.where(np.isfinite(score), score, 0.0)

@@ -12,17 +12,20 @@ computed in more digits (``exact``), on a ladder of wider rungs.
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from .. import _checks
+from .. import _checks, engine
 from .._brief import share
 from .._checks import Array, Shape
+from .._value import changed, complete
 from ..compatible import fits_together
 from ..derivatives import traced
 from ..errors import AccuracyWarning, UnsupportedError
+from ..events.members import Members
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..systems import LinearSystem, Springs, System
@@ -32,7 +35,7 @@ from . import exact, maps
 from .analysis import given_state, state
 from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
-from .limit_search import Search
+from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
 from .parts import parts
 from .small_motions import lifted, linearised
 
@@ -107,17 +110,53 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
             return _of_springs(system, method, v, y)
         if (motions := _linear_part(system, v, y, t)) is not None:
             return _reshaped(system, limit_of(motions, method))
-    search = Search(system, method, v, y, t) if not system.linear else Search(system, method, None, None, 0.0)
-    if system.linear and len(search.rates) > 2:
-        limits, grows, modes = _by_parts(search)
-    else:
-        limits, grows = search.limits()
-        modes = search.modes(grows)[0]
+    limits, grows, modes = _of_all(system, method, v, y, t, members)
     spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
     limits, grows, modes = spread
     if not limits.shape:
         return StabilityLimit(float(limits), modes[()], float(grows))
     return limits_of(limits, modes, grows)
+
+
+#: Numbers that the limit of a member takes beside the shape of its mode.
+NUMBERS_OF_A_LIMIT = 250
+
+
+def _of_all(
+    system: System, method: Method, v: Array | None, y: Array | None, t: float, members: Shape
+) -> tuple[Array, Array, Any]:
+    """The limits of all members, the smallest steps known to grow, and the modes; so many members at once as memory allows."""
+    if system.linear or v is None or y is None:
+        system, v, y, t, members = system.without_inputs(), None, None, 0.0, system.batch
+    n, count = sum(maps.size(system)), prod(members)
+    at_once = members_at_once(n)
+    beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(count, at_once)
+    _checks.fits("the limits", NUMBERS_OF_A_LIMIT + 4 * n, members, "ask for fewer, or of fewer states", beside=beside)
+    if count <= at_once:
+        return _of_some(Search(system, method, v, y, t))
+    every = Members(engine.Plan(system, method, members, 1.0))
+    limits, grows, modes = np.empty(count), np.empty(count), np.empty(count, dtype=object)
+    blocks = None
+    if v is not None and y is not None:
+        both = ((v, system.v_shape), (y, system.y_shape))
+        blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
+    for k in range(0, count, at_once):
+        some = np.arange(k, min(k + at_once, count))
+        own = every.plan(some).system
+        if blocks is None:
+            complete(own, without_inputs=partial(changed, own))  # it has none
+        else:
+            v, y = (block[..., some] for block in blocks)
+        limits[some], grows[some], modes[some] = _of_some(Search(own, method, v, y, t))
+    return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
+
+
+def _of_some(search: Search) -> tuple[Array, Array, Any]:
+    """The same of the members of a search."""
+    if search.v is None and len(search.rates) > 2:
+        return _by_parts(search)
+    limits, grows = search.limits()
+    return limits, grows, search.modes(grows)[0]
 
 
 def _linear_part(system: System, v: Array, y: Array, t: float) -> LinearSystem | None:

@@ -17,8 +17,12 @@ from .limit_digits import LADDER, RUNG_RATIO, in_many_digits, passes_zero
 from .limit_result import Mode
 from .parts import rates
 
-#: Rungs that are computed at once, and numbers of all members in them, so that Ctrl-C is noticed in between.
-RUNGS_AT_ONCE, NUMBERS_AT_ONCE = 64, 200_000
+#: Rungs that are computed at once, and elements of the matrices of all members in them, so that Ctrl-C is noticed in between and
+#: memory has room for them.
+RUNGS_AT_ONCE, ELEMENTS_AT_ONCE = 64, 1 << 18
+
+#: Numbers that a search keeps at a time for each element of a matrix: of steps, eigenvectors, their inverse, and what is between.
+NUMBERS_OF_AN_ELEMENT = 60
 
 #: An eigenvalue of the rates that is this small a part of the largest is zero: such a mode (a chain that floats freely) has an
 #: eigenvalue 1 with every method at every step, and does not count.
@@ -54,6 +58,11 @@ MEETING_TOLERANCE = 1e-3
 
 #: The unstable mode is computed this share past its limit; one that is never stable, at this step times the fastest rate.
 PAST_LIMIT, NEVER_STABLE_STEP = 1e-4, 0.1
+
+
+def members_at_once(n: int) -> int:
+    """How many members of n states are searched at once."""
+    return max(1, ELEMENTS_AT_ONCE // (n * n))
 
 
 class Search:
@@ -151,6 +160,11 @@ class Search:
         beyond, tolerance = (np.take_along_axis(a, at, axis=0)[0] for a in (beyond, tolerance))
         return beyond, tolerance, np.where(beyond > tolerance, 1, np.where(damp, -1, 0)), doubt
 
+    @property
+    def rungs_at_once(self) -> int:
+        """How many rungs are computed at once."""
+        return max(1, min(RUNGS_AT_ONCE, ELEMENTS_AT_ONCE // max(1, self.rates.size)))
+
     def limits(self) -> tuple[Array, Array]:
         """The limit of each member, and the smallest step known to grow: another one where rounding hides what is between."""
         fastest = np.where(self.fastest > 0.0, self.fastest, 1.0)
@@ -159,7 +173,7 @@ class Search:
         low, high = np.zeros(self.members), np.full(self.members, LADDER[-1]) / fastest
         crept, previous, before = np.zeros(self.members, dtype=bool), np.zeros(self.members), np.zeros(self.members, dtype=int)
         doubtful, sure = np.zeros(self.members, dtype=bool), np.zeros(self.members)
-        at_once = max(1, min(RUNGS_AT_ONCE, NUMBERS_AT_ONCE // max(1, first.size)))
+        at_once = self.rungs_at_once
         for start in range(0, none, at_once):
             rungs = LADDER[start : start + at_once].reshape(-1, *(1,) * len(self.members)) / fastest
             beyond, tolerance, side, doubt = self.growth(rungs)
@@ -208,7 +222,7 @@ class Search:
         """
         last = int(np.where(never, 0, np.minimum(first, len(LADDER) - 1)).max(initial=0))
         done = np.zeros(self.members, dtype=bool)
-        at_once = max(1, min(RUNGS_AT_ONCE, NUMBERS_AT_ONCE // max(1, first.size)))
+        at_once = self.rungs_at_once
         for start in range(0, last - 1, at_once):
             rungs = LADDER[start : min(start + at_once + 2, last + 1)].reshape(-1, *(1,) * len(self.members)) / fastest
             margins, tolerance = self.margins(rungs)
@@ -340,7 +354,7 @@ class Search:
         z, tolerance = self.eigenvalues(steps)
         finish = self.finish(steps)
         found = self.modes_of(self.matrix(steps), finish)
-        states = np.einsum("ij...,jk...->ik...", finish, found.own)[:, :, 1]
+        states = eigen.product("ij...,jk...->ik...", finish, found.own)[:, :, 1]
         exact = eigen.matched(found.values[:, 1], states, self.exact)
 
         modes, left = np.empty(self.members, dtype=object), np.ones(self.members, dtype=np.complex128)

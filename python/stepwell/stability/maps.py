@@ -23,6 +23,9 @@ from ..systems import System
 #: step, f'(x) = Im f(x + iε)/ε, have no truncation error.
 COMPLEX_STEP = 1e-200
 
+#: Numbers of states that are stepped at once: an operation with so many takes a millisecond.
+NUMBERS_AT_ONCE = 1 << 20
+
 
 def size(system: System) -> tuple[int, int]:
     """The number of components of each block."""
@@ -67,7 +70,7 @@ def jacobian(system: System, method: Method, dt: Array, t: float, v: Array, y: A
     slot = _started(system, method, dt, members, t, v, y) if method.carry else v
     if method.has_series or not system.complex_step:
         return traced.matrix(system, "step", method, members, slot, y, t, dt)[0]
-    s: Any = _scaled(system, dt, (sum(size(system)), *members))
+    s: Any = _scaled(system, dt, (1, *members))
     h: Any = float(dt) if dt.ndim == 0 else dt
     project: Callable[[Any, Any], Blocks] = getattr(s, "project", lambda v, y: (v, y))
     return _derivative(system, members, slot, y, lambda v, y: project(*method.steps.step(s, t, h, v, y)))
@@ -77,7 +80,7 @@ def rates(system: System, t: float = 0.0, v: Array | None = None, y: Array | Non
     """The matrix of the rates: A of a linear system, and otherwise their derivative at a state."""
 
     def both(v: Array, y: Array) -> Blocks:
-        s = _scaled(system, np.asarray(1.0), (sum(size(system)), *members))
+        s = _scaled(system, np.asarray(1.0), (1, *members))
         return s.dv(t, v, y), s.dy(t, v, y)
 
     if v is None or y is None:
@@ -107,19 +110,20 @@ def finish(
     slot = _started(system, method, dt, members, t, v, y)
     if not system.complex_step:
         return traced.matrix(system, "finish", method, members, slot, y, t, dt)[0]
-    s = _scaled(system, dt, (n, *members))
+    s = _scaled(system, dt, (1, *members))
     return _derivative(system, members, slot, y, lambda slot, y: (method.steps.finish(s, 0, t, slot, y), y))
 
 
 def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
     """The carry of a method, where each member may have its own step."""
-
-    def spread(block: Array, shape: Shape) -> Array:
-        own = block.shape[len(shape) :]
-        return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
-
-    v, y = spread(v, system.v_shape), spread(y, system.y_shape)
+    v, y = spread(v, system.v_shape, members), spread(y, system.y_shape, members)
     return method.steps.start(_scaled(system, dt, members), 0, t, v, y)
+
+
+def spread(block: Array, shape: Shape, members: Shape) -> Array:
+    """A block, of this shape for each member, over all members."""
+    own = block.shape[len(shape) :]
+    return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
 
 
 def unit(system: System, members: Shape) -> tuple[Array, Array]:
@@ -154,15 +158,26 @@ def together(system: System, dt: Array, v: Array, y: Array) -> Shape:
 
 
 def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[[Any, Any], Blocks]) -> Array:
-    """The derivative of a function of both blocks by the complex step, in the direction of each number of a state."""
+    """The derivative of a function of both blocks by the complex step, in the direction of each number of a state.
+
+    Directions lie along the axis after the blocks'. Some are taken at once, so that memory has room for them and Ctrl-C is heard.
+    """
     n = sum(size(system))
 
     def seeded(block: Array, shape: Shape, direction: Array) -> Any:
         own = block.shape[len(shape) :]
         aligned = block.reshape(*shape, 1, *(1,) * (len(members) - len(own)), *own)
-        return np.broadcast_to(aligned, (*shape, n, *members)) + 1j * COMPLEX_STEP * direction
+        return np.broadcast_to(aligned, direction.shape) + 1j * COMPLEX_STEP * direction
 
     unit_v, unit_y = unit(system, members)
-    with np.errstate(all="ignore"):
-        found = rows(system, *f(seeded(v, system.v_shape, unit_v), seeded(y, system.y_shape, unit_y)))
-        return np.asarray(found.imag / COMPLEX_STEP)
+    derivative = np.empty((n, n, *members))
+    at_once = max(1, NUMBERS_AT_ONCE // max(1, n * prod(members)))
+    for k in range(0, n, at_once):
+        some = slice(k, k + at_once)
+        along_v, along_y = (
+            each[(slice(None),) * len(shape) + (some,)] for each, shape in ((unit_v, system.v_shape), (unit_y, system.y_shape))
+        )
+        with np.errstate(all="ignore"):
+            made = rows(system, *f(seeded(v, system.v_shape, along_v), seeded(y, system.y_shape, along_y)))
+            derivative[:, some] = made.imag / COMPLEX_STEP
+    return derivative

@@ -9,8 +9,10 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array
-from ..adaptive_runs import MAX_ABSOLUTE_SHARE, WHY_STOPPED, lost_in_tolerance, order_of_series
-from ..engine import PACE_NUMBERS, pace_of
+from .._runs import goes_with_times
+from .._stops import WHY_STOPPED
+from ..adaptive_runs import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
+from ..engine import PACE_NUMBERS
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..method_records import Method
 from ..result import Run, Status
@@ -58,7 +60,13 @@ class _Evaluations(Reduction):
 
 
 def arguments(
-    grid: Grid, method: Method, tolerance: Any, at: Any, max_steps: Any, fixed: Mapping[str, Any], outcomes: Iterable[Outcome]
+    grid: Grid,
+    method: Method,
+    tolerance: Any,
+    at: Any,
+    options: Mapping[str, Any],
+    fixed: Mapping[str, Any],
+    outcomes: Iterable[Outcome],
 ) -> tuple[dict[str, Any], Array]:
     """Further arguments of ``integrate``, and the times.
 
@@ -67,7 +75,7 @@ def arguments(
         method: by which they are computed.
         tolerance: as the user gave it; None if it is an axis.
         at: as the user gave it.
-        max_steps: likewise.
+        options: what goes with a tolerance only, by name; None if it was not given.
         fixed: what goes with fixed steps only, by name; None if it was not given.
         outcomes: what is kept.
 
@@ -89,13 +97,22 @@ def arguments(
         if axis.own:
             raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
         order_of_series(method, axis.values)
-    if at is None or (tolerance is None and "tolerance" not in varied):
-        raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
+    goes_with_times(tolerance is not None or "tolerance" in varied, at)
     times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
+    if times.ndim > 1:
+        raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
     _fits_outcomes(outcomes, times)
     given = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
-    if max_steps is not None:
-        given["max_steps"] = _checks.count("max_steps", max_steps, 1)
+    if options["max_steps"] is not None:
+        given["max_steps"] = _checks.count("max_steps", options["max_steps"], 1)
+    if options["max_step"] is not None:
+        given["max_step"] = _checks.number("max_step", options["max_step"], positive=True, unit="units of time")
+    if options["jumps"] is not None:
+        given["jumps"] = jumps = np.atleast_1d(_checks.numbers("jumps", options["jumps"], unit="units of time"))
+        if jumps.ndim > 1:
+            raise ShapeError(f"jumps: expected times along one axis, the same for all members, got shape {jumps.shape}")
+    if options["positive"] is not None:
+        given["positive"] = options["positive"]
     return given, times
 
 
@@ -115,10 +132,8 @@ def _one_for_all(tolerance: Any) -> Any:
 def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
     for each in outcomes:
         name = type(each).__name__
-        if isinstance(each, Exponents):
-            raise UnsupportedError(
-                "outcomes: Exponents: Lyapunov exponents are those of fixed steps; give dt= and steps= in place of tolerance="
-            )
+        if isinstance(each, Exponents) and each.transient >= times.size:
+            raise ArgumentError(f"transient: expected fewer intervals than at has times, {times.size}, got {each.transient}")
         if each.observes and times.size < 2:
             raise ArgumentError(
                 f"at: expected two or more times, since with a tolerance {name} sees the states at these times and no others, "
@@ -126,10 +141,12 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
             )
 
 
-def refuse_fixed(outcomes: Iterable[Outcome], max_steps: Any) -> None:
+def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
     """Raise if something was given that goes with a tolerance only."""
-    if max_steps is not None:
+    if options["max_steps"] is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
+    if wrong := [name for name, value in options.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: goes with tolerance= and at= only; steps of fixed length are dt long")
     if any(isinstance(each, Evaluations) for each in outcomes):
         raise UnsupportedError(
             "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "
@@ -141,7 +158,8 @@ def lost(run: Run) -> int:
     """How many members have an absolute tolerance so large that the motion is lost in it."""
     if run.stand is None:
         return 0
-    return int(np.count_nonzero(lost_in_tolerance(pace_of(run.stand.pace, run.status.shape))))
+    groups = len(run.stand.pace) - PACE_NUMBERS
+    return int(np.count_nonzero(lost_in_tolerance(run.stand.pace, groups)))
 
 
 def why(status: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import product
 from math import prod
 from typing import Any, NamedTuple
 
@@ -112,7 +111,7 @@ class Grid:
         """All members in chunks of that shape, in their order; those at an end may be smaller."""
         counts = [-(-size // width) for size, width in zip(self.shape, shape, strict=True)]
         first = 0
-        for place in product(*map(range, counts)):
+        for place in np.ndindex(*counts):
             bounds = [(i * width, min((i + 1) * width, size)) for i, width, size in zip(place, shape, self.shape, strict=True)]
             chunk = Chunk(place, tuple(slice(*each) for each in bounds), tuple(b - a for a, b in bounds), first)
             yield chunk

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,11 @@ from ..systems import System
 from .observed import Of, Piece, checked, name_of, possible, rates
 from .outcomes import Found, Outcome, Reduction, Variable, called
 
-#: The ways in which a level is passed.
-DIRECTIONS = ("rising", "falling", "both")
+if TYPE_CHECKING:
+    from .._words import Direction
+
+#: The directions in words.
+WORDS = {number: word for word, number in _checks.DIRECTIONS.items()}
 #: Halvings of an interval: what is left of it is below the spacing of its numbers.
 HALVINGS = 53
 
@@ -27,11 +30,11 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 class _Passages(Outcome):
     """Of a level."""
 
-    def __init__(self, of: Any = "y", level: float = 0.0, direction: str = "rising", *, name: str | None = None) -> None:
+    def __init__(self, of: Any = "y", level: float = 0.0, direction: int | Direction = 1, *, name: str | None = None) -> None:
         self.of: Of = checked(of)
         self.name = called(name, self.of) or name_of(self.of)
         self.level = _checks.number("level", level)
-        self.direction: str = _checks.known("direction", direction, DIRECTIONS)
+        self.direction = _checks.direction("direction", direction)
 
     def check(self, system: System) -> None:
         """Raise if the system has no such number."""
@@ -57,11 +60,11 @@ class Crossing(_Passages):
         of: "v" or "y", a component such as ("y", 0), a quantity such as "energy", or a function f(t, v, y) of states, whose v
             and y have the shape (*block, states, members).
         level: in the units of the quantity.
-        direction: "rising", "falling" or "both".
+        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
         name: of the results, in place of what they are of.
 
     Example:
-        >>> quarter = sw.sweeps.Crossing("y", direction="falling")
+        >>> quarter = sw.sweeps.Crossing("y", direction=-1)
         >>> axes = {"omega": ("omega", [1.0, 2.0])}
         >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=200, outcomes=quarter)
         >>> found.y_crossing.values.round(6)
@@ -77,12 +80,12 @@ class Period(_Passages):
     """The mean time between passages of a level in one direction, ``y_period``, and their number, ``y_passages``.
 
     It is the time from the first to the last, divided by the number of intervals between them; NaN if there are fewer than two.
-    Times are those of ``Crossing``. A direction "both" gives the half of a symmetric oscillation's period.
+    Times are those of ``Crossing``. A direction 0 gives the half of a symmetric oscillation's period.
 
     Args:
         of: as for ``Crossing``.
         level: in the units of the quantity.
-        direction: "rising", "falling" or "both".
+        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
         name: of the results, in place of what they are of.
 
     Example:
@@ -143,7 +146,7 @@ class _States:
         a, b = self.value[:-1], self.value[1:]
         rising, falling = (a < 0.0) & (b >= 0.0), (a > 0.0) & (b <= 0.0)
         #: Whether the level is passed after each state but the last, shape (states − 1, members).
-        self.mask: Mask = {"rising": rising, "falling": falling, "both": rising | falling}[outcome.direction]
+        self.mask: Mask = {1: rising, -1: falling, 0: rising | falling}[outcome.direction]
 
     def times(self, k: Whole, members: Mask) -> Array:
         """When those members pass the level after the state k, shape (members,); NaN for the others."""
@@ -196,7 +199,7 @@ class _Crossing(_Seeing):
 
     def found(self) -> Found:
         name = self.outcome.name
-        about = f"first time at which {name} passes {self.outcome.level:g}, {self.outcome.direction}"
+        about = f"first time at which {name} passes {self.outcome.level:g}, {WORDS[self.outcome.direction]}"
         assert self.time is not None
         return {f"{name}_crossing": Variable((), self.time, about, "t")}
 
@@ -223,7 +226,7 @@ class _Period(_Seeing):
         assert self.first is not None
         with np.errstate(all="ignore"):
             period = np.where(self.count > 1, (self.last - self.first) / (self.count - 1), np.nan)
-        about = f"mean time between passages of {name} through {self.outcome.level:g}, {self.outcome.direction}"
+        about = f"mean time between passages of {name} through {self.outcome.level:g}, {WORDS[self.outcome.direction]}"
         return {
             f"{name}_period": Variable((), period, about, "t"),
             f"{name}_passages": Variable((), np.asarray(self.count), f"how many passages of {name} were seen"),

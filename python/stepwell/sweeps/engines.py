@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from typing import Any
 
 from .. import _checks
+from .._interrupts import available
 from ..errors import ArgumentError, DTypeError
 from .axes import Chunk, Grid
 from .portable import packed, sweep_chunk
@@ -36,13 +36,13 @@ class Engine:
         self.here = engine is None
         self._executor: Any = None
         if engine is None:
-            self.workers = len(_cores()) if threads is None else _checks.count("threads", threads, 1, 4096)
+            self.workers = available() if threads is None else _checks.count("threads", threads, 1, 4096)
             return
         if threads is not None:
             raise ArgumentError("threads: goes with threads of this process only, and engine= was given")
         if isinstance(engine, Executor):
             self._executor = engine
-            self.workers = int(getattr(engine, "_max_workers", 0) or len(_cores()))
+            self.workers = int(getattr(engine, "_max_workers", 0) or available())
         elif hasattr(engine, "get_executor") and hasattr(engine, "nthreads"):  # a client of Dask
             self._executor = engine.get_executor(pure=False)
             self.workers = max(1, sum(engine.nthreads().values()))
@@ -54,7 +54,7 @@ class Engine:
 
     def compute(self, task: Task, grid: Grid, chunks: Iterable[Chunk]) -> Iterator[tuple[Chunk, Done]]:
         """What is found of each chunk, as they end. If it is closed early, chunks that have begun are stopped or awaited."""
-        if not self.here:
+        if not isinstance(self._executor, ThreadPoolExecutor | None):
             package = packed(task)
             yield from self._all(chunks, lambda chunk: self._executor.submit(sweep_chunk, package, grid.values(chunk), chunk))
             return
@@ -63,12 +63,13 @@ class Engine:
         def of(chunk: Chunk) -> tuple[Chunk, Done]:
             return chunk, run(task, grid.values(chunk), chunk.members, stop.is_set)
 
-        pool = ThreadPoolExecutor(self.workers, thread_name_prefix="sweep")
+        pool: Any = ThreadPoolExecutor(self.workers, thread_name_prefix="sweep") if self.here else self._executor
         try:
             yield from self._all(chunks, lambda chunk: pool.submit(of, chunk))
         finally:
             stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
+            if self.here:
+                pool.shutdown(wait=True, cancel_futures=True)
 
     def _all(self, chunks: Iterable[Chunk], submit: Submit) -> Iterator[tuple[Chunk, Done]]:
         waiting = iter(chunks)
@@ -85,10 +86,3 @@ class Engine:
         finally:
             for each in under_way:
                 each.cancel()
-
-
-def _cores() -> list[int]:
-    """The cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return sorted(os.sched_getaffinity(0))
-    return list(range(os.cpu_count() or 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
@@ -72,6 +72,9 @@ def sweep(
     tolerance: Any = None,
     at: Any = None,
     max_steps: int | None = None,
+    max_step: float | None = None,
+    jumps: Any = None,
+    positive: Any = None,
     control: AnyControl | None = None,
     force: Any = None,
     fused: bool = False,
@@ -118,6 +121,9 @@ def sweep(
         at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
             reductions see the states at these times and no others. Not with ``transient``, ``every`` or ``observe``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
+        max_step: with a tolerance, the longest step, in units of time.
+        jumps: with a tolerance, times that no step crosses, shape (jumps,): as for ``integrate``, the same for all members.
+        positive: with a tolerance, the components that must not become negative, as for ``integrate``.
         control: as for ``integrate``, the same for all members.
         force: likewise.
         fused: likewise.
@@ -173,10 +179,11 @@ def sweep(
     times = None
     if paced:
         others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
-        more, times = adaptive.arguments(grid, how, tolerance, at, max_steps, others, kept_of_each)
+        options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
+        more, times = adaptive.arguments(grid, how, tolerance, at, options, others, kept_of_each)
         given |= more
     else:
-        adaptive.refuse_fixed(kept_of_each, max_steps)
+        adaptive.refuse_fixed(kept_of_each, {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive})
         if steps is None:
             raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(
@@ -191,10 +198,15 @@ def sweep(
         memory=_checks.number("memory", memory, positive=True, unit="bytes"),
         at=times,
     )
-    first, bits = _probe(task, grid)
+    first, bits, names = _probe(task, grid)
     workers = Engine(engine, threads)
     shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk))
     layout = layout_of(task, grid, first, bits, named)
+    if taken := sorted(names & {*layout.coords, *grid.dims}):
+        raise ArgumentError(
+            f'axes: {taken[0]!r} is the name of a result; give the dimension another name, as ("run", values), or '
+            f"the outcome one by name="
+        )
     where = store_of(store)
     kept = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
     _compute(task, grid, workers, kept, _checks.flag("progress", progress))
@@ -251,18 +263,18 @@ def _outcomes(given: Any, every: int | None) -> tuple[Outcome, ...]:
     return tuple(found)
 
 
-def _probe(task: Task, grid: Grid) -> tuple[System, str]:
-    """The system of the first member, and a hash of what the first steps of the first and the last member compute."""
+def _probe(task: Task, grid: Grid) -> tuple[System, str, set[str]]:
+    """The system of the first member, a hash of the first steps of the first and the last member, and names of results."""
     digest = blake2b(digest_size=8)
     for member in dict.fromkeys((0, grid.members - 1)):
         index = np.unravel_index(member, grid.shape)
         one = Chunk(tuple(map(int, index)), tuple(slice(int(i), int(i) + 1) for i in index), (1,) * len(index), member)
-        system, state = probed(task, grid.values(one))
-        for block in state:
+        found = probed(task, grid.values(one))
+        for block in found.state:
             digest.update(np.where(np.isnan(block), np.nan, block).tobytes())
         if member == 0:
-            first = system
-    return first, digest.hexdigest()
+            first = found
+    return first.system, digest.hexdigest(), first.names
 
 
 def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | None) -> int:
@@ -283,12 +295,15 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
 def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progress: bool) -> None:
     """Compute every chunk that is not finished, and keep what is found."""
     done, tally = 0, _Tally(grid, task)
-    waiting = []
-    for chunk in grid.chunks(kept.chunk_shape):
-        if kept.finished(chunk):
-            done += chunk.members
-        else:
-            waiting.append(chunk)
+
+    def unfinished() -> Iterator[Chunk]:  # one after the other, for there may be more than memory has room for
+        nonlocal done
+        for chunk in grid.chunks(kept.chunk_shape):
+            if kept.finished(chunk):
+                done += chunk.members
+            else:
+                yield chunk
+
     if progress:
         from .._progress import bar
 
@@ -296,7 +311,7 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
     else:
         shown = nullcontext(None)
     with shown as told:
-        found = engine.compute(task, grid, waiting)
+        found = engine.compute(task, grid, unfinished())
         try:
             for chunk, each in found:
                 kept.write(chunk, each.found)

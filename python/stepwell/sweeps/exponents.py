@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from .. import _checks
+from .._checks import Array
 from ..errors import ArgumentError
 from ..systems import System
 from .outcomes import Found, Outcome, Variable
@@ -15,12 +17,13 @@ from .outcomes import Found, Outcome, Variable
 class Exponents(Outcome):
     """The largest Lyapunov exponents, ``lyapunov``, by ``stepwell.lyapunov`` over the steps after the transient.
 
-    NumPy makes the steps and their derivatives here, some hundred times slower than ``integrate``. Not with ``control``,
-    ``force``, ``fused``, ``start`` or float32.
+    Not with ``control``, ``force``, ``fused``, ``start`` or float32.
 
     Args:
         exponents: how many, or "all".
-        every: steps from one orthonormalisation to the next.
+        every: steps from one orthonormalisation to the next. With a tolerance, these are at the times of ``at``.
+        transient: with a tolerance, the number of intervals between these times that are left out, of which the first begins at
+            ``t0``. With fixed steps those of the sweep's ``transient`` are.
 
     Example:
         >>> axes = {"damping": ("damping", [0.1, 0.2])}
@@ -32,21 +35,36 @@ class Exponents(Outcome):
 
     observes = False
 
-    def __init__(self, exponents: int | str = 1, every: int = 10) -> None:
+    def __init__(self, exponents: int | str = 1, every: int = 10, transient: int = 0) -> None:
         if isinstance(exponents, str):
             _checks.known("exponents", exponents, ("all",))
         else:
             exponents = _checks.count("exponents", exponents, 1)
         self.exponents, self.every = exponents, _checks.count("every", every, 1)
+        self.transient = _checks.count("transient", transient, 0)
 
-    def of_start(self, system: System, method: str, given: dict[str, Any], transient: int, steps: int) -> Found:
-        """Of members that start so."""
-        from ..dynamics import lyapunov
+    def of_start(
+        self,
+        system: System,
+        method: str,
+        given: dict[str, Any],
+        transient: int,
+        steps: int,
+        look: Callable[[], object],
+        at: Array | None = None,
+    ) -> Found:
+        """Of members that start so; ``look`` is called now and then, and may raise. ``at`` has the times, with a tolerance."""
+        from ..dynamics.exponents import adaptive_averages, averages
 
         if refused := [name for name in ("control", "dtype", "force", "fused", "start") if given.get(name)]:
             raise ArgumentError(f"{', '.join(refused)}: goes without Lyapunov exponents, which are those of plain steps")
-        start = {name: given[name] for name in ("v", "y", "dt", "t0") if name in given}
-        found = lyapunov(system, method, steps=steps, transient=transient, exponents=self.exponents, every=self.every, **start)
+        more: dict[str, Any] = {"exponents": self.exponents, "t0": given["t0"], "keep_history": False, "look": look, "threads": 1}
+        v, y, dt = given.get("v"), given["y"], given.get("dt")
+        if at is None:
+            found = averages(system, method, v, y, dt, steps, transient=transient, every=self.every, **more)
+        else:
+            more |= {"dt": dt, "max_steps": given.get("max_steps"), "transient": self.transient}
+            found = adaptive_averages(system, method, v, y, given["tolerance"], at, **more)
         return {
             "lyapunov": Variable(
                 ("exponent",), np.array(found.exponents), "Lyapunov exponents per unit of time, the largest first"

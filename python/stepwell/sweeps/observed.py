@@ -80,6 +80,9 @@ def checked(what: Any) -> Of:
     if isinstance(what, tuple):
         if len(what) < 2 or what[0] not in ("v", "y"):
             raise ArgumentError(f"of: expected a component such as ('y', 0), got {_checks.short(what)}")
+        if nested := [each for each in what[1:] if isinstance(each, (tuple, list))]:
+            right = (what[0], *nested[0])
+            raise ArgumentError(f"of: expected a component of a block with several axes as {right}, got {_checks.short(what)}")
         return (what[0], *(_checks.count("of", each, 0) for each in what[1:]))
     if isinstance(what, str) or callable(what):
         found: Of = what
@@ -102,7 +105,9 @@ def possible(what: Of, system: System) -> None:
     if isinstance(what, tuple):
         shape = shapes[what[0]]
         if len(what) - 1 != len(shape) or any(i >= n for i, n in zip(what[1:], shape, strict=True)):
-            raise ShapeError(f"of: expected a component of {what[0]}, whose shape is {shape}, got {what}")
+            places = ("row", "column", "layer")[: len(shape)] if len(shape) < 4 else range(len(shape))
+            like = ", ".join((f'"{what[0]}"', *map(str, places)))
+            raise ShapeError(f"of: a component of {what[0]} of shape {shape} is ({like}), got {what}")
 
 
 def block_dims(system: System, block: str) -> tuple[str, ...]:

@@ -221,6 +221,10 @@ class Mean(_Several):
         return _Mean(self)
 
 
+#: So many numbers of states are added up at once.
+NUMBERS_AT_ONCE = 1 << 16
+
+
 class _Mean(Reduction):
     def __init__(self, outcome: Mean) -> None:
         self.outcome = outcome
@@ -231,17 +235,25 @@ class _Mean(Reduction):
     def see(self, piece: Piece) -> None:
         self.run = piece.run
         all_of = [piece.of(what) for what in self.outcome.whats(piece.run)]
-        # State after state, so that the order of the sum does not depend on the piece.
-        for k, t in enumerate(piece.t.tolist()):
-            now = [np.asarray(each[k], np.float64) for each in all_of]
-            if not self.before:
-                self.sums, self.begin = [np.zeros(each.shape) for each in now], t
-            else:
-                half = 0.5 * (t - self.t)
-                for total, old, new in zip(self.sums, self.before, now, strict=True):
-                    total += half * (old + new)
-            self.before, self.t = now, t
-        self.before = [each.copy() for each in self.before]  # not the whole piece
+        first = 0 if self.before else 1
+        if first:
+            now = [np.asarray(each[0], np.float64) for each in all_of]
+            self.sums, self.before, self.begin = [np.zeros(each.shape) for each in now], now, float(piece.t[0])
+            self.t = self.begin
+        # Some states at once: a chunk of few members has many of them.
+        at_once = max(1, NUMBERS_AT_ONCE // max(1, *(each[:1].size for each in all_of)))
+        for k in range(first, len(piece.t), at_once):
+            self._add(piece.t[k : k + at_once], [each[k : k + at_once] for each in all_of])
+
+    def _add(self, t: Array, all_of: list[Array]) -> None:
+        half = 0.5 * np.diff(t, prepend=self.t)
+        for i, states in enumerate(all_of):
+            now = np.concatenate([self.before[i][np.newaxis], states], dtype=np.float64)
+            terms = half.reshape(-1, *(1,) * (now.ndim - 1)) * (now[:-1] + now[1:])
+            # State after state, so that the order of the sum does not depend on the piece.
+            self.sums[i] = np.add.accumulate(np.concatenate([self.sums[i][np.newaxis], terms]), axis=0)[-1].copy()
+            self.before[i] = now[-1].copy()
+        self.t = float(t[-1])
 
     def found(self) -> Found:
         time, found = self.t - self.begin, {}
@@ -352,7 +364,7 @@ class Function(Outcome):
             if isinstance(given, tuple):
                 dims, given = given
                 dims = (dims,) if isinstance(dims, str) else tuple(dims)
-            values = np.asarray(given)
+            values = _checks.as_array(f"outcomes: {name}", given)
             if values.dtype.kind not in "biuf":
                 raise ArgumentError(f"outcomes: {name}: expected numbers, got an array of dtype {values.dtype}")
             if values.ndim == 0 or values.shape[-1] != run.status.size:

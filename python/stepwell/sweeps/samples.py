@@ -31,6 +31,7 @@ def random(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
         ('sample', (1000,), 'random, PCG64, seed 7')
     """
     count, seed = _checks.count("count", count, 1), _checks.count("seed", seed, 0)
+    _fits(count, ranges)
     unit = np.random.Generator(np.random.PCG64(seed)).random((count, len(ranges)))
     return _placed(dim, unit, ranges, f"random, PCG64, seed {seed}")
 
@@ -59,6 +60,7 @@ def sobol(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
         True
     """
     count, seed = _checks.count("count", count, 1), _checks.count("seed", seed, 0)
+    _fits(count, ranges)
     if count & (count - 1):
         raise ArgumentError(f"count: expected a power of two for Sobol's sequence, got {count}; {1 << count.bit_length()} is one")
     qmc = need("scipy.stats.qmc")
@@ -70,6 +72,11 @@ def sobol(dim: str, count: int, *, seed: int, **ranges: Any) -> dict[str, Any]:
         sequence = qmc.Sobol(len(ranges) or 1, scramble=True, seed=rng)
     unit = sequence.random_base2(count.bit_length() - 1)
     return _placed(dim, unit, ranges, f"Sobol, scrambled, seed {seed}")
+
+
+def _fits(count: int, ranges: dict[str, Any]) -> None:
+    """Raise unless there is room for the samples as they are drawn, as they are placed, and for what both need in between."""
+    _checks.fits("count: the samples", 4 * len(ranges), (count,), "take fewer")
 
 
 def _placed(dim: Any, unit: Array, ranges: dict[str, Any], how: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from .. import _checks
 from .._checks import Array, Shape
-from ..errors import ArgumentError, TooLargeError
+from ..errors import ArgumentError, ShapeError, TooLargeError
 from .axes import Chunk
 from .extras import need
 from .layout import Layout, Planned, along_dims, hash_of_all, hash_of_chunk
@@ -26,12 +27,16 @@ SWEEP, CHUNK_SHAPE, BITS = "sweep", "chunk_shape", "bits"
 #: And, for xarray, which arrays are coordinates, and the order of the others.
 COORDINATES, RESULTS = "coordinates", "results"
 
+#: How each member ended takes a byte, when it did eight more; and there is at least one result.
+LEAST_NUMBERS = 17 / 8
+
 
 class Memory:
     """Arrays of this process."""
 
     def __init__(self, layout: Layout, chunk_shape: Shape) -> None:
         self.layout, self.chunk_shape = layout, chunk_shape
+        _checks.fits("axes: status and results", LEAST_NUMBERS, layout.grid.shape, "give store=, a folder on disk")
         self.arrays: dict[str, Array] = {}
         self.about: dict[str, Planned] = {}
 
@@ -86,14 +91,39 @@ class Zarr:
                 f"which is something else ({type(error).__name__}: {error})"
             ) from None
         same_sweep(self.path, there, json.loads(self.layout.attrs[SWEEP]))
+        self._check(group)
         return group
+
+    def _check(self, group: Any) -> None:
+        """Raise unless every array is there, of the shape that it was made with."""
+        sizes, attrs = self.layout.grid.shape, dict(group.attrs)
+        try:
+            shapes = {PROGRESS: (), f"{PROGRESS}/{HASHES}": _counts(sizes, attrs[CHUNK_SHAPE])} | dict.fromkeys(
+                attrs[RESULTS], sizes
+            )
+            shapes |= {name: values.shape for name, (_, values, _) in self.layout.coords.items()}
+        except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+            raise self._torn("the group", error) from None
+        for name, shape in shapes.items():
+            try:
+                there = getattr(group[name], "shape", ())
+                if there[: len(shape)] != shape:
+                    raise ShapeError(f"expected {shape}, got {there}")
+            except Exception as error:  # of torn metadata every part of zarr says something else
+                raise self._torn(name, error) from None
+
+    def _torn(self, what: str, error: Exception) -> ArgumentError:
+        return ArgumentError(
+            f"store: {_checks.short(str(self.path), _checks.PATH)} is of this sweep, but the metadata of {what} is torn "
+            f"({type(error).__name__}: {error}); remove it, or give another path"
+        )
 
     def finished(self, chunk: Chunk) -> bool:
         """Whether the results of a chunk are there and whole."""
         if self.group is None:
             return False
         try:
-            told = int(self.group[PROGRESS][HASHES][chunk.place])
+            told = int(self.group[f"{PROGRESS}/{HASHES}"][chunk.place])
             return told != 0 and hash_of_chunk(self._read(chunk)) == told
         except Exception:  # a torn file is an error of its codec, of which each has its own
             return False
@@ -103,16 +133,36 @@ class Zarr:
 
     def write(self, chunk: Chunk, found: Found) -> None:
         """Write the results of a chunk, and then that it is finished."""
-        if self.group is None:
-            self._create(self.layout.arrays(found))
-        arrays = along_dims(found, chunk)
-        for name, values in arrays.items():
-            self.group[name][chunk.slices] = values
-        self.group[PROGRESS][HASHES][chunk.place] = hash_of_chunk(arrays)
+        with self._disk():
+            if self.group is None:
+                self._create(self.layout.arrays(found))
+            arrays = along_dims(found, chunk)
+            for name, values in arrays.items():
+                self.group[name][chunk.slices] = values
+            self.group[f"{PROGRESS}/{HASHES}"][chunk.place] = hash_of_chunk(arrays)
+
+    @contextmanager
+    def _disk(self) -> Iterator[None]:
+        """What a disk cannot take is told with the path; of a store that could not be made nothing is left."""
+        try:
+            yield
+        except OSError as error:
+            kept = "there was nothing to keep" if self.group is None else "the chunks that are done are kept"
+            raise ArgumentError(
+                f"store: {_checks.short(str(self.path), _checks.PATH)} cannot be written: {error.strerror or error}; {kept}: "
+                f"make room and call again, or give another path"
+            ) from error
+        finally:
+            if self.group is None:
+                shutil.rmtree(self._beside, ignore_errors=True)
+
+    @property
+    def _beside(self) -> Path:
+        return self.path.with_name(f".{self.path.name}.new")
 
     def _create(self, arrays: dict[str, Planned]) -> None:
         """Make the store in a folder beside its path and move it there when it is whole."""
-        beside = self.path.with_name(f".{self.path.name}.new")
+        beside = self._beside
         if beside.exists():
             shutil.rmtree(beside)
         group = self._zarr.open_group(beside, mode="w", zarr_format=3)
@@ -132,7 +182,7 @@ class Zarr:
                 dimension_names=each.dims,
                 attributes=each.attrs,
             )
-        counts = tuple(-(-size // width) for size, width in zip(self.layout.grid.shape, self.chunk_shape, strict=True))
+        counts = _counts(self.layout.grid.shape, self.chunk_shape)
         progress = group.create_group(PROGRESS)
         progress.create_array(HASHES, shape=counts, chunks=(1,) * len(counts), dtype="uint64", fill_value=0, compressors=None)
         os.replace(beside, self.path)
@@ -145,8 +195,14 @@ class Zarr:
     def finish(self) -> Any:
         """The dataset of all results, which are read from the store when they are used."""
         if BITS not in self.group.attrs:
-            self.group.attrs[BITS] = hash_of_all(self._chunks())
+            with self._disk():
+                self.group.attrs[BITS] = hash_of_all(self._chunks())
         return opened(self.path)
+
+
+def _counts(sizes: Shape, widths: Shape) -> Shape:
+    """How many chunks of that shape there are along each dimension."""
+    return tuple(-(-size // width) for size, width in zip(sizes, widths, strict=True))
 
 
 class NetCDF(Zarr):
@@ -167,6 +223,8 @@ class NetCDF(Zarr):
                     f"something else ({type(error).__name__}: {error})"
                 ) from None
             same_sweep(path, told, json.loads(layout.attrs[SWEEP]))
+        else:
+            _room(path, layout.grid.members * int(8 * LEAST_NUMBERS))
         unfinished = path.with_name(f"{path.name}.unfinished")
         if self.whole and unfinished.exists():  # its removal was interrupted
             shutil.rmtree(unfinished)
@@ -217,8 +275,11 @@ def same_sweep(path: Path, there: dict[str, Any], asked: dict[str, Any]) -> None
     names = [name for name in {**there, **asked} if there.get(name) != asked.get(name)]
     if names:
         told = "; ".join(
-            f"{name}: {_checks.short(there.get(name), 60)} there, {_checks.short(asked.get(name), 60)} asked for"
+            "the equations are others: their first steps have other bits"
+            if name == "first steps"
+            else f"{name}: {_checks.short(there.get(name), 60)} there, {_checks.short(asked.get(name), 60)} asked for"
             for name in names
+            if name != "first steps" or len(names) == 1
         )
         raise ArgumentError(
             f"store: {_checks.short(str(path), _checks.PATH)} is of another sweep and is not continued ({told}); "

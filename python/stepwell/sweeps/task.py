@@ -6,11 +6,13 @@ import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from math import gcd, prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import _checks, _core
 from .._checks import Array
 from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integration import integrate
@@ -99,7 +101,7 @@ class Task(NamedTuple):
             numbers += 2 * saved * state
         for each in self.kinds(Exponents):
             k = state if each.exponents == "all" else int(each.exponents)
-            numbers += k * (self.steps // each.every + 10 * state)
+            numbers += (6 if self.at is None else 12) * state * (k + 1) + 4 * k
         return numbers
 
     def most_members(self, system: System) -> int:
@@ -136,12 +138,18 @@ def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
     given = {**task.given, **{name: value for name, value in values.items() if name in OF_THE_RUN}}
     parameters = {name: value for name, value in values.items() if name not in OF_THE_RUN}
     system = task.system if isinstance(task.system, System) else task.system(**parameters)
-    return a_system(system).sized(given.get("v"), given["y"]), given
+    system = a_system(system).sized(given.get("v"), given["y"])
+    if set(values) == {"dt"}:
+        # Nothing else has an axis of members; a chunk of one dt has one.
+        block = _checks.block("y", given["y"], system.y_shape, system.axes)
+        if block.shape == system.y_shape:
+            given["y"] = block[..., np.newaxis]
+    return system, given
 
 
 def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], bool] | None = None) -> Done:
     """Compute a chunk of members."""
-    with _quiet(), np.errstate(all="ignore"):  # members that diverge are told of by their status
+    with _quiet(), _listening(stopped), np.errstate(all="ignore"):  # members that diverge are told of by their status
         system, given = made(task, values)
         start = given
         for each in _pieces(task, system, given, members, task.transient, None, stopped):
@@ -157,8 +165,8 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
             last, reduced = _reduced(task, system, start, members, stopped)
             parts += reduced
         for each in task.kinds(Exponents):
-            _stop(stopped)
-            parts.append(each.of_start(system, task.method, given, task.transient, task.steps))
+            look = partial(_stop, stopped)
+            parts.append(each.of_start(system, task.method, given, task.transient, task.steps, look, task.at))
     status = Variable((), np.array(last.status), "how the member ended")
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
@@ -258,6 +266,16 @@ def _going_on(given: dict[str, Any], run: Run) -> dict[str, Any]:
     return {**kept, **run.resume}
 
 
+@contextmanager
+def _listening(stopped: Callable[[], bool] | None) -> Iterator[None]:
+    """Everything that this thread steps ends when the sweep is stopped; Ctrl-C reaches the main thread alone."""
+    _core.ask(partial(_stop, stopped))
+    try:
+        yield
+    finally:
+        _core.ask(None)
+
+
 def _stop(stopped: Callable[[], bool] | None) -> None:
     if stopped is not None and stopped():
         raise Stopped
@@ -272,12 +290,16 @@ def _as_many(run: Run, members: int) -> None:
         )
 
 
-def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Array]]:
-    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed.
+class Probed(NamedTuple):
+    """What the first steps of a member tell: the system, the state after them, and the names of what is found piece by piece."""
 
-    Returns:
-        The system, and the state after some steps.
-    """
+    system: System
+    state: tuple[Array, Array]
+    names: set[str]
+
+
+def probed(task: Task, values: dict[str, Any]) -> Probed:
+    """The first steps of one member: errors in what was given show here, before any work, and so does what is computed."""
     with _quiet():
         system, given = made(task, values)
         for each in task.outcomes:
@@ -289,10 +311,21 @@ def probed(task: Task, values: dict[str, Any]) -> tuple[System, tuple[Array, Arr
             begun = integrate(system, task.method, at=task.at, **(given | {"max_steps": few}))
             _as_many(begun, 1)
             assert begun.stand is not None
-            return begun.system, (begun.stand.v, begun.stand.y)
+            return Probed(begun.system, (begun.stand.v, begun.stand.y), _names(task, begun))
         first = integrate(system, task.method, steps=min(PROBED_STEPS, task.transient + task.steps), **given)
         _as_many(first, 1)
-    return first.system, (first.v[-1], first.y[-1])
+        return Probed(first.system, (first.v[-1], first.y[-1]), _names(task, first))
+
+
+def _names(task: Task, run: Run) -> set[str]:
+    """The names of results, but for those of functions and of exponents; raise if two of them are the same."""
+    parts: list[Found] = []
+    with np.errstate(all="ignore"):
+        for outcome in task.reductions:
+            reduction = outcome.begin()
+            reduction.see(Piece(run, 0))
+            parts.append(reduction.found())
+    return set(together([*parts, dict.fromkeys(("status", "first_bad_step"), Variable((), np.array(run.status), ""))]))
 
 
 #: Of so many steps the bits tell one sweep from another.

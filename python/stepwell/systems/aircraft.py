@@ -231,6 +231,7 @@ class Aircraft(OwnSystem):
         given = {"roll": roll, "pitch": pitch, "yaw": yaw}
         angles = {name: _checks.numbers(name, angle, unit="degrees") for name, angle in given.items()}
         batch = _checks.batch_shape({name: angle.shape for name, angle in angles.items()})
+        _checks.fits("roll, pitch, yaw: the attitudes", 16, batch, "ask for fewer")
         block = np.stack([np.broadcast_to(angle, batch) for angle in angles.values()])
         return block if self.form == "euler" else attitude.quaternion_of_angles(attitude.wrapped(block))
 
@@ -285,6 +286,7 @@ class Aircraft(OwnSystem):
         (size,) = self.y_shape
         if axis >= block.ndim or block.shape[axis] != size:
             raise ShapeError(f"y: expected {size} numbers along axis {axis}, got shape {block.shape}")
+        _checks.fits("y: the angles", 24, (block.size // size,), "ask for fewer")
         return np.moveaxis(block, axis, 0), axis
 
 

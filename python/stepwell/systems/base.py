@@ -17,7 +17,7 @@ from ..contact import parameters
 from ..errors import ArgumentError, DTypeError, UnsupportedError
 from ..reference import contact
 from ..reference.around import surrounded
-from ..reference.signal import Constant, Held, Sine
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
 from .inputs import Sampled
 
 if TYPE_CHECKING:
@@ -92,8 +92,8 @@ class System(Fixed, Value, ABC):
     @property
     def _instead(self) -> str:
         return (
-            f"make another {self.kind_name}, with what is to change. A World that goes on from here with it: "
-            f"World(system, method, dt=world.dt, **world.resume)"
+            f"make another {self.kind_name}, with what is to change; for a number that changes each frame use force=, or a state "
+            f"whose rate is zero. A World that goes on from here: World(system, method, dt=world.dt, **world.resume)"
         )
 
     @property
@@ -141,6 +141,11 @@ class System(Fixed, Value, ABC):
         first, then those of the batch), a signal, a list of signals, or None if it was not given. The core takes the same under
         the same names.
         """
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """The group of each number of v, then of y, whose errors count together: see ``reference/acceptance.py``."""
+        return ()
 
     def alone(self, h: float, batch: Shape) -> Any:
         """The NumPy reference of this system, scaled to the step h, for states of that batch shape; control left out."""
@@ -315,13 +320,42 @@ class System(Fixed, Value, ABC):
             return inf, -inf
         return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
 
+    def jumps(self, begin: float, end: float) -> Array:
+        """When its inputs or their derivatives jump, after ``begin`` and before ``end``: ascending, each time once."""
+        return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
+
+    def over_steps(self, method: Method, t0: float, dt: float) -> Self:
+        """The same system, whose held samples of less than a step are given by their means over the steps."""
+        held = [each for each in self.given_inputs().values() if isinstance(each, Sampled)]
+        # Rates of methods that carry something in place of v belong to the middle of what is stepped over.
+        first = t0 if method.carry is None else t0 - 0.5 * dt
+        if all(each.over_steps(first, dt) is each for each in held):
+            return self
+
+        def means(value: Any) -> Any:
+            if isinstance(value, dict):
+                return type(value)({name: means(each) for name, each in value.items()})
+            if isinstance(value, tuple):
+                return tuple(map(means, value))
+            return value.over_steps(first, dt) if isinstance(value, Sampled) else value
+
+        return changed(self, **{name: means(value) for name, value in vars(self).items() if not name.startswith("_")})
+
     def without_inputs(self) -> System:
         """The same system without inputs."""
         return self
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> System:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> System:
         """The same system with these samples as its only input."""
         raise KeyError(name)
+
+
+def how_to_wrap(function: FunctionType) -> str:
+    """How a function of rates becomes a system."""
+    name, taken = function.__name__, function.__code__.co_varnames[: function.__code__.co_argcount]
+    if taken[:1] == ("t",) and len(taken) > 1 and "v" not in taken[1:2] and (len(taken) == 2 or taken[2:3] != ("y",)):
+        return f"for ẏ = f(t, y) wrap it with sw.system(order=1)({name}), or @sw.system(order=1)"
+    return f"wrap it with sw.system({name}), or @sw.system"
 
 
 def a_system(value: Any) -> System:
@@ -330,8 +364,7 @@ def a_system(value: Any) -> System:
         if type(value).__name__ == "Definition":
             return a_system(value())
         if isinstance(value, FunctionType):
-            name = value.__name__
-            raise DTypeError(f"system: expected a system, got the function {name}; wrap it with sw.system({name}), or @sw.system")
+            raise DTypeError(f"system: expected a system, got the function {value.__name__}; {how_to_wrap(value)}")
         raise DTypeError(f"system: expected a stepwell system such as Oscillator(), got {type(value).__name__}")
     return value
 
@@ -362,6 +395,8 @@ def flat(given: dict[str, Any], batch: Shape) -> Given:
                 entries += flat({f"{name}.{part}": each for part, each in parts.items()}, batch)
             case Constant():
                 entries.append((name, rows(value.value, batch)))
+            case Stepped() | Curve():
+                entries += flat({name + behind: each for behind, each in value.parts().items()}, batch)
             case Held():
                 entries.append((name, (value.start, value.interval, rows(value.values, batch, 1))))
             case _:

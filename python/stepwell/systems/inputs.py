@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _checks
 from .._brief import brief
-from .._checks import Shape
+from .._checks import Array, Shape
 from .._value import Fixed, Value
 from ..errors import ArgumentError, ShapeError
-from ..reference.signal import Constant, Held, Sine
+from ..reference.signal import Constant, Curve, Held, Sine, Stepped
+
+if TYPE_CHECKING:
+    from .._words import Interpolation
 
 #: Beyond this angle the spacing of floating-point numbers is too coarse to locate a time within a period.
 LAST_ANGLE = 2.0**50
@@ -53,21 +56,42 @@ class Sinusoid(Fixed, Value):
                 f"omega, phase: a sinusoid's angle may grow to {LAST_ANGLE:.3g} rad, but reaches {angle:.3g} rad by t = {last:g}"
             )
 
+    def jumps(self, begin: float, end: float) -> Array:
+        """When it or a derivative jumps: never."""
+        return np.empty(0)
+
     def signal(self) -> Sine:
         """The reference signal."""
         return Sine(self.amplitude, self.omega, self.phase)
 
 
+#: What is between samples.
+INTERPOLATIONS: tuple[Interpolation, ...] = ("hold", "linear", "cubic")
+
+
 class Sampled(Fixed, Value):
-    """Samples, each held until the next (zero-order hold); the first also holds before its time, the last one for ever.
+    """Samples at equal intervals, and what is between them.
+
+    | ``interpolation`` | between two samples | use |
+    |---|---|---|
+    | ``"hold"`` | the first of them (zero-order hold) | what a computer or a converter puts out |
+    | ``"linear"`` | a straight line, as ``np.interp`` | what was measured |
+    | ``"cubic"`` | a cubic (Hermite), with derivatives from up to five neighbouring samples | samples of something smooth |
+
+    Before the first sample there is the first, after the last the last.
+
+    A step of fixed length sees the mean of held samples over the step. Where samples begin with steps, so that the interval is a
+    multiple of dt, that is the sample itself, and each method has its order. Where a sample begins within a step, the error is of
+    second order in dt. Curves are functions of the time, evaluated wherever in a step a method asks. A straight line errs by the
+    second power of the interval and has kinks; cubics err by the fourth, and their first derivative is continuous.
 
     Args:
         values: the samples along the first axis, the batch along the others.
         interval: time from one sample to the next.
         start: time of the first sample.
+        interpolation: one of the table.
 
-    A time that falls short of a sample's time by less than a millionth of the interval, as t = t0 + k·dt may by rounding, already
-    gets that sample.
+    A time that falls short of a sample's time by rounding alone already gets that sample.
 
     Example:
         >>> steps = sw.Sampled([0.0, 1.0, 0.5], interval=2.0)  # 0 until t = 2, 1 until 4, then 0.5
@@ -76,30 +100,118 @@ class Sampled(Fixed, Value):
         0.5
     """
 
-    def __init__(self, values: Any, interval: Any, start: Any = 0.0) -> None:
+    interpolation: Interpolation = "hold"
+
+    def __init__(self, values: Any, interval: Any, start: Any = 0.0, interpolation: Interpolation = "hold") -> None:
         self.values = _checks.numbers("values", values)
         if self.values.ndim == 0 or len(self.values) == 0:
             raise ShapeError(f"values: expected at least one sample along the first axis, got shape {self.values.shape}")
         self.interval = _checks.number("interval", interval, positive=True, unit="units of time")
         self.start = _checks.number("start", start, unit="units of time")
+        self.interpolation = _checks.known("interpolation", interpolation, INTERPOLATIONS)
         self.batch: Shape = self.values.shape[1:]
 
     def __repr__(self) -> str:
         if len(self.values) == 1:
             return f"constant({brief(self.values[0])})"
-        return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start})"
+        between = "" if self.interpolation == "hold" else f", interpolation={self.interpolation!r}"
+        return f"Sampled({len(self.values)} values, interval={self.interval}, start={self.start}{between})"
 
     @property
     def constant(self) -> bool:
         """Whether all samples are equal."""
         return bool((self.values == self.values[0]).all())
 
+    @property
+    def times(self) -> Array:
+        """When the samples are, shape (samples,)."""
+        return np.asarray(self.start + self.interval * np.arange(len(self.values)), np.float64)
+
+    def jumps(self, begin: float, end: float) -> Array:
+        """When the input or its first derivatives jump, after ``begin`` and before ``end``, ascending.
+
+        Held samples jump where a sample differs from the one before it. Curves have a kink where the slope changes (linear) or a
+        jump of the second derivative (cubic), at each sample.
+        """
+        times: Array = self.times
+        if self.constant:
+            return np.empty(0)
+        if self.interpolation == "hold":
+            changes = (self.values[1:] != self.values[:-1]).reshape(len(times) - 1, -1).any(axis=1)
+            times = times[1:][changes]
+        return times[(begin < times) & (times < end)]
+
+    def over_steps(self, first: float, dt: float) -> Sampled:
+        """The means over steps from ``first`` on in place of held samples of which a step has several; else itself."""
+        if self.interpolation != "hold" or len(self.values) == 1 or self.interval >= dt * (1.0 - 1e-9):
+            return self
+        times = self.times
+        before = np.floor((times[0] - first) / dt)
+        ends = first + dt * (before + np.arange(np.ceil((times[-1] - times[0]) / dt) + 2.0))
+        off = self.values - self.values[0]  # so that less cancels
+        until = np.concatenate([np.zeros((1, *self.batch)), np.cumsum(off, axis=0)]) * self.interval
+        at = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, None)
+        since = np.maximum(ends - times[at], 0.0).reshape(-1, *(1,) * len(self.batch))
+        means = np.diff(until[at] + off[at] * since, axis=0) / dt + self.values[0]
+        return Sampled(np.concatenate([means, self.values[-1:]]), dt, float(ends[0]))
+
     def check(self, last: float) -> None:
         """Do nothing: samples are defined at any time."""
 
-    def signal(self) -> Constant | Held:
+    def signal(self) -> Constant | Stepped | Curve:
         """The reference signal."""
-        return Constant(np.asarray(self.values[0])) if len(self.values) == 1 else Held(self.values, self.interval, self.start)
+        if len(self.values) == 1:
+            return Constant(np.asarray(self.values[0]))
+        if self.interpolation == "hold":
+            return Stepped(*(Held(each, self.interval, self.start) for each in (self.values, self.times)))
+        slopes = np.diff(self.values, axis=0) / self.interval
+        pieces = [self.values[:-1], slopes]
+        if self.interpolation == "cubic":
+            at = _derivatives(self.values, self.interval)
+            pieces[1:] = [
+                at[:-1],
+                (3.0 * slopes - 2.0 * at[:-1] - at[1:]) / self.interval,
+                (at[:-1] + at[1:] - 2.0 * slopes) / self.interval**2,
+            ]
+        # A piece before the first sample and one behind the last are constant.
+        ends = [self.values[[0]], self.values[[-1]]]
+        nothing = np.zeros_like(ends[0])
+        tables = [np.concatenate([ends[0], pieces[0], ends[1]])]
+        tables += [np.concatenate([nothing, each, nothing]) for each in pieces[1:]]
+        first = self.start - self.interval
+        times = first + self.interval * np.arange(len(tables[0]))
+        return Curve(*(Held(each, self.interval, first) for each in (*tables, times)))
+
+
+#: Samples from which a derivative is found: it is exact for polynomials up to one degree less.
+NEIGHBOURS = 5
+
+
+def _derivatives(values: Array, interval: float) -> Array:
+    """The derivative at each sample of the polynomial through it and its nearest neighbours, five in all if there are as many."""
+    n = min(NEIGHBOURS, len(values))
+    made = np.empty(values.shape)
+    for i in range(n):
+        # The first rows have too few neighbours before them, the last too few behind them; between them all are alike.
+        weights = _weights(n, i) / interval
+        middle = i == n // 2
+        first, count = (0, len(values) - n + 1) if middle else (0 if i < n // 2 else len(values) - n, 1)
+        made[first + i : first + i + count] = sum(w * values[first + k : first + k + count] for k, w in enumerate(weights))
+    return made
+
+
+def _weights(n: int, at: int) -> Array:
+    """By what n samples at 0, 1, … are multiplied for the derivative of their polynomial at one of them."""
+    powers = np.vander(np.arange(n) - at, increasing=True).T.astype(np.float64)
+    return np.linalg.solve(powers, np.eye(n)[1]) if n > 1 else np.zeros(1)
+
+
+class Pulse(Sampled):
+    """Samples that a method meets wherever in a step it asks: by them it is found what it does with an input there."""
+
+    def signal(self) -> Constant | Held:  # type: ignore[override]
+        """The reference signal."""
+        return Held(self.values, self.interval, self.start)
 
 
 Input = Sinusoid | Sampled
@@ -112,6 +224,6 @@ def as_input(argument: str, value: Any) -> Input | None:
     return Sampled(_checks.numbers(argument, value)[np.newaxis], interval=1.0)
 
 
-def signal(given: Input | None) -> Constant | Held | Sine | None:
+def signal(given: Input | None) -> Constant | Held | Sine | Stepped | Curve | None:
     """The reference signal of an input, or None."""
     return None if given is None else given.signal()

@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import counted
 from .._checks import Array, Shape
 from ..errors import ArgumentError, ShapeError
 from ..reference.product import times
 from ..reference.systems.linear import Linear as Reference
 from .base import System, aligned
-from .inputs import Input, Sampled, as_input
+from .inputs import Input, Pulse, as_input
+
+#: A run of many states holds so many copies of A: as it is given, by rows, and as the core steps it.
+COPIES_OF_A = 5
 
 
 class LinearSystem(System):
@@ -56,6 +60,7 @@ class LinearSystem(System):
     def __init__(self, A: Any, B: Any = None, C: Any = None, D: Any = None, *, x: Any = None, velocities: Any = None) -> None:
         self.A = _square(A)
         n = len(self.A)
+        _checks.fits("A: the matrix and its copies", COPIES_OF_A * n * n, (), "take fewer states")
         single = self.A.ndim == 2  # else a single axis might be meant for the batch
         self.B = None if B is None else _matrix("B", B, ("n", n), ("m", None), (n, 1) if single else None)
         m = 0 if self.B is None else self.B.shape[1]
@@ -71,6 +76,8 @@ class LinearSystem(System):
         self.D = None if D is None else _matrix("D", D, ("r", r), ("m", m), (1, 1) if r == m == 1 else None)
         self.input_names = ("x",) if m == 1 else tuple(f"x[{i}]" for i in range(m))
         self.x = _inputs(x, self.input_names)
+        if velocities is None and B is not None and C is not None:
+            velocities = 0  # a model of inputs and outputs, whose states are of no kind
         self.velocities = _velocities(velocities, n)
         self.coordinates = tuple(i for i in range(n) if i not in set(self.velocities))
         self.v_shape, self.y_shape = (len(self.velocities),), (len(self.coordinates),)
@@ -97,7 +104,14 @@ class LinearSystem(System):
     def said(self) -> list[str]:
         """Its arguments, for its repr."""
         m, r = (0 if self.B is None else self.B.shape[1]), (0 if self.C is None else len(self.C))
-        return [f"{len(self.A)} states", f"{self.v_shape[0]} of them velocities", f"{m} inputs", f"{r} outputs"]
+        v = self.v_shape[0]
+        states = f"{counted(len(self.A), 'state')}{f', {v} of them velocities' if v else ''}"
+        return [states, counted(m, "input"), counted(r, "output")]
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """Each state is one of its own, for their units differ."""
+        return tuple(range(len(self.A)))
 
     def given_inputs(self) -> dict[str, Input]:
         """Its inputs by name, without those that were not given."""
@@ -107,11 +121,11 @@ class LinearSystem(System):
         """The same system without inputs."""
         return LinearSystem(self.A, self.B, self.C, self.D, velocities=self.velocities)
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> LinearSystem:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> LinearSystem:
         """The same system with these samples as its only input."""
         if name not in self.input_names:
             raise KeyError(name)
-        x = [Sampled(values, interval) if name == each else None for each in self.input_names]
+        x = [Pulse(values, interval, start) if name == each else None for each in self.input_names]
         return LinearSystem(self.A, self.B, self.C, self.D, x=x, velocities=self.velocities)
 
     def _parts(self) -> list[Array]:
@@ -238,7 +252,8 @@ def _velocities(velocities: Any, n: int) -> tuple[int, ...]:
         return tuple(range(n // 2))
     if not isinstance(velocities, Iterable) or isinstance(velocities, str) or getattr(velocities, "ndim", 1) == 0:
         return tuple(range(_checks.count("velocities", velocities, 0, n)))
-    chosen = tuple(_checks.count(f"velocities[{i}]", each, 0, n - 1) for i, each in enumerate(velocities))
+    several = _checks.several("velocities", velocities, "states")
+    chosen = tuple(_checks.count(f"velocities[{i}]", each, 0, n - 1) for i, each in enumerate(several))
     for each in chosen:
         if chosen.count(each) > 1:
             raise ArgumentError(f"velocities: expected distinct states, got {each} twice")

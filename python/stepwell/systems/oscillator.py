@@ -11,7 +11,7 @@ from .._checks import Array, Shape
 from ..errors import ArgumentError
 from ..reference.systems.oscillator import Oscillator as Reference
 from .base import System, shown
-from .inputs import Input, Sampled, as_input, signal
+from .inputs import Input, Pulse, as_input, signal
 
 if TYPE_CHECKING:
     from .._words import OscillatorForm
@@ -21,6 +21,9 @@ FORMS: tuple[OscillatorForm, ...] = ("canonical", "physical")
 
 class Oscillator(System):
     """ÿ + 2Dω₀ẏ + ω₀²y = ω₀²x(t) + a(t), the document's test case (§3), and less friction·sgn ẏ where that is given (§8).
+
+    **v is ẏ/ω₀ unless ``form="physical"``**: that is the document's canonical form, whose phase diagram is a circle. There a
+    start with the velocity u is ``v=u / omega``.
 
     Args:
         omega: ω₀ in radians per unit of time, above zero; broadcasts over the batch. In physical form it may be zero: a block
@@ -123,9 +126,9 @@ class Oscillator(System):
         """The same oscillator without inputs."""
         return self._driven({})
 
-    def with_pulse(self, name: str, values: Array, interval: float) -> Oscillator:
+    def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> Oscillator:
         """The same oscillator with these samples as its only input."""
-        return self._driven({name: Sampled(values, interval)})
+        return self._driven({name: Pulse(values, interval, start)})
 
     def _driven(self, inputs: dict[str, Input]) -> Oscillator:
         terms: dict[str, Any] = {"drag": self.drag, "friction": self.friction, "form": self.form}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import nullcontext
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from .._checks import Array, Shape
 from .._value import changed, complete
 from ..control import WAYS, AnyControl, ConstraintControl, Control, EnergyControl, Projection
 from ..equations.definition import Definition, fits
+from ..equations.recognised import Unknown, told
 from ..equations.series import derivatives_of_functions
 from ..equations.trace import Equations
 from ..errors import ShapeError, TraceError, UnsupportedError
@@ -26,9 +28,12 @@ from .inputs import Input, Sampled, Sinusoid
 #: The name of the function among those of parameters; no parameter can have it.
 RATES = "equations()"
 #: Attributes that are found out of the others and kept.
-FOUND_LATER = ("_core", "_single", "_with_functions", "_bounds", "_met")
+FOUND_LATER = ("_core", "_single", "_with_functions", "_digest", "_bounds", "_met")
 #: Of how many shapes of states it is remembered what they are of.
 MOST_MET = 256
+#: Of how many functions the operations are kept.
+MOST_TRACED = 256
+_TRACED: dict[Any, Any] = {}
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
 LONGEST_GUESS = 32
 
@@ -37,6 +42,8 @@ class OwnSystem(System):
     """A system of your own equations: calling a function that is decorated by ``stepwell.system`` returns one."""
 
     kernel = "equations"
+    #: The operations, and what they are known by.
+    _digest: tuple[Any, str] | None = None
     reference = Reference
     #: The control that keeps an invariant as a part of the rates, or None.
     push: Control | None = None
@@ -94,7 +101,7 @@ class OwnSystem(System):
         return {name: value for name, value in super()._held().items() if name not in FOUND_LATER}
 
     def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_bounds": {}, "_met": {}}
+        return vars(self) | {"_core": None, "_single": None, "_with_functions": None, "_digest": None, "_bounds": {}, "_met": {}}
 
     def __deepcopy__(self, memo: Any) -> OwnSystem:
         again = changed(self, parameters_given=copy.deepcopy(self.parameters_given, memo), _bounds={}, _met={})
@@ -133,7 +140,24 @@ class OwnSystem(System):
                 + ", ".join(f"{name} of shape {shape}" for name, shape in shapes.items())
             )
         # The error of a function of arrays that is run with a number would be misleading.
-        raise next((error for error in refused if not error.of_shape), refused[0])
+        told = next((error for error in refused if not error.of_shape), None)
+        if told is None and (hint := self._batch_first(shapes)):
+            raise ShapeError(f"{self.definition.name}: {hint}") from refused[-1]
+        raise told or refused[0]
+
+    def _batch_first(self, shapes: dict[str, Shape]) -> str:
+        """What to say if the function does with the last axes of the states what it does not do with the first; else nothing."""
+        if self.definition.blocks == 2 or not shapes:
+            return ""
+        name, shape = max(shapes.items(), key=lambda each: len(each[1]))
+        for n in range(1, len(shape)):
+            last = shape[-n:]
+            try:
+                self._bound((0,) if self.definition.order == 1 else last, last)
+            except TraceError:
+                continue
+            return f"batch axes come last: expected {name} of shape {(*last, *shape[:-n])}, got {shape}"
+        return ""
 
     def _fits(self, shapes: dict[str, Shape]) -> bool:
         """Whether blocks of the known shapes can be the first axes of these."""
@@ -172,9 +196,44 @@ class OwnSystem(System):
         }
         equations = Equations(definition, v_shape, y_shape, shapes)
         bound = changed(self, v_shape=v_shape, y_shape=y_shape, equations=equations, _single=None, _bounds={}, _met={})
-        bound._trace()
+        bound._trace_once()
         self._bounds[v_shape, y_shape] = bound
         return bound
+
+    def _trace_once(self) -> None:
+        """Trace the function, or take what was traced of the same function with parameters of the same kinds."""
+        key = self._key()
+        core = None if key is None else _TRACED.get(key)
+        if core is None:
+            self._trace()
+            if key is not None:
+                if len(_TRACED) >= MOST_TRACED:
+                    _TRACED.clear()
+                _TRACED[key] = self._core
+            return
+        self._core = core
+        complete(self, velocity_term="forces that do" if core.reads_v else None)
+
+    def _key(self) -> Any:
+        """What its operations depend on; None if that cannot be told."""
+        definition = self.definition
+        try:
+            parameters = tuple((name, self._kind_of(name, value)) for name, value in self.parameters_given.items())
+            invariants = tuple((each.name, each.parameters, told(each.function)) for each in definition.invariants.values())
+            function = told(definition.function)
+            key = definition.order, definition.blocks, definition.quick_sines, self.v_shape, self.y_shape
+            return *key, function, parameters, invariants, definition.name
+        except Unknown:
+            return None
+
+    def _kind_of(self, name: str, value: Any) -> Any:
+        """What the operations depend on of a parameter: not its numbers."""
+        if isinstance(value, np.ndarray):
+            return value.shape[: self.own_axes(name)]
+        if isinstance(value, (Sinusoid, Sampled)):
+            signal = value.signal()
+            return type(signal).__name__, len(getattr(signal, "coefficients", ()))
+        return told(value)
 
     def _trace(self) -> None:
         """Run the function with symbols, twice to check that it always does the same; a control is a part of the rates."""
@@ -214,6 +273,18 @@ class OwnSystem(System):
     def _known(self) -> OwnSystem:
         """The same system with known shapes of its blocks."""
         return self if self.equations is not None else self.sized()
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """By the definition's ``scale``: each component, each row along the last axis, or each block."""
+        if self.definition.scale == "block":
+            return ()
+        groups: list[int] = []
+        for shape in (self.v_shape, self.y_shape):
+            of_one = prod(shape[-1:]) if self.definition.scale == "row" else 1
+            first = groups[-1] + 1 if groups else 0
+            groups += [first + place // max(of_one, 1) for place in range(prod(shape))]
+        return tuple(groups)
 
     # ---- for the core and the reference
 
@@ -259,6 +330,16 @@ class OwnSystem(System):
         if self._with_functions is None or self._with_functions[0] is not self._core:
             self._with_functions = self._core, self._rates({})
         return self._with_functions[1]
+
+    @property
+    def digest(self) -> str:
+        """What its operations are known by; a long list of them takes long to write out, so it is kept."""
+        from ..interop.parts import digest  # only runs that go on need it
+
+        bound = self._retraced()
+        if bound._digest is None or bound._digest[0] is not bound._core:
+            bound._digest = bound._core, digest(bound)
+        return bound._digest[1]
 
     def _retraced(self) -> OwnSystem:
         """With its operations, which an unpickled copy lacks."""

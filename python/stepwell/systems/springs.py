@@ -37,8 +37,9 @@ class Springs(System):
         layout: places of the particles with the springs at rest, shape (n, dim) or (n, dim, *batch).
         damping: c, force per speed at which a spring becomes longer, zero or more, likewise; none if None.
         masses: one number, or an array with the particles along its first axis and the batch along the others, above zero.
-        fixed: the particles that do not feel any force, or None.
-        gravity: acceleration of all particles, shape (dim,) or (dim, *batch), such as (0, -9.81); none if None.
+        fixed: the particles that do not feel any force, by their numbers or as a mask of all; or None.
+        gravity: acceleration of all particles: a number, down the last axis, or a vector of shape (dim,) or (dim, *batch), such
+            as (0, -9.81); none if None.
         drag: force per speed of a particle against its motion, zero or more, given like ``masses``; none if None.
         floor: a ``Floor`` or ``Sphere`` that particles meet, or a list of them; fixed particles pass through it.
         dim: 1, 2 or 3; if None, that of ``layout``, ``gravity`` or ``floor``, or else taken from the shape of the state.
@@ -143,10 +144,18 @@ class Springs(System):
         (dim,) = dims
         return changed(self, dim=dim, v_shape=(self.n, dim), y_shape=(self.n, dim))
 
+    @property
+    def acceleration(self) -> Array | None:
+        """That of gravity as a vector, or None without."""
+        if self.gravity is None or self.gravity.ndim:
+            return self.gravity
+        return np.append(np.zeros(self.y_shape[1] - 1), -self.gravity)
+
     def given(self, batch: Shape) -> dict[str, Any]:
         """Particles, dimensions, ends of springs, and all numbers."""
         numbers = {name: getattr(self, name) for name in ("masses", "stiffness", "rest", "damping", "gravity", "drag")}
         lists = {"pairs": self.pairs.tobytes(), "fixed": self.fixed.tobytes() if len(self.fixed) else None}
+        numbers["gravity"] = self.acceleration
         rows = {name: None if each is None else aligned(each, 1, batch) for name, each in numbers.items()}
         return {"n": self.n, "dim": self.y_shape[1], **lists, **rows}
 
@@ -207,10 +216,7 @@ class Springs(System):
 
 def _whole(argument: str, value: Any, what: str) -> Any:
     """An array of whole numbers of zero or more."""
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError, RecursionError) as error:
-        raise ShapeError(f"{argument}: expected {what}, got {_checks.short(value)} ({error})") from None
+    array = _checks.as_array(argument, value)
     if array.size and array.dtype.kind not in "iu":
         raise DTypeError(f"{argument}: expected {what}, got {_checks.short(value)}")
     if array.size and (array.min() < 0 or array.max() >= MOST_PARTICLES):
@@ -242,12 +248,24 @@ def _particles(argument: str, given: Any, n: int) -> Any:
     if given is None:
         return np.empty(0, dtype="<u4")
     what = "numbers of particles"
+    if _is_mask(given):
+        mask = np.asarray(given)
+        if mask.shape != (n,):
+            raise ShapeError(f"{argument}: expected a mask of {n} particles, or {what}, got a mask of shape {mask.shape}")
+        return np.flatnonzero(mask).astype("<u4")
     array = np.atleast_1d(_whole(argument, given, what))
     if array.ndim != 1:
         raise ShapeError(f"{argument}: expected {what} along one axis, got shape {array.shape}")
     if array.size and array.max() >= n:
         raise ArgumentError(f"{argument}: expected particles below {n}, of which there are so many, got {array.max()}")
     return np.unique(array).astype("<u4")
+
+
+def _is_mask(given: Any) -> bool:
+    """Whether particles are told by what is true of each."""
+    if isinstance(given, np.ndarray):
+        return bool(given.dtype == np.bool_)
+    return isinstance(given, (list, tuple)) and bool(given) and all(isinstance(each, (bool, np.bool_)) for each in given)
 
 
 def _layout(layout: Any) -> Array:
@@ -259,8 +277,8 @@ def _layout(layout: Any) -> Array:
 
 def _gravity(gravity: Any) -> Array:
     array = _checks.numbers("gravity", gravity, unit="length per time squared")
-    if array.ndim == 0 or array.shape[0] not in (1, 2, 3):
-        raise ShapeError(f"gravity: expected a vector of 1 to 3 numbers, such as (0, -9.81), got shape {array.shape}")
+    if array.ndim and array.shape[0] not in (1, 2, 3):
+        raise ShapeError(f"gravity: expected a number, or a vector of 1 to 3 numbers such as (0, -9.81), got shape {array.shape}")
     return array
 
 
@@ -268,7 +286,7 @@ def _dimensions(dim: Any, placed: Array | None, gravity: Array | None, floors: d
     """The number of dimensions, if anything says it and all that does agrees."""
     said = {} if dim is None else {"dim": _checks.count("dim", dim, 1, 3)}
     said |= {} if placed is None else {"layout": placed.shape[1]}
-    said |= {} if gravity is None else {"gravity": gravity.shape[0]}
+    said |= {} if gravity is None or gravity.ndim == 0 else {"gravity": gravity.shape[0]}
     said |= floors
     if len(set(said.values())) > 1:
         told = ", ".join(f"{name} of {number}" for name, number in said.items())

@@ -55,10 +55,10 @@ impl Level {
     /// Every level, ascending.
     pub const ALL: [Level; 4] = [Level::Baseline, Level::Neon, Level::Avx2, Level::Avx512];
 
-    /// Its name, which `STEPWELL_ISA` takes.
+    /// Its name, which `STEPWELL_KERNELS` and `STEPWELL_ISA` take.
     pub fn name(self) -> &'static str {
         match self {
-            Level::Baseline => "baseline",
+            Level::Baseline => "interpret",
             Level::Neon => "neon",
             Level::Avx2 => "avx2",
             Level::Avx512 => "avx512",
@@ -104,14 +104,6 @@ impl Level {
         Level::ALL.into_iter().filter(|l| l.here()).collect()
     }
 
-    /// What `STEPWELL_KERNELS` calls its kernels.
-    pub fn kernels(self) -> &'static str {
-        match self {
-            Level::Baseline => "interpret",
-            written => written.name(),
-        }
-    }
-
     /// The level whose kernels `STEPWELL_KERNELS` names, or else the one that `STEPWELL_ISA` does, or else the best of this machine.
     pub fn choose() -> Result<Level, UnknownLevel> {
         Level::asked(std::env::var_os(KERNELS), std::env::var_os(ISA))
@@ -120,18 +112,14 @@ impl Level {
     /// As `choose`, with what the two variables hold; an empty one counts as none.
     pub fn asked(kernels: Option<OsString>, isa: Option<OsString>) -> Result<Level, UnknownLevel> {
         let available = Level::available();
-        let find = |given: &OsString, name: fn(Level) -> &'static str| {
-            let found = available.iter().copied().find(|level| *given == name(*level));
-            let known = || available.iter().map(|level| name(*level)).collect::<Vec<_>>().join(", ");
-            found.ok_or_else(|| (given.to_string_lossy().into_owned(), known()))
-        };
-        if let Some(given) = kernels.filter(|given| !given.is_empty()) {
-            return find(&given, Level::kernels).map_err(|(given, known)| UnknownLevel { variable: KERNELS, given, known });
-        }
-        if let Some(given) = isa.filter(|given| !given.is_empty()) {
-            return find(&given, Level::name).map_err(|(given, known)| UnknownLevel { variable: ISA, given, known });
-        }
-        Ok(available.last().copied().unwrap_or(Level::Baseline))
+        let given = [(KERNELS, kernels), (ISA, isa)]
+            .into_iter()
+            .find_map(|(variable, given)| given.filter(|given| !given.is_empty()).map(|given| (variable, given)));
+        let Some((variable, given)) = given else { return Ok(available.last().copied().unwrap_or(Level::Baseline)) };
+        available.iter().copied().find(|level| given == level.name()).ok_or_else(|| {
+            let known = available.iter().map(|level| level.name()).collect::<Vec<_>>().join(", ");
+            UnknownLevel { variable, given: given.to_string_lossy().into_owned(), known }
+        })
     }
 }
 

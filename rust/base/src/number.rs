@@ -19,6 +19,27 @@ pub enum Function {
     Log,
 }
 
+/// The Taylor coefficients of a solution, from the first on, and the functions with several branches that its rates have.
+#[derive(Clone, Debug)]
+pub struct Series<N> {
+    /// Of each order as many as the state has numbers.
+    pub terms: Vec<Vec<N>>,
+    /// The branches that the rates are on.
+    pub branches: Vec<Branch<N>>,
+}
+
+/// A function with several branches, such as a root: its start and its coefficients, none where it is known to be zero, and the bounds of
+/// the values of its branch.
+#[derive(Clone, Debug)]
+pub struct Branch<N> {
+    /// The value at the start of the step, and the coefficients.
+    pub terms: Vec<Option<N>>,
+    /// The least value of the branch,
+    pub least: f64,
+    /// and the largest.
+    pub most: f64,
+}
+
 /// A number, or a symbol for one.
 ///
 /// A step can use only these operations: no `if` on a number, no operation that two machines might round differently.
@@ -82,9 +103,9 @@ pub trait Number:
     }
 
     /// The Taylor coefficients, from the first to the one of that order, of a solution that starts so and whose rates a function makes
-    /// of the start and of the time. The time is its value and its first coefficient. Only symbols have a record of how rates were made,
-    /// so of numbers there is no series.
-    fn series(_order: u32, _start: &[Self], _time: [Self; 2], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Vec<Vec<Self>>> {
+    /// of the start and of the time. The time is its value, the unit in powers of which the coefficients are, and this over the one of the
+    /// rates. Only symbols have a record of how rates were made, so of numbers there is no series.
+    fn series(_order: u32, _start: &[Self], _time: [Self; 3], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Series<Self>> {
         None
     }
 

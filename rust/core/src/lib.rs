@@ -34,6 +34,7 @@ pub mod tableau;
 pub mod tape;
 pub mod trace;
 pub mod watch;
+pub mod window;
 
 /// The methods, one file each; `build.rs` lists the folder.
 #[allow(missing_docs, reason = "each file documents its method in the record")]

@@ -7,7 +7,7 @@ use std::{
     ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign},
 };
 
-pub use stepwell_base::number::{Function, Number};
+pub use stepwell_base::number::{Branch, Function, Number, Series};
 
 use crate::{
     real::Precision,
@@ -170,12 +170,7 @@ impl Number for Symbol {
         series::mark(self, series::Mark::Of(function, of));
         self
     }
-    fn series(
-        order: u32,
-        start: &[Symbol],
-        time: [Symbol; 2],
-        rates: &mut dyn FnMut() -> Vec<Symbol>,
-    ) -> Option<Vec<Vec<Symbol>>> {
+    fn series(order: u32, start: &[Symbol], time: [Symbol; 3], rates: &mut dyn FnMut() -> Vec<Symbol>) -> Option<Series<Symbol>> {
         Some(series::of_solution(order, start, time, rates))
     }
 }

@@ -12,7 +12,10 @@ use std::{
 
 use nalgebra::DVector;
 
-use crate::{number::Number, system::System};
+use crate::{
+    number::{Branch, Number, Series},
+    system::System,
+};
 
 /// A velocity or coordinate block, by the number of the entry that makes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -281,7 +284,10 @@ impl Program {
                 Entry::Sub(a, b) => of(a).zip_map(of(b), |a, b| a - b),
                 Entry::Scale(c, a) => of(a).map(|a| N::of(c) * a),
                 Entry::SeriesV(k, v, y) | Entry::SeriesY(k, v, y) => {
-                    let made = series.get_or_insert_with(|| coefficients(s, self.series_order(), [t, h], of(v), of(y)));
+                    let made = series.get_or_insert_with(|| {
+                        let made = coefficients(s, self.series_order(), [t, h, N::of(1.0)], of(v), of(y));
+                        made.0
+                    });
                     let (v, y) = &made[k as usize - 1];
                     if matches!(entry, Entry::SeriesV(..)) { v.clone() } else { y.clone() }
                 }
@@ -292,22 +298,27 @@ impl Program {
     }
 }
 
-/// The Taylor coefficients of v and y around a state, from the first on; NaN of numbers, which have none.
+/// Coefficients of v and y, from the first on.
+pub type Terms<N> = Vec<(DVector<N>, DVector<N>)>;
+
+/// The Taylor coefficients of v and y around a state, from the first on, and the branches of functions that the rates are on; NaN of numbers,
+/// which have no series. The time is that of [`Number::series`].
 pub(crate) fn coefficients<N: Number>(
     s: &dyn System<N>,
     order: u32,
-    [t, h]: [N; 2],
+    time: [N; 3],
     v: &DVector<N>,
     y: &DVector<N>,
-) -> Vec<(DVector<N>, DVector<N>)> {
+) -> (Terms<N>, Vec<Branch<N>>) {
     let start: Vec<N> = v.iter().chain(y).copied().collect();
+    let t = time[0];
     let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();
-    let Some(made) = N::series(order, &start, [t, h], &mut rates) else {
+    let Some(Series { terms, branches }) = N::series(order, &start, time, &mut rates) else {
         let unknown = N::of(f64::NAN);
-        return (1..=order).map(|_| (v.map(|_| unknown), y.map(|_| unknown))).collect();
+        return ((1..=order).map(|_| (v.map(|_| unknown), y.map(|_| unknown))).collect(), Vec::new());
     };
     let block = |numbers: &[N]| DVector::from_column_slice(numbers);
-    made.iter().map(|numbers| (block(&numbers[..v.len()]), block(&numbers[v.len()..]))).collect()
+    (terms.iter().map(|numbers| (block(&numbers[..v.len()]), block(&numbers[v.len()..]))).collect(), branches)
 }
 
 impl Block {

@@ -12,7 +12,7 @@ use std::{
 
 use crate::{
     functions::{cos, sin},
-    number::{Function, Number, Symbol, on_tape, operation},
+    number::{self, Branch, Function, Number, Symbol, on_tape, operation},
     tape::{Id, Op},
 };
 
@@ -21,8 +21,8 @@ use crate::{
 pub enum Mark {
     /// It is a function of another value.
     Of(Function, Symbol),
-    /// Its derivatives by other values: pairs of a value and the derivative by it.
-    Factors(Vec<(Symbol, Symbol)>),
+    /// Its derivatives by other values, pairs of a value and the derivative by it; and its bounds, if it is one branch of several.
+    Factors(Factors, Option<[f64; 2]>),
 }
 
 thread_local! {
@@ -44,42 +44,58 @@ pub fn mark(value: Symbol, mark: Mark) {
     });
 }
 
+/// Pairs of a value and the derivative by it.
+pub type Factors = Vec<(Symbol, Symbol)>;
+
 /// A coefficient; none if it is known to be zero.
 type Term = Option<Symbol>;
 
-/// The coefficients of a solution, from the first to the one of that order: of each order as many as the start has.
-pub fn of_solution(order: u32, start: &[Symbol], time: [Symbol; 2], rates: &mut dyn FnMut() -> Vec<Symbol>) -> Vec<Vec<Symbol>> {
+/// The coefficients of a solution, from the first to the one of that order. The time is its value, the unit in powers of which they are, and
+/// this over the one of the rates.
+pub fn of_solution(
+    order: u32,
+    start: &[Symbol],
+    [time, length, unit]: [Symbol; 3],
+    rates: &mut dyn FnMut() -> Vec<Symbol>,
+) -> number::Series<Symbol> {
     let outer = MARKS.replace(Some(HashMap::new()));
     let rates = rates();
-    let mut series = Series::new(start, time[0], &rates);
+    let mut series = Series::new(start, time, &rates);
     MARKS.set(outer);
     let mut made = Vec::with_capacity(order as usize);
+    let mut own = BTreeSet::from([unit.0]);
     for k in 0..order as usize {
         series.advance(k);
-        let by = Symbol::of(1.0 / (k + 1) as f64);
+        let by = unit * Symbol::of(1.0 / (k + 1) as f64);
+        own.insert(by.0);
         let next: Vec<Term> = rates.iter().map(|rate| series.term(rate.0, k).map(|term| by * term)).collect();
         for (symbol, term) in start.iter().zip(&next) {
             series.terms.entry(symbol.0).or_default().push(*term);
         }
-        if let Some(terms) = series.terms.get_mut(&time[0].0) {
-            terms.push((k == 0).then_some(time[1]));
+        if let Some(terms) = series.terms.get_mut(&time.0) {
+            terms.push((k == 0).then_some(length));
         }
         made.push(next.into_iter().map(|term| term.unwrap_or_else(|| Symbol::of(0.0))).collect());
     }
-    note_evaluations(order, &rates, &series, &made);
-    made
+    note_evaluations(order, &rates, &series, &made, own);
+    number::Series { terms: made, branches: series.branches() }
 }
 
-/// Notes what the coefficients cost in evaluations of the rates. The products by 1/k, from the second order on, are the method's own, as the
-/// sums of stages are of other methods.
-fn note_evaluations(order: u32, rates: &[Symbol], series: &Series, made: &[Vec<Symbol>]) {
+/// Notes what the coefficients cost in evaluations of the rates. The products by the unit and by 1/k are the method's `own`, as the sums of
+/// stages are of other methods.
+fn note_evaluations(order: u32, rates: &[Symbol], series: &Series, made: &[Vec<Symbol>], mut own: BTreeSet<Id>) {
     let all = (0..order as usize).flat_map(|k| rates.iter().map(move |rate| (rate.0, k)));
     let terms: Vec<Id> = all.filter_map(|(rate, k)| series.term(rate, k)).map(|term| term.0).collect();
-    let own = made.iter().skip(1).flatten().map(|term| match operation(term.0) {
-        Op::Neg(product) => product,
-        _ => term.0,
-    });
-    let own: BTreeSet<Id> = own.filter(|id| !operation(*id).is_leaf()).collect();
+    let is_scaled = |order: usize| order > 0 || own.iter().any(|id| !operation(*id).is_leaf());
+    let products = made.iter().enumerate().filter(|(order, _)| is_scaled(*order)).flat_map(|(_, terms)| terms);
+    let products: Vec<Id> = products
+        .map(|term| match operation(term.0) {
+            Op::Neg(product) => product,
+            _ => term.0,
+        })
+        .collect();
+    own.extend(products);
+    own.retain(|id| !operation(*id).is_leaf());
     on_tape(|tape| {
         let one = tape.changing(rates.iter().map(|rate| rate.0), &BTreeSet::new());
         // Rates that are copies take no operation: each order then counts as one evaluation.
@@ -94,6 +110,8 @@ struct Series {
     values: Vec<Id>,
     /// Of some of them the derivatives by others.
     factors: HashMap<Id, Vec<(Symbol, Symbol)>>,
+    /// Bounds of those that are one branch of several.
+    bounds: HashMap<Id, [f64; 2]>,
     /// Reciprocals of divisors, and of roots twice over, each computed once.
     reciprocals: HashMap<Id, Symbol>,
 }
@@ -101,19 +119,23 @@ struct Series {
 impl Series {
     fn new(start: &[Symbol], time: Symbol, rates: &[Symbol]) -> Series {
         let mut terms: HashMap<Id, Vec<Term>> = start.iter().chain([&time]).map(|seed| (seed.0, vec![Some(*seed)])).collect();
-        let mut factors = HashMap::new();
+        let (mut factors, mut bounds) = (HashMap::new(), HashMap::new());
         let mut needed = BTreeSet::new();
         let mut open: Vec<Id> = rates.iter().map(|rate| rate.0).collect();
         while let Some(id) = open.pop() {
             if terms.contains_key(&id) || !needed.insert(id) {
                 continue;
             }
-            if let Some(of) = factors_of(Symbol(id)) {
+            if let Some((of, within)) = factors_of(Symbol(id)) {
+                bounds.extend(within.map(|within| (id, within)));
                 open.extend(of.iter().flat_map(|(argument, factor)| [argument.0, factor.0]));
                 factors.insert(id, of);
             } else {
                 let (operands, n) = operation(id).operands();
                 open.extend(&operands[..n]);
+                if matches!(operation(id), Op::Sqrt(_)) {
+                    bounds.insert(id, [0.0, f64::INFINITY]);
+                }
             }
         }
         let mut values = Vec::new();
@@ -128,7 +150,13 @@ impl Series {
                 values.push(id);
             }
         }
-        Series { terms, values, factors, reciprocals: HashMap::new() }
+        Series { terms, values, factors, bounds, reciprocals: HashMap::new() }
+    }
+
+    /// The values that are one branch of several, in the order in which they are made.
+    fn branches(&self) -> Vec<Branch<Symbol>> {
+        let bounded = self.values.iter().filter_map(|id| Some((id, self.bounds.get(id)?)));
+        bounded.map(|(id, [least, most])| Branch { terms: self.terms[id].clone(), least: *least, most: *most }).collect()
     }
 
     fn term(&self, id: Id, k: usize) -> Term {
@@ -223,14 +251,18 @@ impl Series {
     }
 }
 
-/// The derivatives of a marked value by those that it is a function of.
-fn factors_of(value: Symbol) -> Option<Vec<(Symbol, Symbol)>> {
+/// The derivatives of a marked value by those that it is a function of, and its bounds if it is one branch of several.
+fn factors_of(value: Symbol) -> Option<(Factors, Option<[f64; 2]>)> {
     let mark = MARKS.with_borrow(|marks| marks.as_ref()?.get(&value.0).cloned())?;
     Some(match mark {
-        Mark::Of(Function::Sin, x) => vec![(x, cos(x))],
-        Mark::Of(Function::Cos, x) => vec![(x, -sin(x))],
-        Mark::Of(Function::Log, x) => vec![(x, Symbol::of(1.0) / x)],
-        Mark::Factors(factors) => factors,
+        Mark::Of(Function::Sin, x) => (vec![(x, cos(x))], None),
+        Mark::Of(Function::Cos, x) => (vec![(x, -sin(x))], None),
+        Mark::Of(Function::Log, x) => (vec![(x, Symbol::of(1.0) / x)], None),
+        Mark::Factors(mut factors, bounds) => {
+            // Whole numbers stay as they are within a step: that of a remainder, which may be made after it, is only there to be seen.
+            factors.retain(|(of, _)| !matches!(operation(of.0), Op::Floor(_)));
+            (factors, bounds)
+        }
     })
 }
 

@@ -1,120 +1,234 @@
 //! Adaptive steps by the series of a solution: how far it reaches, and what comes after a step.
 //!
-//! The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2), so none is rejected. With ‖cⱼ‖ the length
-//! of a block of coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is
-//! the least of these for j = p − 1 and p and both blocks, times exp(−0.7/(p − 1)). `reference/series_pace.py` is the specification.
+//! The step is found from the last two coefficients before it is made (Jorba and Zou 2005, §3.2). With ‖cⱼ‖ the size of a group of
+//! coefficients and τ what is tolerated there, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of these for
+//! j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected only if a function
+//! might leave its branch within it, if a number is not finite or if it does not move the time. `reference/series_pace.py` is the
+//! specification.
 
 use crate::{
     functions::{rough_exp2, rough_log2},
-    number::Number,
-    pace::{Pace, length2, longer},
-    program::coefficients,
+    number::{Branch, Number},
+    pace::{Acceptance, MAX_FACTOR, ONSET, Pace, ROUNDING, Scales, largest, longer, over, total},
+    program::{Terms, coefficients},
     system::{Block, System},
 };
 
 /// The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 const MAX_GROWTH: f64 = 1024.0;
-/// The squared length of the last terms over the tolerated one, between bounds whose logarithms exist.
+/// The size of the last terms over the tolerated one, between bounds whose logarithms exist.
 const BOUNDS: [f64; 2] = [1e-280, 1e280];
 /// The margin of a step of order p is 2^(−MARGIN/(p − 1)): exp(−0.7/(p − 1)).
 const MARGIN: f64 = 0.7 * std::f64::consts::LOG2_E;
+/// The most that a step is of the radius of convergence. Beyond it the last terms say nothing of those that follow, however small.
+const SHARE: f64 = 0.5;
+/// A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first twofold: so many
+/// are left before what it met.
+const SHRINK: f64 = 0.25;
+/// The bits of an exponent.
+const EXPONENT: u64 = 0x7FF << 52;
 
-/// Coefficients of v and y, from the first on.
-pub type Terms<N> = Vec<(Block<N>, Block<N>)>;
+/// Coefficients of v and y, and the branches of functions that the rates are on.
+pub type Known<'a, N> = (&'a [(Block<N>, Block<N>)], &'a [Branch<N>]);
 
-/// The coefficients at the start of a step. The system is scaled to a step of 1.
-pub fn terms<N: Number>(order: u32, system: &dyn System<N>, pace: &Pace<N>, v: &Block<N>, y: &Block<N>) -> Terms<N> {
-    coefficients(system, order, [pace.t, N::of(1.0)], v, y)
+/// The coefficients at the start of a step, and the branches of functions that the rates are on. The system is scaled to a step of 1.
+pub fn terms<N: Number>(
+    order: u32,
+    system: &dyn System<N>,
+    pace: &Pace<N>,
+    v: &Block<N>,
+    y: &Block<N>,
+) -> (Terms<N>, Vec<Branch<N>>) {
+    let unit = unit_of(pace.before);
+    coefficients(system, order, [pace.t, unit, unit], v, y)
 }
 
-/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back.
+/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. Also the largest
+/// sizes so far. A step that is made once more needs no branches: it was on them.
+#[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
 pub fn attempt<N: Number>(
-    terms: &[(Block<N>, Block<N>)],
+    (terms, branches): Known<N>,
     projected: &dyn System<N>,
-    pace: Pace<N>,
+    acceptance: &Acceptance,
+    (pace, scales): (Pace<N>, &Scales<N>),
     budget: N,
     v: &Block<N>,
     y: &Block<N>,
-) -> (Pace<N>, Block<N>, Block<N>) {
+) -> (Pace<N>, Vec<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
-    let reach = reach(terms.len() as u32, &pace, [v, y], terms);
-    let step = N::choose(outlook.is_extra, pace.extra, reach);
-    let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), step), value(y, terms.iter().map(|term| &term.1), step));
-    let new = [length2(&new_v), length2(&new_y)];
+    let unit = unit_of(pace.before);
+    let (far, moved) = reach(acceptance, (&pace, scales), unit, [v, y], terms);
+    let bound = pace.wall - pace.t;
+    let ends = bound.below(far);
+    let step = N::choose(ends, bound, far);
+    let share = N::choose(outlook.is_extra, pace.extra, step) * (N::of(1.0) / unit);
+    let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), share), value(y, terms.iter().map(|term| &term.1), share));
+    let new = acceptance.sizes(new_v.as_slice(), new_y.as_slice());
     let (new_v, new_y) = projected.project(new_v, new_y);
-    let (next, took) = decided(&pace, reach, new, outlook.is_extra, outlook.runs);
+    let stays = on_branches(branches, share, moved);
+    let tolerable = N::of(0.5) / moved * unit;
+    let (next, longest, took) =
+        decided(&pace, (step, ends), (&scales.longest, &new), (stays, tolerable), outlook.is_extra, outlook.runs);
     let next = match projected.tally() {
         Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
         None => next,
     };
     let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
-    (next, goes_on(&new_v, v), goes_on(&new_y, y))
+    (next, longest, goes_on(&new_v, v), goes_on(&new_y, y))
+}
+
+/// The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's.
+fn unit_of<N: Number>(step: N) -> N {
+    step.and_bits(EXPONENT)
 }
 
 /// The sum of a series at a distance. Odd and even powers are summed apart by Horner's rule, which takes half the time of one sum; the start
 /// comes last, so that it is rounded once.
-fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a Block<N>>, step: N) -> Block<N> {
-    let square = step * step;
+fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a Block<N>>, share: N) -> Block<N> {
+    let square = share * share;
     let terms: Vec<&Block<N>> = terms.collect();
     let sum = |first: usize| {
         let powers = terms.iter().skip(first).step_by(2).rev().map(|term| (*term).clone());
         powers.reduce(|sum, term| term.zip_map(&sum, |term, sum| term + square * sum))
     };
     let (Some(odd), Some(even)) = (sum(0), sum(1)) else { return start.clone() };
-    let rest = odd.zip_map(&even, |odd, even| odd + step * even);
-    start.zip_map(&rest, |start, rest| start + step * rest)
+    let rest = odd.zip_map(&even, |odd, even| odd + share * even);
+    start.zip_map(&rest, |start, rest| start + share * rest)
 }
 
-/// How far the series is as good as is tolerated. In `before` the pace has the length of the last step that was taken; a held one does not
-/// count, for it is made once more and must be the same.
-fn reach<N: Number>(order: u32, pace: &Pace<N>, start: [&Block<N>; 2], terms: &[(Block<N>, Block<N>)]) -> N {
-    let of = |k: u32| {
-        let (v, y) = &terms[k as usize - 1];
-        [length2(v), length2(y)]
+/// How far the series is as good as is tolerated, and the motion in one unit of time over the tolerated error. In `before` the pace has the
+/// length of the last step that was taken; a held one does not count, for it is made once more and must be the same.
+fn reach<N: Number>(
+    acceptance: &Acceptance,
+    (pace, scales): (&Pace<N>, &Scales<N>),
+    unit: N,
+    [v, y]: [&Block<N>; 2],
+    terms: &[(Block<N>, Block<N>)],
+) -> (N, N) {
+    let (zero, number, order) = (N::of(0.0), N::of, terms.len());
+    let of = |k: usize| {
+        let (v, y) = &terms[k - 1];
+        acceptance.sizes(v.as_slice(), y.as_slice())
     };
-    let (present, first) = (start.map(length2), of(1));
-    // A block at zero counts as long as its rate would have made it in the last step.
-    // Squares of what is tolerated: of the absolute part and of the relative one, added.
-    let tolerated = [0, 1].map(|i| {
-        let counts = N::choose(N::of(0.0).below(pace.lasts), pace.longest[i], present[i]);
-        let square = longer(counts, first[i] * (pace.before * pace.before));
-        pace.absolute * pace.absolute + (pace.relative * pace.relative) * square
-    });
-    let per = tolerated.map(|square| N::of(1.0) / square);
+    let (present, first, second) = (acceptance.sizes(v.as_slice(), y.as_slice()), of(1), of(2));
+    // A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    let [of_v, of_y] = acceptance.counts(v.len(), y.len());
+    let mut standing = Vec::new();
+    for block in [0..of_v, of_v..of_v + of_y] {
+        let (longest, now) = (&scales.longest[block.clone()], &present[block]);
+        if now.len() > 1 {
+            let onset = N::of(ONSET) * longer(largest(longest), largest(now));
+            standing.extend(longest.iter().map(|size| N::choose(zero.below(*size), *size, onset)));
+        } else {
+            standing.extend(longest);
+        }
+    }
+    let before = pace.before * (number(1.0) / unit);
+    let groups = 0..present.len();
+    let counts_as = |group: usize| {
+        let counts = N::choose(zero.below(pace.lasts), standing[group], present[group]);
+        longer(counts, first[group] * before)
+    };
+    let counts_as: Vec<N> = groups.clone().map(counts_as).collect();
+    // What begins at zero, where nothing else has been, tolerates no error: it does not count.
+    let bound = |group: usize| {
+        let [relative, absolute] = scales.tolerances(group, pace);
+        let tolerated = absolute + relative * counts_as[group];
+        N::choose(zero.below(tolerated), tolerated, number(f64::INFINITY))
+    };
+    let bound: Vec<N> = groups.map(bound).collect();
+    let logarithm = |size: N| rough_log2(size.clamped(BOUNDS[0], BOUNDS[1]));
+    let p = order as f64;
+    let lost: Vec<N> = counts_as.iter().map(|size| number(ROUNDING) * *size).collect();
+    let moved = over(&first, &bound);
+    let (one, other) = (over(&of(order - 1), &bound), over(&of(order), &bound));
+    let (by_one, by_other) = (logarithm(one) * number(-1.0 / (p - 1.0)), logarithm(other) * number(-1.0 / p));
+    let by_error = N::choose(by_one.below(by_other), by_one, by_other) - number(MARGIN / (p - 1.0));
+    let motion = longer(longer(moved, over(&second, &bound)), over(&lost, &bound));
+    let falls = logarithm(longer(one, other)) - logarithm(motion);
+    let by_radius = falls * number(-1.0 / (p - 2.0)) + number(SHARE.log2() - (p - 1.0).log2() / (p - 2.0));
+    // A motion that is lost in rounding has no radius: it goes on as before.
+    let is_lost = first.iter().zip(&lost).map(|(rate, lost)| rate.at_most(*lost));
+    let is_lost = is_lost.fold(by_radius.below(zero), |all, each| all & each);
+    let by_radius = N::choose(is_lost, zero, by_radius);
+    let far = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error)) * unit;
+    let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
+    let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * pace.before;
+    (pace.shortened(N::choose(most.below(far), most, far), pace.t), moved)
+}
+
+/// Whether all functions stay on their branch within a step, or all its motion is tolerated as an error; none without branches.
+fn on_branches<N: Number>(branches: &[Branch<N>], share: N, moved: N) -> Option<N::Truth> {
     let zero = N::of(0.0);
-    let share = |square: N, per: N| N::choose(square.at_most(zero), zero, square * per);
-    let logarithm = |k: u32| {
-        let last = of(k);
-        let over = longer(share(last[0], per[0]), share(last[1], per[1])).clamped(BOUNDS[0], BOUNDS[1]);
-        rough_log2(over) * N::of(-0.5 / f64::from(k))
-    };
-    let (one, other) = (logarithm(order - 1), logarithm(order));
-    let reach = rough_exp2(N::choose(one.below(other), one, other) - N::of(MARGIN / f64::from(order - 1)));
-    let most = N::of(MAX_GROWTH) * pace.before;
-    N::choose(most.below(reach), most, reach)
+    let mut stays = Vec::new();
+    for Branch { terms, least, most } in branches {
+        if least.is_finite() {
+            let bound = furthest(terms, share, |term| N::choose(term.below(zero), term, zero));
+            stays.push(N::of(*least).at_most(bound));
+        }
+        if most.is_finite() {
+            let bound = furthest(terms, share, |term| N::choose(zero.below(term), term, zero));
+            stays.push(bound.at_most(N::of(*most)));
+        }
+    }
+    let stays = stays.into_iter().reduce(|all, each| all & each)?;
+    Some((moved * share).at_most(N::of(1.0)) | stays)
 }
 
-/// What comes after a step, and whether the state goes on. `new`: squares of the lengths of the new blocks.
-fn decided<N: Number>(pace: &Pace<N>, reach: N, new: [N; 2], is_extra: N::Truth, runs: N::Truth) -> (Pace<N>, N::Truth) {
+/// How far the terms to one side alone would take a value within a step: no further can it be.
+fn furthest<N: Number>(terms: &[Option<N>], share: N, part: impl Fn(N) -> N) -> N {
+    let start = terms.first().copied().flatten().unwrap_or(N::of(0.0));
+    let total = terms[1..].iter().rev().fold(None, |total: Option<N>, term| {
+        let beyond = total.map(|total| share * total);
+        match (term.map(&part), beyond) {
+            (Some(part), Some(beyond)) => Some(part + beyond),
+            (part, beyond) => part.or(beyond),
+        }
+    });
+    total.map_or(start, |total| start + share * total)
+}
+
+/// What comes after a step, which may end at the wall, the largest sizes so far, and whether the state goes on. `longest` and `new` are the
+/// largest sizes before, and those that the groups would have. `stays`: whether functions stay on their branch, none without any;
+/// `tolerable`: a step that may leave it.
+fn decided<N: Number>(
+    pace: &Pace<N>,
+    (step, ends): (N, N::Truth),
+    (longest, new): (&[N], &[N]),
+    (stays, tolerable): (Option<N::Truth>, N),
+    is_extra: N::Truth,
+    runs: N::Truth,
+) -> (Pace<N>, Vec<N>, N::Truth) {
     let number = N::of;
-    let good = (new[0] + new[1]).below(number(f64::INFINITY)); // NaN is not
-    let reached = pace.t + reach;
+    let finite = total(new).below(number(f64::INFINITY)); // NaN is not
+    // A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
+    let fits = finite & (ends | pace.t.below(pace.t + number(0.25) * step));
+    let good = stays.map_or(fits, |stays| fits & stays);
+    let shorter = number(SHRINK) * N::choose(step.below(pace.before), step, pace.before);
+    let shorter = stays.map_or(shorter, |stays| N::choose(stays, shorter, longer(shorter, tolerable)));
+    let reached = N::choose(ends, pace.wall, pace.t + step);
     let passes = pace.target.below(reached);
     let (takes, holds, fails) = (runs & good & !passes, runs & good & passes, runs & !good);
     let count = |truth: N::Truth| N::choose(truth, number(1.0), number(0.0));
-    let longest = |i: usize| N::choose(takes & pace.longest[i].below(new[i]), new[i], pace.longest[i]);
     let next = Pace {
         t: N::choose(takes, reached, pace.t),
-        h: N::choose(takes | holds, reach, N::choose(fails, number(0.0), pace.h)),
+        h: N::choose(takes | holds, step, N::choose(fails, shorter, pace.h)),
         extra: N::choose(is_extra, number(0.0), pace.extra),
         held: N::choose(holds, number(1.0), pace.held),
-        before: N::choose(takes, reach, pace.before),
-        longest: [longest(0), longest(1)],
+        before: N::choose(takes & !ends, step, N::choose(fails, shorter, pace.before)),
+        most: {
+            let failed = N::choose(fails, number(SHRINK), pace.most);
+            N::choose(takes & pace.most.below(number(MAX_FACTOR)), number(2.0) * pace.most, failed)
+        },
         accepted: pace.accepted + count(takes),
         rejected: pace.rejected + count(fails),
         extra_steps: pace.extra_steps + count(holds | is_extra),
-        error: N::choose(fails, number(f64::INFINITY), pace.error),
+        error: {
+            let failed = N::choose(finite, number(1.0), number(f64::INFINITY));
+            N::choose(takes, number(0.0), N::choose(fails, failed, pace.error))
+        },
         ..*pace
     };
-    (next, takes | is_extra)
+    let grows = longest.iter().zip(new).map(|(so_far, new)| N::choose(takes & so_far.below(*new), *new, *so_far));
+    (next, grows.collect(), takes | is_extra)
 }

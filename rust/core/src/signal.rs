@@ -25,6 +25,17 @@ pub enum Signal<N: Number> {
         /// What it is multiplied with.
         factor: Option<N>,
     },
+    /// A polynomial between each two samples, of the time since the first of them.
+    Curve {
+        /// The table of its constant terms; those of higher powers follow, and then one of the times at which pieces begin.
+        table: u32,
+        /// Its degree.
+        degree: u32,
+        /// The value of a table at a time.
+        sample: fn(u32, N) -> N,
+        /// What it is multiplied with.
+        factor: Option<N>,
+    },
 }
 
 impl<N: Number> Signal<N> {
@@ -37,6 +48,10 @@ impl<N: Number> Signal<N> {
                 let value = sample(table, t);
                 factor.map_or(value, |factor| factor * value)
             }
+            Signal::Curve { table, degree, sample, factor } => {
+                let value = curve(table, degree, t, |table| sample(table, t));
+                factor.map_or(value, |factor| factor * value)
+            }
         }
     }
 
@@ -47,6 +62,13 @@ impl<N: Number> Signal<N> {
             Signal::Constant(value) => Signal::Constant(factor * value),
             Signal::Sine { amplitude, omega, phase } => Signal::Sine { amplitude: factor * amplitude, omega, phase },
             Signal::Held { table, sample, .. } => Signal::Held { table, sample, factor: Some(factor) },
+            Signal::Curve { table, degree, sample, .. } => Signal::Curve { table, degree, sample, factor: Some(factor) },
         }
     }
+}
+
+/// The value of a curve at a time, from its tables there.
+pub fn curve<N: Number>(table: u32, degree: u32, t: N, at: impl Fn(u32) -> N) -> N {
+    let since = t - at(table + degree + 1);
+    (0..degree).rev().fold(at(table + degree), |value, k| value * since + at(table + k))
 }

@@ -99,7 +99,8 @@ impl Given {
 
     /// Whether anything of that name was given: a parameter, or an input of any kind.
     pub fn has(&self, name: &str) -> bool {
-        self.count(name) > 0 || find(&self.tables, name).is_some() || self.count(&format!("{name}.amplitude")) > 0
+        let table = |name: &str| find(&self.tables, name).is_some();
+        self.count(name) > 0 || table(name) || table(&format!("{name}.0")) || self.count(&format!("{name}.amplitude")) > 0
     }
 
     /// How many rows of parameters there are in all.
@@ -184,6 +185,11 @@ impl<N: Number> Parameters<'_, N> {
         }
         if let Some(table) = self.given.tables.iter().position(|(known, _)| known == name) {
             return Some(Signal::Held { table: table as u32, sample: self.sample, factor: None });
+        }
+        if let Some(table) = self.given.tables.iter().position(|(known, _)| *known == format!("{name}.0")) {
+            let is_next = |k: &usize| self.given.tables.get(table + k).is_some_and(|(known, _)| *known == format!("{name}.{k}"));
+            let degree = (1..).take_while(is_next).count() as u32;
+            return Some(Signal::Curve { table: table as u32, degree, sample: self.sample, factor: None });
         }
         let part = |part: &str| self.maybe(&format!("{name}.{part}"));
         let (amplitude, omega, phase) = (part("amplitude")?, part("omega")?, part("phase")?);

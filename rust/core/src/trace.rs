@@ -17,16 +17,19 @@ use crate::{
     large::{Facts, MAX_TAPE_OPERATIONS, group::Courses, tapes::Rated},
     method::Record,
     number::{Number, Symbol, record},
-    pace::{Attempted, Pace, Stretched, attempt},
-    program::Program,
+    pace::{Acceptance, Attempted, Backward, Pace, Scales, Stretched, attempt},
+    program::{Program, Terms},
     real::{Precision, Real},
     run::stage::Stage,
     series_pace,
     spec::{Given, Parameters},
     system::{Block, Kind, Shape, System},
-    systems::linear::products,
-    tape::{Counts, Id, Op, Tape, fuse::fuse, split::split},
-    watch,
+    systems::{
+        equations::{Equations, next_state},
+        linear::products,
+    },
+    tape::{Counts, Id, Op, Tape, fuse::fuse, split::split_with_times},
+    watch, window,
 };
 
 /// The kind of step.
@@ -45,7 +48,13 @@ pub enum How {
         name: String,
         /// The order of its series, if it is one; 0 for that of a step of fixed length.
         order: u32,
+        /// What a step must satisfy.
+        acceptance: Acceptance,
+        /// Whether the time of the run is that of the system, negated.
+        backward: bool,
     },
+    /// A step that is given as operations.
+    Step(Arc<Equations>),
     /// The transition-matrix form (Appendix B): s ← P·s + Σ Q·u, with the inputs at these nodes, by the bits of each.
     Matrix {
         /// Times of the inputs, as fractions of a step, by their bits.
@@ -132,7 +141,7 @@ pub struct Steps {
 /// The leaves of a tape: parameters, sampled inputs, the step.
 pub(crate) fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
     let numbers = (0..given.parameters() as u32).map(|i| Symbol::new(Op::Param(i))).collect();
-    Parameters { given, h, numbers, sample: |table, t| Symbol::new(Op::Sample(table, t.0)) }
+    Parameters { given, h, numbers, sample: window::sample }
 }
 
 /// Numbers of the state.
@@ -164,6 +173,7 @@ pub fn shape(given: &Given, how: &How) -> Result<Shape, Error> {
             let (n, v) = (given.whole("n"), given.whole("n_v").min(given.whole("n")));
             Ok(Shape { v, y: n - v })
         }
+        How::Step(step) => step.fit(given),
         How::Method { name, .. } | How::Attempts { name, .. } => kind(given)?.fit(given, method(name)?),
     }
 }
@@ -193,20 +203,31 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             let (tape, next) = record(tape, || matrix(given, shape, nodes));
             Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
         }
+        How::Step(step) => {
+            let (tape, next) = record(tape, || {
+                let p = parameters(given, Symbol::new(Op::Step));
+                let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
+                ids([&next_state(step, &p, Symbol::new(Op::Time), &v, &y)])
+            });
+            Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
+        }
         How::Method { name, choice } => {
             let (kind, method) = (kind(given)?, method(name)?);
-            let (tape, (next, tally)) = record(tape, || step(kind, given, shape, method, *choice));
+            let carries = method.carry.is_some();
+            let seen = || window::of_step(Symbol::new(Op::Time), Symbol::new(Op::Step), carries);
+            let (tape, (next, tally)) = record(tape, || window::over(given, seen, || step(kind, given, shape, method, *choice)));
             Ok(Steps { tape, next, shape, tally, terms: Vec::new() })
         }
-        How::Attempts { name, order } => {
+        How::Attempts { name, order, acceptance, backward } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let (Some(program), Some(estimate)) = (method.attempt(), &method.estimate) else { return Err(Error::NoEstimate) };
             if contact::is_given(given) {
                 return Err(given.unknown("contact_0"));
             }
+            let scene = AttemptsOf { kind, given, shape, acceptance, backward: *backward };
             let (tape, (next, terms)) = record(tape, || match series_order(&program, *order) {
-                Some(order) => series_attempts(kind, given, shape, order),
-                None => (attempts(kind, given, shape, &program, estimate.order), Vec::new()),
+                Some(order) => scene.series(order),
+                None => (scene.attempts(&program, estimate.order), Vec::new()),
             });
             Ok(Steps { tape, next, shape, tally: false, terms })
         }
@@ -247,75 +268,110 @@ fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize
     (next, tally.is_some())
 }
 
-fn attempts(kind: &Kind, given: &Given, shape: Shape, program: &Program, order: u32) -> Vec<Id> {
-    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let scaled = |h: Symbol| (kind.make)(&parameters(given, h));
-    let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
-        if given.equations.is_some() {
-            return scaled(step); // the push of their control depends on the step
-        }
-        let stretched = Box::new(Stretched { s: scaled(Symbol::of(1.0)), h: step });
-        if controls::pushes(given) { controls::wrap(&parameters(given, step), stretched, Symbol::of(0.0)) } else { stretched }
-    };
-    let plain = scaled(Symbol::of(1.0));
-    let one = parameters(given, Symbol::of(1.0));
-    let projected = if controls::pushes(given) { plain } else { controls::wrap(&one, plain, Symbol::of(0.0)) };
-    let system = Attempted { rates: &rates, projected: projected.as_ref() };
-    let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = attempt(program, &system, order, pace(shape), budget, &v, &y);
-    let mut next = ids([&v, &y]);
-    next.extend(pace.numbers().map(|symbol| symbol.0));
-    next
+/// What attempts at adaptive steps are traced of.
+struct AttemptsOf<'a> {
+    kind: &'a Kind,
+    given: &'a Given,
+    shape: Shape,
+    acceptance: &'a Acceptance,
+    backward: bool,
 }
 
-/// The pace as a part of the state, behind v and y.
-fn pace(shape: Shape) -> Pace<Symbol> {
-    Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((shape.v + shape.y + i) as u32))))
+impl AttemptsOf<'_> {
+    /// The system, scaled to a step.
+    fn scaled(&self, h: Symbol) -> Box<dyn System<Symbol>> {
+        if self.backward {
+            return Box::new(Backward((self.kind.make)(&parameters(self.given, -h))));
+        }
+        (self.kind.make)(&parameters(self.given, h))
+    }
+
+    /// The system scaled to a step of 1, under its projection if there is one.
+    fn projected(&self) -> Box<dyn System<Symbol>> {
+        controls::wrap(&parameters(self.given, Symbol::of(1.0)), self.scaled(Symbol::of(1.0)), Symbol::of(0.0))
+    }
+
+    fn state(&self) -> (Block<Symbol>, Block<Symbol>) {
+        (block(0, self.shape.v), block(self.shape.v, self.shape.y))
+    }
+
+    /// The pace as a part of the state, behind v and y, and the sizes behind it.
+    fn pace(&self) -> (Pace<Symbol>, Scales<Symbol>) {
+        let first = self.shape.v + self.shape.y;
+        let pace = Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((first + i) as u32))));
+        let numbers = block(first + Pace::<Symbol>::NUMBERS, self.acceptance.numbers(self.shape.v, self.shape.y));
+        (pace, Scales::of(numbers.as_slice(), self.acceptance.own))
+    }
+
+    /// The next state: v and y, the pace, and the sizes.
+    fn next(&self, pace: &Pace<Symbol>, longest: &[Symbol], v: &Block<Symbol>, y: &Block<Symbol>) -> Vec<Id> {
+        let own = self.pace().1.own;
+        let mut next = ids([v, y]);
+        next.extend(pace.numbers().iter().chain(longest).chain(&own).map(|symbol| symbol.0));
+        next
+    }
+
+    fn attempts(&self, program: &Program, order: u32) -> Vec<Id> {
+        let (given, (v, y), (pace, scales)) = (self.given, self.state(), self.pace());
+        let rates = |step: Symbol| -> Box<dyn System<Symbol>> {
+            if given.equations.is_some() {
+                return self.scaled(step); // the push of their control depends on the step
+            }
+            let stretched = Box::new(Stretched { s: self.scaled(Symbol::of(1.0)), h: step });
+            if controls::pushes(given) { controls::wrap(&parameters(given, step), stretched, Symbol::of(0.0)) } else { stretched }
+        };
+        let projected = if controls::pushes(given) { self.scaled(Symbol::of(1.0)) } else { self.projected() };
+        let system = Attempted { rates: &rates, projected: projected.as_ref() };
+        let budget = Symbol::new(Op::Param(BUDGET));
+        let (pace, longest, v, y) = attempt(program, &system, order, self.acceptance, (pace, &scales), budget, &v, &y);
+        self.next(&pace, &longest, &v, &y)
+    }
+
+    /// Steps by a series of that order, and its coefficients.
+    fn series(&self, order: u32) -> (Vec<Id>, Vec<Id>) {
+        let (v, y) = self.state();
+        let (terms, branches) = series_pace::terms(order, self.scaled(Symbol::of(1.0)).as_ref(), &self.pace().0, &v, &y);
+        let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
+        (self.attempt_by((&terms, &branches)), numbers)
+    }
+
+    /// One attempt by coefficients of a series.
+    fn attempt_by(&self, terms: series_pace::Known<Symbol>) -> Vec<Id> {
+        let ((v, y), (pace, scales)) = (self.state(), self.pace());
+        let budget = Symbol::new(Op::Param(BUDGET));
+        let projected = self.projected();
+        let (pace, longest, v, y) =
+            series_pace::attempt(terms, projected.as_ref(), self.acceptance, (pace, &scales), budget, &v, &y);
+        self.next(&pace, &longest, &v, &y)
+    }
+
+    /// Where a member stands at the start, without control.
+    fn begin(&self, series: bool) -> Vec<Id> {
+        let (v, y) = self.state();
+        let (pace, longest) = self.pace().0.begun(self.scaled(Symbol::of(1.0)).as_ref(), self.acceptance, series, &v, &y);
+        self.next(&pace, &longest, &v, &y)
+    }
 }
 
 /// Traces where a member stands at the start, without control, onto a tape that may hold something already.
-fn trace_begin(tape: Tape, given: &Given, method: &Record) -> Result<(Tape, Vec<Id>), Error> {
+fn trace_begin(tape: Tape, given: &Given, how: &How) -> Result<(Tape, Vec<Id>), Error> {
+    let How::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
     let kind = kind(given)?;
-    let shape = (kind.shape)(given)?;
-    let series = method.program().series_order() > 0;
+    let scene = AttemptsOf { kind, given, shape: (kind.shape)(given)?, acceptance, backward: *backward };
+    let series = method(name)?.program().series_order() > 0;
+    Ok(record(tape, || scene.begin(series)))
+}
+
+/// Traces an attempt by coefficients that stand behind the rest of the state, where they stay.
+fn trace_by_terms(tape: Tape, given: &Given, how: &How, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
+    let How::Attempts { acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
+    let scene = AttemptsOf { kind: kind(given)?, given, shape, acceptance, backward: *backward };
     Ok(record(tape, || {
-        let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let begun = pace(shape).begun((kind.make)(&parameters(given, Symbol::of(1.0))).as_ref(), series, &v, &y);
-        let mut next = ids([&v, &y]);
-        next.extend(begun.numbers().map(|symbol| symbol.0));
-        next
-    }))
-}
-
-/// Steps by a series of that order, and its coefficients.
-fn series_attempts(kind: &Kind, given: &Given, shape: Shape, order: u32) -> (Vec<Id>, Vec<Id>) {
-    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let system = (kind.make)(&parameters(given, Symbol::of(1.0)));
-    let terms = series_pace::terms(order, system.as_ref(), &pace(shape), &v, &y);
-    let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
-    (attempt_by(kind, given, shape, &terms), numbers)
-}
-
-/// One attempt by coefficients of a series.
-fn attempt_by(kind: &Kind, given: &Given, shape: Shape, terms: &[(Block<Symbol>, Block<Symbol>)]) -> Vec<Id> {
-    let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-    let one = parameters(given, Symbol::of(1.0));
-    let projected = controls::wrap(&one, (kind.make)(&one), Symbol::of(0.0));
-    let budget = Symbol::new(Op::Param(BUDGET));
-    let (pace, v, y) = series_pace::attempt(terms, projected.as_ref(), pace(shape), budget, &v, &y);
-    let mut next = ids([&v, &y]);
-    next.extend(pace.numbers().map(|symbol| symbol.0));
-    next
-}
-
-/// Traces an attempt by coefficients that stand behind the state and the pace, where they stay.
-fn trace_by_terms(tape: Tape, given: &Given, shape: Shape, numbers: usize) -> Result<(Tape, Vec<Id>), Error> {
-    let kind = kind(given)?;
-    Ok(record(tape, || {
-        let (state, first) = (shape.v + shape.y, shape.v + shape.y + Pace::<Symbol>::NUMBERS);
+        let state = shape.v + shape.y;
+        let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
-        let terms: series_pace::Terms<Symbol> = (0..numbers / state).map(of).collect();
-        let mut next = attempt_by(kind, given, shape, &terms);
+        let terms: Terms<Symbol> = (0..numbers / state).map(of).collect();
+        let mut next = scene.attempt_by((&terms, &[]));
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
     }))
@@ -328,10 +384,16 @@ fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
     let n = shape.v + shape.y;
     let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
     let inputs: Vec<_> = (0..given.whole("inputs")).filter_map(|i| p.signal(&format!("inputs[{i}]"))).collect();
-    for node in nodes {
-        let at = t + Symbol::of(f64::from_bits(*node)) * h;
-        columns.extend(inputs.iter().map(|input| input.at(at)));
-    }
+    window::over(
+        given,
+        || window::of_step(t, h, given.whole("carries") > 0),
+        || {
+            for node in nodes {
+                let at = t + Symbol::of(f64::from_bits(*node)) * h;
+                columns.extend(inputs.iter().map(|input| input.at(at)));
+            }
+        },
+    );
     let (of_state, of_inputs) = (p.numbers("p"), p.numbers("q"));
     // P by rows; Q by columns, nodes and inputs, each with a number for every row.
     let entry = |i: usize, j: usize| if j < n { of_state[i * n + j] } else { of_inputs[(j - n) * n + i] };
@@ -352,8 +414,8 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
         let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
-        let mut made = program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter();
-        ids([&made.next().unwrap_or(v), &y])
+        let made = || program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter().next();
+        ids([&window::over(given, || window::of_slot(t, h), made).unwrap_or_else(|| v.clone()), &y])
     }))
 }
 
@@ -380,13 +442,13 @@ pub fn trace(tape: Tape, given: &Given, how: &How, what: &str) -> Result<(Tape, 
     let unknown = || Error::Options { system: given.system.clone(), options: format!("trace {what} {which}") };
     let name = match how {
         How::Method { name, .. } | How::Attempts { name, .. } => name.as_str(),
-        How::Matrix { .. } => "",
+        How::Step(_) | How::Matrix { .. } => "",
     };
     let choice = which.parse().unwrap_or(0);
     match what {
         "step" => trace_step(tape, given, &started(how, choice)).map(|steps| (steps.tape, steps.next)),
         "attempt" if matches!(how, How::Attempts { .. }) => trace_step(tape, given, how).map(|steps| (steps.tape, steps.next)),
-        "begin" => trace_begin(tape, given, method(name)?),
+        "begin" => trace_begin(tape, given, how),
         "start" => trace_slot(tape, given, &method(name)?.start(choice).ok_or_else(unknown)?),
         "finish" => trace_slot(tape, given, &method(name)?.finish(choice).ok_or_else(unknown)?),
         "record" => trace_record(tape, given, &[which.to_owned()]),
@@ -404,7 +466,9 @@ fn started(how: &How, choice: usize) -> How {
 
 /// Cuts a tape.
 pub(crate) fn cut<T: Real>(given: &Given, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
-    Stage::new(split(tape, next, &|i| i == BUDGET || given.is_common(i), &|table| given.is_common_table(table)))
+    let of_times = |table: u32| given.tables.get(table as usize).is_some_and(|(name, _)| name.ends_with(".times"));
+    let shared = |i: u32| i == BUDGET || given.is_common(i);
+    Stage::new(split_with_times(tape, next, &shared, &|table| given.is_common_table(table), &of_times))
 }
 
 /// Approximate numbers of operations of the rates of a scene and of a step.
@@ -415,6 +479,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
             let products = n * (n + given.whole("inputs") * nodes.len());
             (2 * products, 2 * products)
         }
+        How::Step(step) => (step.operations(), step.operations()),
         How::Method { name, .. } | How::Attempts { name, .. } => {
             let rates = (kind(given)?.operations)(given);
             let method = method(name)?;
@@ -438,7 +503,7 @@ fn operations(given: &Given, how: &How, shape: Shape) -> Result<(usize, usize), 
 fn has_series(how: &How) -> Result<bool, Error> {
     Ok(match how {
         How::Method { name, .. } | How::Attempts { name, .. } => method(name)?.program().series_order() > 0,
-        How::Matrix { .. } => false,
+        How::Step(_) | How::Matrix { .. } => false,
     })
 }
 
@@ -484,7 +549,7 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            let most = if series { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            let most = if series || matches!(self.how, How::Step(_)) { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
             Ok((traced, operations.1.min(most)))
         })
     }
@@ -604,7 +669,7 @@ impl Scene {
             }
         }
         let begin = match &self.how {
-            How::Attempts { name, .. } => Some(cut(&self.given, &trace_begin(new(), &self.given, method(name)?)?)),
+            How::Attempts { .. } => Some(cut(&self.given, &trace_begin(new(), &self.given, &self.how)?)),
             _ => None,
         };
         let mut quantities = None;
@@ -615,7 +680,7 @@ impl Scene {
         let series_evaluations = steps.tape.series_evaluations();
         let (mut next, mut by_terms) = (steps.next, None);
         if !steps.terms.is_empty() && !self.fused {
-            by_terms = Some(cut(&self.given, &trace_by_terms(new(), &self.given, steps.shape, steps.terms.len())?));
+            by_terms = Some(cut(&self.given, &trace_by_terms(new(), &self.given, &self.how, steps.shape, steps.terms.len())?));
             next.extend(steps.terms);
         }
         let step = fused(steps.tape, next);

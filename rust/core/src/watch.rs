@@ -1,7 +1,7 @@
 //! Quantities whose changes of sign are noticed while steps are made, for runs with events.
 //!
-//! A step computes them at its start, compares each with what it was at the start of the step before, and counts. Where and which they are
-//! is found afterwards, by repeating steps; so what is noticed here only has to be complete.
+//! A step computes them at its start, compares each with what it was at the start of the step before, and counts where it is near to zero
+//! against its change. Where and which they are is found afterwards, by repeating steps; so what is noticed here only has to be complete.
 
 use crate::{
     error::Error,
@@ -12,7 +12,12 @@ use crate::{
     systems::equations::values_of,
     tape::{Id, Op},
     trace::around,
+    window,
 };
+
+/// A quantity may be at zero and back within a step where it is no further from zero than so many times its change in this one: `REACH`
+/// of `reference/events.py`.
+const REACH: f64 = 4.0;
 
 /// How many numbers of a state it takes, behind all others: the last value of each quantity, and the count.
 pub fn numbers(given: &Given) -> usize {
@@ -39,22 +44,23 @@ pub fn next(
     let Some(watched) = &p.given.watched else { return Vec::new() };
     let v = match method.finish(choice) {
         None => v.clone(),
-        Some(program) => program.run(around(kind, p).as_ref(), t, p.h, v, y).into_iter().next().unwrap_or_else(|| v.clone()),
+        Some(program) => {
+            let made = || program.run(around(kind, p).as_ref(), t, p.h, v, y).into_iter().next();
+            window::over(p.given, || window::of_slot(t, p.h), made).unwrap_or_else(|| v.clone())
+        }
     };
     let now = values_of(watched, p, t, &v, y);
     let state = |i: usize| Symbol::new(Op::State((first + i) as u32));
     let zero = Symbol::of(0.0);
     let mut count = state(now.len());
-    for (i, ((direction, _), now)) in watched.quantities().iter().zip(&now).enumerate() {
+    let reach = Symbol::of(REACH * REACH);
+    for (i, now) in now.iter().enumerate() {
         let before = state(i);
-        let rising = before.below(zero) & zero.at_most(*now);
-        let falling = zero.below(before) & now.at_most(zero);
-        let changes = match direction.as_str() {
-            "rising" => rising,
-            "falling" => falling,
-            _ => rising | falling,
-        };
-        count = Symbol::choose(changes, count + Symbol::of(1.0), count);
+        let (change, square, last) = (*now - before, *now * *now, before * before);
+        let far = reach * (change * change);
+        // A change of sign is a longer way than from zero to either of them, so that it is among these.
+        let near = zero.below(last) & (square.at_most(far) | last.at_most(far));
+        count = Symbol::choose(near, count + Symbol::of(1.0), count);
     }
     now.into_iter().chain([count]).map(|symbol| symbol.0).collect()
 }

@@ -16,6 +16,7 @@ use stepwell_core::{
         pack::{self, Make},
         writer::{Shape, Written, choose, write, write_if_it_gains},
     },
+    pace::Acceptance,
     run::Model,
     spec::{Row, Table},
     steppers::RECORDS,
@@ -182,7 +183,7 @@ fn no_kernel_computes_more_than_its_step_or_in_narrower_vectors() {
         if method.estimate.is_some() {
             // Adaptive steps.
             let attempts = |model: Model<'static>| {
-                let how = How::Attempts { name: name.to_owned(), order: 0 };
+                let how = How::Attempts { name: name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false };
                 Model { scene: Scene { how, ..model.scene }, ..model }
             };
             models.extend([pendulum(name, true), restricted(name), three_bodies(name)].map(attempts));

@@ -16,7 +16,7 @@ use stepwell_core::{
         tapes::TapeRates,
     },
     method,
-    pace::Pace,
+    pace::{Acceptance, Pace},
     real::Precision,
     run::{
         Machine,
@@ -284,7 +284,10 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
         let parameters = numbers(13 * (given.parameters() + 9), seed as u64 + 1);
         let spec = spec(&given, &parameters, 13);
         for record in RECORDS.iter().filter(|record| record.estimate.is_some() && record.program().series_order() == 0) {
-            let scene = scene(&given, How::Attempts { name: record.name.to_owned(), order: 0 });
+            let scene = scene(
+                &given,
+                How::Attempts { name: record.name.to_owned(), order: 0, acceptance: Acceptance::default(), backward: false },
+            );
             let traced = scene.traced().unwrap();
             let (level, shape) = (Level::choose().unwrap(), traced.shape);
             let state = numbers(shape.v + shape.y, 98);
@@ -295,14 +298,17 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
                     adaptive.set_state(0, &state);
                     let new = Pace::of([0.0; Pace::<f64>::NUMBERS]);
                     let (t, interval, until) = (0.3, f64::INFINITY, f64::NEG_INFINITY);
-                    let begun = Pace { t, begin: t, h: 0.2, interval, until, relative: 1e-6, before: 1.0, most: 5.0, ..new };
+                    let (most_step, wall) = (f64::INFINITY, f64::INFINITY);
+                    let begun = Pace { t, begin: t, h: 0.2, interval, until, most_step, wall, before: 1.0, most: 5.0, ..new };
+                    let begun = Pace { relative: 1e-6, ..begun };
+                    adaptive.set_scales(0, &vec![0.25; Acceptance::default().numbers(shape.v, shape.y)]);
                     let lasts = f64::from(u8::from(member == 4));
                     adaptive.set_pace(0, Pace { target: 0.9, lasts, absolute: 1e-9 * (1.0 - lasts), ..begun });
                     // Along the path, and then a step beside it, wherever that has come to.
                     for (attempts, extra) in [(1, 0.0), (1, 0.0), (40, 0.0), (1, 0.01)] {
                         adaptive.set_pace(0, Pace { extra, ..adaptive.pace(0) });
                         adaptive.attempt(attempts);
-                        let numbers = [adaptive.state(0), adaptive.pace(0).numbers().to_vec()].concat();
+                        let numbers = [adaptive.state(0), adaptive.pace(0).numbers().to_vec(), adaptive.scales(0)].concat();
                         seen.push(numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>());
                     }
                 }

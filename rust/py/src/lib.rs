@@ -4,9 +4,11 @@ mod model;
 mod tape;
 mod world;
 
+use std::cell::RefCell;
+
 use numpy::{
-    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1,
-    PyReadwriteArray2, PyReadwriteArrayDyn, ndarray::Dimension,
+    Element, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray, PyReadwriteArray1, PyReadwriteArray2,
+    PyReadwriteArrayDyn, ndarray::Dimension,
 };
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
@@ -186,7 +188,8 @@ fn times(plan: PlanOf, mut t: PyReadwriteArray1<'_, f64>) -> PyResult<()> {
 /// When the state is asked for, and how long to try: see `Pacing` in `engine/adaptive.py`.
 #[derive(FromPyObject)]
 struct PacingOf<'py> {
-    at: PyReadonlyArray1<'py, f64>,
+    at: PyReadonlyArray2<'py, f64>,
+    jumps: PyReadonlyArray2<'py, f64>,
     budget: i64,
     begins: bool,
 }
@@ -214,7 +217,8 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     let plan_of_core = chosen::Plan {
         model: model.model(model.attempts(), &rows, &tables)?,
         machine: Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: plan.threads },
-        at: pacing.at.as_slice()?,
+        at: by_row(&pacing.at)?,
+        jumps: by_row(&pacing.jumps)?,
         paces: by_row(&arrays.paces)?,
         begins: pacing.begins,
         budget: pacing.budget,
@@ -233,6 +237,24 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
     interruptible(py, plan.progress, |monitor| chosen::run(&plan_of_core, to_fill, monitor))
 }
 
+thread_local! {
+    /// What this thread asks at intervals while it steps: signals reach the main thread alone.
+    static ASKED: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
+}
+
+/// Lets this thread ask a function at intervals while it steps, or none; what the function raises ends the run.
+#[pyfunction]
+fn ask(function: Option<Py<PyAny>>) {
+    ASKED.with(|asked| *asked.borrow_mut() = function);
+}
+
+/// Raises if this thread is to stop: what the function says that it asks, and `KeyboardInterrupt` after Ctrl-C.
+#[pyfunction]
+pub fn listen(py: Python<'_>) -> PyResult<()> {
+    let asked = ASKED.with(|asked| asked.borrow().as_ref().map(|function| function.clone_ref(py)));
+    asked.map_or(Ok(()), |function| function.call0(py).map(drop)).and_then(|()| py.check_signals())
+}
+
 /// Runs without the GIL, reports progress and answers Ctrl-C.
 fn interruptible<T: Send>(
     py: Python<'_>,
@@ -243,7 +265,7 @@ fn interruptible<T: Send>(
     let mut monitor = |share: f64| {
         Python::attach(|py| {
             let told = progress.as_ref().map_or(Ok(()), |p| p.call1(py, (share,)).map(drop));
-            match told.and_then(|()| py.check_signals()) {
+            match told.and_then(|()| listen(py)) {
                 Ok(()) => true,
                 Err(error) => {
                     raised = Some(error);
@@ -342,6 +364,14 @@ fn check(py: Python<'_>, model: &ModelSpec) -> PyResult<()> {
     model.model(model.started(0), &rows, &tables)?.traced().map(drop).map_err(core_error)
 }
 
+/// About how many operations a step has: see `_core.pyi`.
+#[pyfunction]
+fn operations(py: Python<'_>, model: &ModelSpec) -> PyResult<usize> {
+    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
+    let traced = model.model(model.started(0), &rows, &tables)?.traced().map_err(core_error)?;
+    Ok(traced.operations.1)
+}
+
 /// To how many function evaluations a step with a series is equal: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, *, attempts=false))]
@@ -437,12 +467,15 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(systems, m)?)?;
     m.add_function(wrap_pyfunction!(isa, m)?)?;
     m.add_function(wrap_pyfunction!(isa_levels, m)?)?;
+    m.add_function(wrap_pyfunction!(ask, m)?)?;
+    m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_function(wrap_pyfunction!(times, m)?)?;
     m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
     m.add_function(wrap_pyfunction!(in_parts, m)?)?;
+    m.add_function(wrap_pyfunction!(operations, m)?)?;
     m.add_function(wrap_pyfunction!(program, m)?)?;
     m.add_function(wrap_pyfunction!(series_evaluations, m)?)?;
     m.add_function(wrap_pyfunction!(forget, m)?)?;

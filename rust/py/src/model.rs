@@ -10,6 +10,7 @@ use pyo3::{
 use stepwell_core::{
     controls::force,
     error::Error,
+    pace::Acceptance,
     real::Precision,
     run::Model,
     spec::{Given, Row, Spec, Table},
@@ -19,6 +20,8 @@ use stepwell_core::{
 
 /// The name of quantities whose changes of sign are noticed.
 const WATCHED: &str = "watched()";
+/// The name of a step that is given as operations.
+const STEP: &str = "step()";
 
 /// A message as an argument error of the package.
 pub fn argument_error(message: String) -> PyErr {
@@ -126,6 +129,8 @@ pub struct ModelSpec {
     fused: bool,
     order: u32,
     pub precision: Precision,
+    acceptance: Acceptance,
+    backward: bool,
 }
 
 /// The parameters, borrowed for a run.
@@ -153,9 +158,9 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 impl ModelSpec {
     /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the number of rows
     /// in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether steps are computed with
-    /// numbers of 32 bits.
+    /// numbers of 32 bits; `acceptance` is that of `reference/adaptive.py`, and `backward` whether adaptive steps go back in time.
     #[new]
-    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false))]
+    #[pyo3(signature = (system, method, given, *, matrix=None, record=Vec::new(), fused=false, order=0, single=false, acceptance=None, backward=false))]
     #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn new(
         py: Python<'_>,
@@ -167,9 +172,11 @@ impl ModelSpec {
         fused: bool,
         order: u32,
         single: bool,
+        acceptance: Option<(Vec<u32>, bool, Vec<u32>)>,
+        backward: bool,
     ) -> Self {
         let mut names = Given { system, ..Given::default() };
-        let (mut rows, mut tables) = (Vec::new(), Vec::new());
+        let (mut rows, mut tables, mut step) = (Vec::new(), Vec::new(), None);
         for (name, value) in given {
             match value {
                 Value::Word(word) => names.words.push((name, word)),
@@ -182,6 +189,7 @@ impl ModelSpec {
                     rows.push(array);
                 }
                 Value::Equations(quantities) if name == WATCHED => names.watched = Some(quantities),
+                Value::Equations(next) if name == STEP => step = Some(next),
                 Value::Equations(rates) => names.equations = Some(rates),
                 Value::Samples((start, interval, array)) => {
                     let common = array.bind(py).shape()[1] == 1;
@@ -190,11 +198,25 @@ impl ModelSpec {
                 }
             }
         }
-        let how = match matrix {
-            None => How::Method { name: method, choice: 0 },
-            Some((nodes, _)) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
+        let how = match (matrix, step) {
+            (None, Some(step)) => How::Step(step),
+            (None, None) => How::Method { name: method, choice: 0 },
+            (Some((nodes, _)), _) => How::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect() },
         };
-        ModelSpec { given: Arc::new(names), how, rows, tables, record, fused, order, precision: precision(single) }
+        let acceptance =
+            acceptance.map_or_else(Acceptance::default, |(groups, own, positive)| Acceptance { groups, own, positive });
+        ModelSpec {
+            given: Arc::new(names),
+            how,
+            rows,
+            tables,
+            record,
+            fused,
+            order,
+            precision: precision(single),
+            acceptance,
+            backward,
+        }
     }
 }
 
@@ -220,7 +242,12 @@ impl ModelSpec {
     /// Adaptive steps.
     pub fn attempts(&self) -> How {
         match &self.how {
-            How::Method { name, .. } => How::Attempts { name: name.clone(), order: self.order },
+            How::Method { name, .. } => How::Attempts {
+                name: name.clone(),
+                order: self.order,
+                acceptance: self.acceptance.clone(),
+                backward: self.backward,
+            },
             other => other.clone(),
         }
     }

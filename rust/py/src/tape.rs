@@ -54,7 +54,7 @@ pub struct Symbol {
 type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Symbol>>, PyRef<'py, Symbol>);
 
 /// A value that is a function of others: with each of these its derivative by it.
-type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>);
+type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>, Option<[f64; 2]>);
 
 /// A symbol, or a number that becomes one.
 enum Value<'py> {
@@ -312,7 +312,7 @@ impl Tape {
 
     /// The rates of a user's own system: of v, and of y unless they are v itself; quantities of a state by name; and of the invariant that
     /// a projection keeps its value, its derivatives by v and by y, and the square of their length.
-    /// `functions` are values with, for each that they depend on, the derivative by it.
+    /// `functions` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its bounds.
     #[pyo3(signature = (dv, dy=None, quantities=Vec::new(), kept=None, functions=Vec::new()))]
     fn equations(
         &self,
@@ -336,9 +336,9 @@ impl Tape {
             Ok(Invariant { value: known(&value)?, along_v: all(&along_v)?, along_y: all(&along_y)?, square: known(&square)? })
         });
         let made = equations::Equations::new(tape.ops().to_vec(), dv, dy, quantities, kept.transpose()?);
-        let functions = functions.into_iter().map(|(value, by)| {
+        let functions = functions.into_iter().map(|(value, by, bounds)| {
             let by = by.iter().map(|(of, factor)| Ok((known(of)?, known(factor)?))).collect::<PyResult<Vec<_>>>()?;
-            Ok((known(&value)?, by))
+            Ok((known(&value)?, by, bounds.map(|bounds| bounds.map(f64::to_bits))))
         });
         let made = made.with_functions(functions.collect::<PyResult<Vec<_>>>()?);
         Ok(Equations(Arc::new(made.without_the_rest())))

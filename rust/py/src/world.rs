@@ -18,7 +18,7 @@ use stepwell_core::{
 };
 
 use crate::{
-    interruptible,
+    interruptible, listen,
     model::{ModelSpec, argument_error, core_error, error_of, in_use},
 };
 
@@ -82,6 +82,9 @@ impl<T: Of> ForceArray<T> {
 
 /// Arrays of up to so many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
+/// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let them
+/// would take longer than the call.
+const CALL_IS_SHORT: i64 = 64;
 /// Steps above this are no longer exact as floating-point numbers.
 const LAST_STEP: i64 = 1 << 53;
 
@@ -155,9 +158,13 @@ impl<T: Of> Loop<T> {
                 py.detach(|| world.step(steps_between_checks, v, y));
                 n -= steps_between_checks;
                 at.store(world.step_number(), Relaxed);
-                py.check_signals()?;
+                listen(py)?;
             }
-            world.step(n, v, y);
+            if n > steps_between_checks / CALL_IS_SHORT {
+                py.detach(|| world.step(n, v, y));
+            } else {
+                world.step(n, v, y);
+            }
             at.store(world.step_number(), Relaxed);
             Ok(())
         })

@@ -64,7 +64,7 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
         section="§1",
         description="A ball bounces lower and lower and comes to rest; no impact adds energy, wherever in a step it is.",
         error="as far from the true place as the ball rolls, or from the true velocity as that of the first impact",
-        system=Particles(gravity=gravity, floor=Floor(restitution), dim=2),
+        system=Particles(gravity=gravity, floor=Floor(restitution=restitution), dim=2),
         v=np.array([[along, 0.0]]),
         y=np.array([[0.0, height]]),
         dt=fall / 26.5,

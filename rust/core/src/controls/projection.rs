@@ -21,14 +21,19 @@ pub struct Projected<N: Number> {
 }
 
 /// The factor of all velocities, and the energy that it adds; from h times the error of the energy and h times the kinetic energy.
+/// At rest there is nothing to scale: the factor is 1.
 pub fn scaling<N: Number>(off: N, kinetic: N) -> (N, N) {
-    let factor = factor(N::of(1.0) - off / kinetic);
-    (factor, (factor * factor - N::of(1.0)) * kinetic)
+    let one = N::of(1.0);
+    let factor = N::choose(kinetic.at_most(N::of(0.0)), one, factor(one - off / kinetic));
+    (factor, (factor * factor - one) * kinetic)
 }
 
-/// The step along the gradient of the energy, from the square of its length.
-pub fn nacozy<N: Number>(off: N, h: N, square: N) -> N {
-    (off / h) / square
+/// The step along the gradient of the energy, from the square of its length, and the energy that it takes away. Where the gradient is
+/// zero, both are.
+pub fn nacozy<N: Number>(off: N, h: N, square: N) -> (N, N) {
+    let zero = N::of(0.0);
+    let flat = square.at_most(zero);
+    (N::choose(flat, zero, (off / h) / square), N::choose(flat, zero, off))
 }
 
 impl<N: Number> Projected<N> {
@@ -44,8 +49,8 @@ impl<N: Number> Projected<N> {
         let off = energies.whole - self.target;
         if self.nacozy {
             let along = self.system.gradient(v, y, &energies)?;
-            let step = nacozy(off, self.h, along.square);
-            self.work.set(self.work.get() - off);
+            let (step, taken) = nacozy(off, self.h, along.square);
+            self.work.set(self.work.get() - taken);
             return Some((v.zip_map(&along.v, |v, along| v - step * along), y.zip_map(&along.y, |y, along| y - step * along)));
         }
         let (factor, gained) = scaling(off, energies.kinetic);

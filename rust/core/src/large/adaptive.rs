@@ -12,7 +12,7 @@ use crate::{
     controls,
     error::Error,
     isa::Level,
-    pace::{Pace, judge, length2},
+    pace::{Acceptance, Made, Pace, Scales, judge},
     run::{
         adaptive::{AdaptiveBatch, NO_CLOCK},
         workers::Stop,
@@ -27,10 +27,13 @@ pub struct LargeAdaptive {
     executor: Executor,
     /// The order of the estimate.
     order: u32,
+    acceptance: Acceptance,
+    backward: bool,
     budget: f64,
     /// Whether a control pushes in the stages; its tally is then times the step.
     pushes: bool,
     pace: Pace<f64>,
+    scales: Scales<f64>,
 }
 
 impl LargeAdaptive {
@@ -42,12 +45,14 @@ impl LargeAdaptive {
         level: Level,
         budget: f64,
     ) -> Result<LargeAdaptive, Error> {
-        let How::Attempts { name, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
+        let How::Attempts { name, acceptance, backward, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
         let order = method(name)?.estimate.as_ref().ok_or(Error::NoEstimate)?.order;
         let blocks = Blocks::new(courses, rates, traced.shape);
         let executor = blocks.executor(&blocks.courses.step, level, &NO_CLOCK);
         let pushes = controls::pushes(&traced.scene().given);
-        Ok(LargeAdaptive { blocks, executor, order, budget, pushes, pace: Pace::of([0.0; Pace::<f64>::NUMBERS]) })
+        let (acceptance, backward) = (acceptance.clone(), *backward);
+        let pace = Pace::of([0.0; Pace::<f64>::NUMBERS]);
+        Ok(LargeAdaptive { blocks, executor, order, acceptance, backward, budget, pushes, pace, scales: Scales::default() })
     }
 }
 
@@ -80,6 +85,14 @@ impl AdaptiveBatch for LargeAdaptive {
         self.pace = pace;
     }
 
+    fn scales(&self, _lane: usize) -> Vec<f64> {
+        [&self.scales.longest[..], &self.scales.own[..]].concat()
+    }
+
+    fn set_scales(&mut self, _lane: usize, numbers: &[f64]) {
+        self.scales = Scales::of(numbers, self.acceptance.own);
+    }
+
     fn set_stop_flag(&mut self, stop: &Stop) {
         self.executor.stop = Stop::clone(stop);
         self.blocks.rates.set_stop_flag(stop);
@@ -94,12 +107,17 @@ impl AdaptiveBatch for LargeAdaptive {
             }
             rates.set_step(outlook.step);
             rates.tally_mut().fill(0.0);
-            self.executor.run(&courses.step, rates.as_mut(), *sizes, self.pace.t, outlook.step, arena);
+            // Rates that run backward are those of a step of −1.
+            let (t, step) = if self.backward { (-self.pace.t, -outlook.step) } else { (self.pace.t, outlook.step) };
+            self.executor.run(&courses.step, rates.as_mut(), *sizes, t, step, arena);
             // Results come in pairs: of velocities, of coordinates.
-            let length = |i: usize, row: usize| length2(&arena[row * *stride..][..sizes[i % 2]]);
-            let made: Vec<f64> = courses.step.results.iter().enumerate().map(|(i, row)| length(i, *row)).collect();
-            let (next, took) = judge(&self.pace, self.order, [length(0, V), length(1, Y)], &made, outlook);
+            let block = |i: usize, row: usize| &arena[row * *stride..][..sizes[i % 2]];
+            let blocks: Vec<&[f64]> = courses.step.results.iter().enumerate().map(|(i, row)| block(i, *row)).collect();
+            let made = Made::of(&self.acceptance, [block(0, V), block(1, Y)], &blocks);
+            let counts = self.acceptance.counts(sizes[0], sizes[1]);
+            let (next, longest, took) = judge(&self.pace, &self.scales, self.order, counts, &made, outlook);
             self.pace = next;
+            self.scales.longest = longest;
             if took {
                 for ((home, made), numbers) in [V, Y].into_iter().zip(&courses.step.results).zip(*sizes) {
                     arena.copy_within(made * *stride..made * *stride + numbers, home * *stride);

@@ -7,6 +7,7 @@ use crate::{
     contact::{Contacts, Springs, dimensions},
     run::workers::Stop,
     spec::{Parameters, Spec},
+    window::Window,
 };
 
 /// The parameters of one member.
@@ -171,6 +172,10 @@ impl Rates for SprungRates {
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize) {
         self.springs = Springs::new(&parameters(spec, self.h, first));
         self.rates.prepare(spec, first, count);
+    }
+
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        self.rates.set_window(window);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {

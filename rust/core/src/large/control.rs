@@ -5,6 +5,7 @@ use crate::{
     controls::{self, energy, projection},
     run::workers::Stop,
     spec::Spec,
+    window::Window,
 };
 
 /// Rates under the control that is given, or the rates themselves.
@@ -64,6 +65,10 @@ impl Rates for ControlledRates {
         self.rates.prepare(spec, first, count);
     }
 
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        self.rates.set_window(window);
+    }
+
     fn set_stop_flag(&mut self, stop: &Stop) {
         self.rates.set_stop_flag(stop);
     }
@@ -112,8 +117,8 @@ impl Rates for ControlledRates {
         }
         let (along_v, along_y) = (&mut self.along.0[..], &mut self.along.1[..]);
         let Some(square) = self.rates.gradient(v, &self.dv, (along_v, along_y)) else { return };
-        let step = projection::nacozy(off, self.h, square);
-        self.work[0] -= off;
+        let (step, taken) = projection::nacozy(off, self.h, square);
+        self.work[0] -= taken;
         for (block, along) in [(v, &self.along.0), (y, &self.along.1)] {
             block.iter_mut().zip(along).for_each(|(number, along)| *number -= step * along);
         }

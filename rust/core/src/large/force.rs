@@ -5,6 +5,7 @@ use crate::{
     controls::force::{NAME, fixed},
     run::{stage::Force, workers::Stop},
     spec::Spec,
+    window::Window,
 };
 
 /// Rates under the force that is given, or the rates themselves.
@@ -52,6 +53,10 @@ impl Rates for ForcedRates {
 
     fn set_force(&mut self, force: &Force, first: usize, _count: usize) {
         self.set(|i| force.row(i)[first]);
+    }
+
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        self.rates.set_window(window);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {

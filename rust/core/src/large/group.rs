@@ -21,6 +21,7 @@ use crate::{
     spec::Spec,
     system::Shape,
     trace::{How, method},
+    window,
 };
 
 /// The courses of a method, for one kind of rates.
@@ -39,7 +40,7 @@ impl Courses {
         let (name, choice) = match how {
             How::Method { name, choice } => (name.as_str(), Some(*choice)),
             How::Attempts { name, .. } => (name.as_str(), None),
-            How::Matrix { .. } => ("", None), // it has no method, which the next line says
+            How::Step(_) | How::Matrix { .. } => ("", None), // it has no method, which the next line says
         };
         let method = method(name)?;
         let course = |program: Program| {
@@ -179,6 +180,7 @@ impl Group for LargeGroup {
         let (t, h) = (self.clock.at(k), self.clock.h);
         let Blocks { courses, rates, arena, sizes, .. } = &mut self.blocks;
         if let (Some(executor), Some(course)) = (&mut self.start, &courses.start) {
+            rates.set_window(Some(window::of_slot(t, h)));
             executor.run(course, rates.as_mut(), *sizes, t, h, arena);
         }
     }
@@ -193,6 +195,7 @@ impl Group for LargeGroup {
                 contacts.keep(self.blocks.slots());
             }
             let Blocks { courses, rates, arena, sizes, stride } = &mut self.blocks;
+            rates.set_window(Some(window::of_step(t, h, self.start.is_some())));
             self.step.run(&courses.step, rates.as_mut(), *sizes, t, h, arena);
             let (v, y) = arena.split_at_mut(*stride);
             rates.project(&mut v[..sizes[0]], &mut y[..sizes[1]]);
@@ -210,6 +213,7 @@ impl Group for LargeGroup {
             if self.recorded > 0 {
                 rates.cache_forces(&arena[*stride..][..sizes[1]]);
             }
+            rates.set_window(Some(window::of_slot(t, h)));
             executor.run(course, rates.as_mut(), *sizes, t, h, arena);
         }
     }

@@ -1,9 +1,10 @@
 //! Inputs of one member, by number.
 
 use crate::{
-    signal::Signal,
+    signal::{Signal, curve},
     spec::{Parameters, Spec},
     tape::split::HOLD_SLACK,
+    window::{Window, is_held, mean},
 };
 
 /// A sampled input of one member.
@@ -16,7 +17,7 @@ struct Samples {
 impl Samples {
     /// The sample that holds at a time: the last one not after it, or the first or last one outside; the first if the time is a NaN.
     fn at(&self, t: f64) -> f64 {
-        let at = ((t - self.start) / self.interval + HOLD_SLACK).floor();
+        let at = ((t - self.start) / self.interval * HOLD_SLACK).floor();
         let last = self.values.len() - 1;
         self.values[if at > 0.0 { last.min(at as usize) } else { 0 }]
     }
@@ -27,6 +28,8 @@ impl Samples {
 pub struct Inputs {
     signals: Vec<Signal<f64>>,
     samples: Vec<Samples>,
+    /// Of which samples a step sees the mean.
+    held: Vec<bool>,
 }
 
 impl Inputs {
@@ -42,15 +45,21 @@ impl Inputs {
             start: table.start,
             interval: table.interval,
         });
-        Inputs { signals: (0..given.whole("inputs")).map(signal).collect(), samples: samples.collect() }
+        let held = (0..given.tables.len()).map(|table| is_held(given, table)).collect();
+        Inputs { signals: (0..given.whole("inputs")).map(signal).collect(), samples: samples.collect(), held }
     }
 
-    /// Their values at a time.
-    pub fn fill(&self, t: f64, values: &mut [f64]) {
+    /// Their values at a time, or those that steps over a window see.
+    pub fn fill(&self, t: f64, window: Option<Window<f64>>, values: &mut [f64]) {
+        let at = |table: u32, t: f64| self.samples[table as usize].at(t);
         for (value, signal) in values.iter_mut().zip(&self.signals) {
-            *value = match signal {
-                Signal::Held { table, .. } => self.samples[*table as usize].at(t),
-                signal => signal.at(t),
+            *value = match (*signal, window) {
+                (Signal::Held { table, .. }, Some(window @ [from, to, _])) if self.held[table as usize] => {
+                    mean(window, at(table + 1, to), at(table, from), at(table, to))
+                }
+                (Signal::Held { table, .. }, _) => at(table, t),
+                (Signal::Curve { table, degree, .. }, _) => curve(table, degree, t, |table| at(table, t)),
+                (signal, _) => signal.at(t),
             };
         }
     }

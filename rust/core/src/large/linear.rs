@@ -8,6 +8,7 @@ use crate::{
     run::workers::Stop,
     spec::Spec,
     system::Shape,
+    window::Window,
 };
 
 struct Linear {
@@ -21,6 +22,7 @@ struct Linear {
     x: Vec<f64>,
     /// The time for which the inputs hold: both blocks ask at the same times, and a sine is expensive.
     time: f64,
+    window: Option<Window<f64>>,
     /// h·ẏ of v = 1, in a second-order system.
     speed: f64,
     stop: Stop,
@@ -38,6 +40,7 @@ pub fn make(asked: &Asked) -> Box<dyn Rates> {
         inputs: Inputs::default(),
         x: vec![0.0; asked.given.whole("inputs")],
         time: f64::NAN,
+        window: None,
         speed: 0.0,
         stop: Stop::default(),
     })
@@ -62,7 +65,7 @@ impl<const N: usize> Task for Times<'_, N> {
 impl Linear {
     fn update_inputs(&mut self, t: f64) {
         if self.time != t {
-            self.inputs.fill(t, &mut self.x);
+            self.inputs.fill(t, self.window, &mut self.x);
             self.time = t;
         }
     }
@@ -82,6 +85,10 @@ impl Rates for Linear {
         self.speed = if self.shape.y > 0 { entry(self.shape.v, 0) } else { f64::NAN };
         self.inputs = Inputs::new(spec, first);
         self.time = f64::NAN;
+    }
+
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        (self.window, self.time) = (window, f64::NAN);
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {

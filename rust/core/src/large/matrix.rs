@@ -12,6 +12,7 @@ use crate::{
     spec::Spec,
     system::Shape,
     trace::How,
+    window,
 };
 
 /// A member of a linear map.
@@ -25,6 +26,8 @@ pub struct Matrix {
     inputs: Inputs,
     /// How many inputs there are.
     count: usize,
+    /// Whether the method carries something in place of v.
+    carries: bool,
     /// The inputs at all nodes.
     u: Vec<f64>,
     state: Aligned,
@@ -39,7 +42,7 @@ impl Matrix {
     pub fn new(spec: &Spec, shape: Shape, how: &How, level: Level, clock: &Clock) -> Matrix {
         let nodes: Vec<f64> = match how {
             How::Matrix { nodes } => nodes.iter().map(|bits| f64::from_bits(*bits)).collect(),
-            How::Method { .. } | How::Attempts { .. } => Vec::new(), // not the matrix form: never called
+            How::Method { .. } | How::Attempts { .. } | How::Step(_) => Vec::new(), // not the matrix form: never called
         };
         let (n, count) = (shape.v + shape.y, spec.given.whole("inputs"));
         Matrix {
@@ -49,6 +52,7 @@ impl Matrix {
             pq: Panels::new(0, 0, |_, _| 0.0),
             inputs: Inputs::default(),
             count,
+            carries: spec.given.whole("carries") > 0,
             u: vec![0.0; nodes.len() * count],
             nodes,
             state: Aligned::new(filled(n)),
@@ -68,11 +72,12 @@ struct Steps<'a> {
 impl Task for Steps<'_> {
     #[inline(always)]
     fn run(self) {
-        let Matrix { shape, clock, nodes, pq, inputs, count, u, state, next, stop, .. } = self.of;
+        let Matrix { shape, clock, nodes, pq, inputs, count, carries, u, state, next, stop, .. } = self.of;
         for k in self.k..self.k + self.n {
             let t = clock.at(k);
+            let window = window::of_step(t, clock.h, *carries);
             for (node, u) in nodes.iter().zip(u.chunks_exact_mut((*count).max(1))) {
-                inputs.fill(t + node * clock.h, u);
+                inputs.fill(t + node * clock.h, Some(window), u);
             }
             if stop.load(Relaxed) {
                 return;

@@ -29,6 +29,7 @@ use crate::{
     run::{Machine, stage::Force, workers::Stop},
     spec::{Given, Spec},
     system::Shape,
+    window::Window,
 };
 
 /// The most operations of a step that is a single tape. Writing the code of one operation takes about a microsecond, and longer code would
@@ -60,6 +61,9 @@ pub trait Rates: Send + Sync {
 
     /// The step of the attempt that comes, for rates that depend on it.
     fn set_step(&mut self, _step: f64) {}
+
+    /// The window over which samples of inputs are averaged in what comes; at any other time they are looked up at that time.
+    fn set_window(&mut self, _window: Option<Window<f64>>) {}
 
     /// Takes the parameters of the members from `first`; lanes past the `count`-th repeat the last member.
     fn prepare(&mut self, spec: &Spec, first: usize, count: usize);

@@ -16,6 +16,7 @@ use crate::{
     system::{Block, Kind, Shape, System},
     tape::{Id, Op, Tape},
     trace::{block, cut, ids, kind, parameters},
+    window::{self, Window},
 };
 
 /// The rates of a system, traced. Their state is v, y, a block for the result, and a number for the tally.
@@ -54,7 +55,8 @@ fn rate(
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, Symbol::new(Op::Step));
         let s = controls::wrap(&p, contact::wrap(&p, (kind.make)(&p)), state(behind(shape)));
-        let (made, v, y) = make(s.as_ref(), v, y);
+        let seen = || window::ENDS.map(|end| Symbol::new(Op::Param(end)));
+        let (made, v, y) = window::over(given, seen, || make(s.as_ref(), v, y));
         let mut next = ids([&v, &y]);
         next.extend(made.iter().flat_map(|made| made.iter().map(|symbol| symbol.0)));
         next.extend((next.len()..behind(shape)).map(|i| state(i).0));
@@ -88,7 +90,7 @@ impl Rated {
         let needed = dv.0.needed(dv.1[before(shape)..].iter().copied());
         let reads = |what: &dyn Fn(Op) -> bool| needed.iter().zip(dv.0.ops()).any(|(needed, op)| *needed && what(*op));
         let reads_v = reads(&|op| matches!(op, Op::State(i) if (i as usize) < shape.v));
-        let is_of_y = !reads_v && !reads(&|op| op == Op::Time);
+        let is_of_y = !reads_v && !reads(&|op| matches!(op, Op::Time | Op::Sample(..)));
         let velocity =
             (!second_order && shape.v == shape.y).then(|| rate(kind, given, shape, |s, v, y| (Some(s.velocity(&y)), v, y)));
         // Where a tape that also computes h·v̇ costs hardly more than without, it does so, and the next step uses it.
@@ -159,6 +161,7 @@ pub struct TapeRates {
     is_known: bool,
     y: Vec<f64>,
     known: Vec<f64>,
+    window: Option<Window<f64>>,
 }
 
 fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
@@ -187,6 +190,7 @@ impl TapeRates {
             is_known: false,
             y: Vec::new(),
             known: Vec::new(),
+            window: None,
             rated,
         }
     }
@@ -246,6 +250,10 @@ impl Rates for TapeRates {
         self.stages(|prepared, stage| prepared.set_force(stage, force, first, count));
     }
 
+    fn set_window(&mut self, window: Option<Window<f64>>) {
+        self.window = window;
+    }
+
     fn dv(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         if self.is_known && y.iter().zip(&self.y).all(|(a, b)| a.to_bits() == b.to_bits()) {
             out[..self.known.len()].copy_from_slice(&self.known);
@@ -253,16 +261,18 @@ impl Rates for TapeRates {
         }
         self.is_known = false;
         self.set_state(if self.rated.facts.reads_v { v } else { &[] }, y);
+        let window = self.window.unwrap_or([t, t, 1.0]);
         if let (Some(prepared), Some(stage)) = (&mut self.dv, &self.rated.dv) {
-            prepared.advance_at(stage, t, &mut self.state);
+            prepared.advance_over(stage, t, window, &mut self.state);
         }
         self.give(out);
     }
 
     fn dy(&mut self, t: f64, v: &[f64], y: &[f64], out: &mut [f64]) {
         self.set_state(v, y);
+        let window = self.window.unwrap_or([t, t, 1.0]);
         if let (Some(prepared), Some(stage)) = (&mut self.dy, &self.rated.dy) {
-            prepared.advance_at(stage, t, &mut self.state);
+            prepared.advance_over(stage, t, window, &mut self.state);
         }
         self.give(out);
     }

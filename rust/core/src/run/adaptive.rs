@@ -12,7 +12,7 @@ use crate::{
     isa::Level,
     pace::Pace,
     spec::Spec,
-    trace::{Tapes, Traced},
+    trace::{How, Tapes, Traced},
 };
 
 /// A batch of members with adaptive steps; their rates are scaled to a step of 1.
@@ -39,6 +39,12 @@ pub trait AdaptiveBatch: Send {
 
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
+
+    /// What stands behind the step-size control of a lane: the largest sizes of its groups, and tolerances of their own.
+    fn scales(&self, lane: usize) -> Vec<f64>;
+
+    /// Sets it.
+    fn set_scales(&mut self, lane: usize, numbers: &[f64]);
 
     /// Whether it knows where a member stands at the start, so that [`AdaptiveBatch::begin`] can be asked.
     fn begins(&self) -> bool {
@@ -76,10 +82,11 @@ pub trait AdaptiveBatch: Send {
 /// Members of a system whose whole attempt is one tape.
 pub struct AdaptiveLanes {
     tapes: Arc<Tapes>,
-    /// Numbers of v and y.
+    /// Numbers of v and y, and those that stand behind the pace.
     numbers: usize,
+    scales: usize,
     step: PreparedStage,
-    /// Rows of v, of y, of the paces and, of a series, of its coefficients.
+    /// Rows of v, of y, of the paces, of the sizes and, of a series, of its coefficients.
     state: Aligned,
     /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the start.
     by_terms: Option<OneLane>,
@@ -125,10 +132,11 @@ impl AdaptiveLanes {
     pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
         let tapes = traced.tapes()?;
         let step = PreparedStage::new(&tapes.step, spec, level, members, &NO_CLOCK, budget);
-        let numbers = traced.shape.v + traced.shape.y;
+        let How::Attempts { acceptance, .. } = &traced.scene().how else { return Err(Error::NoEstimate) };
+        let (numbers, scales) = (traced.shape.v + traced.shape.y, acceptance.numbers(traced.shape.v, traced.shape.y));
         let all = tapes.step.split.body.next.len();
         let state = Aligned::new(all * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, by_terms: None, begin: None, level, budget, tapes })
+        Ok(AdaptiveLanes { state, step, numbers, scales, by_terms: None, begin: None, level, budget, tapes })
     }
 }
 
@@ -169,6 +177,18 @@ impl AdaptiveBatch for AdaptiveLanes {
         }
     }
 
+    fn scales(&self, lane: usize) -> Vec<f64> {
+        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
+        (0..self.scales).map(|i| self.state[(before + i) * lanes + lane]).collect()
+    }
+
+    fn set_scales(&mut self, lane: usize, numbers: &[f64]) {
+        let (lanes, before) = (self.step.lanes(), self.numbers + Pace::<f64>::NUMBERS);
+        for (i, number) in numbers.iter().enumerate() {
+            self.state[(before + i) * lanes + lane] = *number;
+        }
+    }
+
     fn begins(&self) -> bool {
         self.tapes.begin.is_some()
     }
@@ -206,7 +226,8 @@ impl AdaptiveBatch for AdaptiveLanes {
         let lanes = self.step.lanes();
         let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
         let made = one.run(stage, spec, member, &self.state, (lane, lanes));
-        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS) {
+        for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales)
+        {
             row[lane] = *number;
         }
     }

@@ -493,7 +493,7 @@ impl<T: Real> Job<'_, '_, T> {
     /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a method's carry
     /// may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
     fn is_suspect(&self) -> bool {
-        let most = if self.carries { T::of(T::HUGE.wide() * self.plan.clock.h.min(1.0)) } else { T::INFINITY };
+        let most = if self.carries { T::of(T::HUGE.wide() * self.plan.clock.h.abs().min(1.0)) } else { T::INFINITY };
         self.any_new(most)
     }
 

@@ -9,7 +9,12 @@ use super::{
     columns::{Columns, cut},
     workers::{self, GoOn, Stop, Workers},
 };
-use crate::{error::Error, pace::Pace, spec::Row, trace::Traced};
+use crate::{
+    error::Error,
+    pace::Pace,
+    spec::Row,
+    trace::{How, Traced},
+};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
@@ -18,9 +23,11 @@ pub struct Plan<'a> {
     pub model: Model<'a>,
     /// What hot loops may use.
     pub machine: Machine,
-    /// Times to keep the state at, ascending.
-    pub at: &'a [f64],
-    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`].
+    /// Times to keep the state at, ascending, by rows.
+    pub at: Vec<Row<'a>>,
+    /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
+    pub jumps: Vec<Row<'a>>,
+    /// The members' paces at the start, by rows, in the order of [`Pace::numbers`], and what stands behind them.
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see [`Pace::begun`].
     pub begins: bool,
@@ -97,13 +104,15 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     expect("saved_v", plan.at.len() * p * b, arrays.saved_v.len())?;
     expect("saved_y", plan.at.len() * q * b, arrays.saved_y.len())?;
     expect("state", (p + q) * b, arrays.state.len())?;
-    expect("paces", Pace::<f64>::NUMBERS, plan.paces.len())?;
-    expect("paces", Pace::<f64>::NUMBERS * b, arrays.paces.len())?;
+    let How::Attempts { acceptance, .. } = &plan.model.scene.how else { return Err(Error::NoEstimate) };
+    let numbers = Pace::<f64>::NUMBERS + acceptance.numbers(p, q);
+    expect("paces", numbers, plan.paces.len())?;
+    expect("paces", numbers * b, arrays.paces.len())?;
     expect("status", b, arrays.status.len())?;
     if !arrays.trail.is_empty() {
         expect("trail", 2 * plan.at.len() * b, arrays.trail.len())?;
     }
-    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces) {
+    for row in plan.model.spec.rows.iter().chain(&plan.v).chain(&plan.y).chain(&plan.paces).chain(&plan.at).chain(&plan.jumps) {
         if row.0.len() != 1 {
             expect("a row", b, row.0.len())?;
         }
@@ -140,12 +149,17 @@ pub fn run(plan: &Plan, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) ->
     Ok(true)
 }
 
+/// How long a step is that ends at the wall if it would cross it.
+fn length(t: f64, h: f64, wall: f64) -> f64 {
+    if wall < t + h { wall - t } else { h }
+}
+
 /// Which member of the part a lane steps, and which of the saved times is next.
 struct Assignment {
     member: usize,
     next: usize,
-    /// While an extra step is made: the state that it starts from, which has to be put back.
-    origin: Option<Vec<f64>>,
+    /// While an extra step is made: the state that it starts from, which has to be put back, and how many attempts were rejected before.
+    origin: Option<(Vec<f64>, f64)>,
     /// A run that goes on is held, and the coefficients of its series have to be found first.
     held_before: bool,
 }
@@ -233,20 +247,24 @@ impl<'a> Worker<'a> {
                 let pace = self.group.pace(lane);
                 self.group.set_pace(lane, Pace { target: f64::INFINITY, held: 0.0, ..pace });
             }
-            for (row, end) in self.plan.at.iter().enumerate() {
+            for (row, ends) in self.plan.at.iter().enumerate() {
                 self.note(&mut part, first, row);
                 for lane in 0..lanes {
-                    if self.group.row(of_time).is_some_and(|times| times[lane] < *end) {
+                    let end = ends.at(part.first + (first + lane).min(last));
+                    if self.group.row(of_time).is_some_and(|times| times[lane] < end) {
                         continue;
                     }
                     let pace = self.group.pace(lane);
-                    if pace.t >= *end && pace.target > pace.t {
+                    if pace.t >= end && pace.target > pace.t {
                         self.group.set_pace(lane, pace.idle());
                     }
                 }
                 let budget = self.plan.budget as f64;
                 if row + 1 < rows && (0..lanes).any(|lane| self.group.pace(lane).runs(budget)) {
                     self.group.attempt(1);
+                    for lane in (0..lanes).filter(|_| !self.plan.jumps.is_empty()) {
+                        self.cross(lane, part.first + (first + lane).min(last));
+                    }
                 }
                 if !go_on(0) {
                     return Err(Error::Interrupted);
@@ -268,7 +286,7 @@ impl<'a> Worker<'a> {
             for (lane, member) in members.enumerate() {
                 let pace = self.group.pace(lane);
                 part.trail.row(row)[member] = pace.t;
-                part.trail.row(rows + row)[member] = pace.h;
+                part.trail.row(rows + row)[member] = length(pace.t, pace.h, pace.wall);
                 self.save(part, lane, &Assignment { member, next: row, origin: None, held_before: false });
             }
             return;
@@ -282,6 +300,28 @@ impl<'a> Worker<'a> {
         for (i, place) in Pace::<f64>::PLACES.into_iter().enumerate() {
             copy(p + q + place, part.trail.row(i * rows + row));
         }
+        if !self.plan.jumps.is_empty() {
+            for (lane, member) in members.clone().enumerate() {
+                let pace = self.group.pace(lane);
+                part.trail.row(rows + row)[member] = length(pace.t, pace.h, pace.wall);
+            }
+        }
+    }
+
+    /// Brings a lane whose member has come to a wall behind it; returns whether it did.
+    fn cross(&mut self, lane: usize, member: usize) -> bool {
+        let pace = self.group.pace(lane);
+        if pace.t < pace.wall {
+            return false;
+        }
+        let (before, after) = self.plan.jumps.split_at(self.plan.jumps.len() / 2);
+        let passed = before.partition_point(|row| row.at(member) <= pace.t);
+        let Some(after) = passed.checked_sub(1).and_then(|last| after.get(last)) else { return false };
+        let wall =
+            |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
+        let after = after.at(member);
+        self.group.set_pace(lane, pace.crossed(after, wall(after), self.group.has_terms()));
+        true
     }
 
     /// How many attempts are made before the next check, by the number of steps that are left to the next saved times. A single lane
@@ -309,7 +349,11 @@ impl<'a> Worker<'a> {
         let state: Vec<f64> = plan.v.iter().chain(&plan.y).map(|row| row.at(at)).collect();
         self.group.set_state(lane, &state);
         let pace = Pace::of(std::array::from_fn(|i| plan.paces[i].at(at)));
-        self.group.set_pace(lane, Pace { target: pace.t, ..pace });
+        let scales: Vec<f64> = plan.paces[Pace::<f64>::NUMBERS..].iter().map(|row| row.at(at)).collect();
+        self.group.set_scales(lane, &scales);
+        let before = &plan.jumps[..plan.jumps.len() / 2];
+        let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
+        self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
         Assignment { member, next: 0, origin: None, held_before: pace.held > 0.0 }
     }
 
@@ -325,14 +369,21 @@ impl<'a> Worker<'a> {
     ) -> Result<Option<Assignment>, Error> {
         let (plan, budget) = (self.plan, self.plan.budget as f64);
         loop {
-            if let Some(origin) = assigned.origin.take() {
-                self.save(part, lane, &assigned);
-                assigned.next += 1;
-                self.group.set_state(lane, &origin);
+            if let Some((origin, rejected)) = assigned.origin.take() {
+                // An extra step whose error was not tolerated did not change the state; the run has gone on with shorter steps.
+                if self.group.pace(lane).rejected <= rejected {
+                    self.save(part, lane, &assigned);
+                    assigned.next += 1;
+                    self.group.set_state(lane, &origin);
+                }
+            }
+            if !plan.jumps.is_empty() {
+                self.cross(lane, part.first + assigned.member);
             }
             let mut pace = self.group.pace(lane);
-            while let Some(&target) = plan.at.get(assigned.next) {
-                pace.target = target;
+            while let Some(target) = plan.at.get(assigned.next) {
+                pace.target = target.at(part.first + assigned.member);
+                let target = pace.target;
                 if pace.t < target {
                     break;
                 }
@@ -350,7 +401,7 @@ impl<'a> Worker<'a> {
             if assigned.next < plan.at.len() {
                 if pace.holds() {
                     pace.extra = pace.target - pace.t;
-                    assigned.origin = Some(self.group.state(lane));
+                    assigned.origin = Some((self.group.state(lane), pace.rejected));
                 } else {
                     pace.held = 0.0;
                 }
@@ -409,7 +460,7 @@ impl<'a> Worker<'a> {
         for (row, number) in self.group.state(lane).into_iter().enumerate() {
             part.state.row(row)[assigned.member] = number;
         }
-        for (row, number) in pace.numbers().into_iter().enumerate() {
+        for (row, number) in pace.numbers().into_iter().chain(self.group.scales(lane)).enumerate() {
             part.paces.row(row)[assigned.member] = number;
         }
         for row in 0..part.status.rows() {

@@ -92,7 +92,8 @@ impl Model<'_> {
         let single = members == 1;
         // Operations are fused on the tape of the whole step, and friction needs the state at its start.
         let is_single = self.scene.precision == Precision::Single;
-        if is_single || self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
+        let is_given = matches!(self.scene.how, How::Step(_));
+        if is_single || self.scene.fused || traced.series || is_given || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {

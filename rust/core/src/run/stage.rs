@@ -15,6 +15,7 @@ use crate::{
     spec::Spec,
     tape::split::{Body, Entry, Given, Split},
     trace::BUDGET,
+    window::Window,
 };
 
 /// A cut tape with its kernels, which are made when they are first asked for and kept.
@@ -410,13 +411,18 @@ impl<T: Real> PreparedStage<T> {
     /// One step of a state at a time.
     #[inline]
     pub fn advance_at(&mut self, stage: &Stage<T>, t: f64, state: &mut [T]) {
+        self.advance_over(stage, t, [t, t, 1.0], state);
+    }
+
+    /// The same, where inputs are looked up over a window.
+    pub fn advance_over(&mut self, stage: &Stage<T>, t: f64, [from, to, length]: Window<f64>, state: &mut [T]) {
         if stage.split.entries.is_empty() {
             self.steps(1, &[], state);
             return;
         }
         let mut table = std::mem::take(&mut self.moment);
         let kit = Arc::clone(&self.kit);
-        self.fill(stage, &kit.moment, &[T::of(t)], &mut table);
+        self.fill(stage, &kit.moment, &[t, from, to, length].map(T::of), 1, &mut table);
         self.steps(1, &table, state);
         self.moment = table;
     }
@@ -450,14 +456,14 @@ impl<T: Real> PreparedStage<T> {
         times.clear();
         times.extend((first..first + STEPS_AT_ONCE).map(|k| T::of(clock.at(k))));
         let kit = Arc::clone(&self.kit);
-        self.fill(stage, &kit.step, &times, &mut table);
+        self.fill(stage, &kit.step, &times, times.len(), &mut table);
         (self.times, self.tables[at].1) = (times, table);
         at
     }
 
-    /// The entries of steps at these times, as many as the interpreter has lanes.
-    fn fill(&mut self, stage: &Stage<T>, step: &Runner<T>, times: &[T], table: &mut Vec<u64>) {
-        let (entries, steps, lanes) = (&stage.split.entries, times.len(), self.lanes());
+    /// The entries of steps at these times, as many as the interpreter has lanes. Behind one time there may be its window.
+    fn fill(&mut self, stage: &Stage<T>, step: &Runner<T>, times: &[T], steps: usize, table: &mut Vec<u64>) {
+        let (entries, lanes) = (&stage.split.entries, self.lanes());
         self.values.resize(entries.len() * steps, T::default()); // all of them are by anew
         let (kernel, by) = step.kernel(1);
         if self.given_for != Some(by) {

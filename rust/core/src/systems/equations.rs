@@ -40,8 +40,9 @@ pub struct Invariant {
     pub square: Id,
 }
 
-/// A value that is a function of others: pairs of a value and the derivative by it.
-pub type Marked = (Id, Vec<(Id, Id)>);
+/// A value that is a function of others: pairs of a value and the derivative by it; and, if it is one branch of several, the bits of its
+/// bounds.
+pub type Marked = (Id, Vec<(Id, Id)>, Option<[u64; 2]>);
 
 /// The rates of a system, as operations.
 #[derive(Clone, Debug)]
@@ -117,9 +118,9 @@ impl Equations {
             square: at(kept.square),
         });
         let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
-        let functions = self.functions.into_iter().filter(|(value, _)| needed[*value as usize]);
-        let functions =
-            functions.map(|(value, by)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect()));
+        let functions = self.functions.into_iter().filter(|(value, ..)| needed[*value as usize]);
+        let functions = functions
+            .map(|(value, by, bounds)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect(), bounds));
         let functions = functions.collect();
         Equations::new(ops, all(self.dv), self.dy.map(all), quantities, kept).with_functions(functions)
     }
@@ -141,11 +142,18 @@ impl Equations {
     }
 
     /// How many operations the rates, quantities and gradients have.
-    fn operations(&self) -> usize {
+    pub fn operations(&self) -> usize {
         if self.functions.is_empty() {
             return self.ops.len();
         }
         self.needed(&self.roots().collect::<Vec<_>>()).into_iter().filter(|needed| *needed).count()
+    }
+
+    /// The size of the blocks, or an error if the operations do not belong to what is given.
+    pub fn fit(&self, given: &Given) -> Result<Shape, Error> {
+        let shape = self.shape();
+        self.check(given, shape.v + shape.y)?;
+        Ok(shape)
     }
 
     fn shape(&self) -> Shape {
@@ -160,7 +168,7 @@ impl Equations {
 
     /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not count.
     pub fn chooses(&self) -> bool {
-        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by)| (*value, by)).collect();
+        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by, _)| (*value, by)).collect();
         let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
         for op in &self.ops {
             let (operands, n) = op.operands();
@@ -178,6 +186,7 @@ impl Equations {
                 Some(by) if by.is_empty() => return true, // as floor and sign, whose derivative is zero between jumps
                 Some(by) => open.extend(by.iter().flat_map(|(of, factor)| [*of, *factor])),
                 None if matches!(op, Op::Select(truth, ..) if varies[truth as usize]) => return true,
+                None if rounds_or_works_on_bits(op) => return true,
                 None => open.extend(&operands[..n]),
             }
         }
@@ -203,13 +212,13 @@ impl Equations {
         needed
     }
 
-    /// Likewise, and for functions also what their derivatives depend on.
+    /// Likewise, and for functions also what they and their derivatives depend on.
     fn needed_with_functions(&self, mut roots: Vec<Id>) -> Vec<bool> {
         let mut needed = self.needed(&roots);
         loop {
             let known = roots.len();
-            for (_, by) in self.functions.iter().filter(|(value, _)| needed[*value as usize]) {
-                roots.extend(by.iter().map(|(_, factor)| *factor).filter(|factor| !needed[*factor as usize]));
+            for (_, by, _) in self.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
+                roots.extend(by.iter().flat_map(|(of, factor)| [*of, *factor]).filter(|id| !needed[*id as usize]));
             }
             if roots.len() == known {
                 return needed;
@@ -250,8 +259,7 @@ fn shape(given: &Given) -> Result<Shape, Error> {
     let Some(equations) = &given.equations else {
         return Err(Error::Shape { what: "equations", expected: 1, got: 0 });
     };
-    equations.check(given, equations.shape().v + equations.shape().y)?;
-    Ok(equations.shape())
+    equations.fit(given)
 }
 
 /// A number on which every operation is defined.
@@ -264,8 +272,8 @@ pub trait Operand: Number {
         false
     }
 
-    /// Notes the derivatives of a value by others.
-    fn mark(self, _by: Vec<(Self, Self)>) {}
+    /// Notes the derivatives of a value by others, and its bounds.
+    fn mark(self, _by: Vec<(Self, Self)>, _bounds: Option<[f64; 2]>) {}
 }
 
 impl Operand for f64 {
@@ -285,9 +293,17 @@ impl Operand for Symbol {
         series::is_marking()
     }
 
-    fn mark(self, by: Vec<(Symbol, Symbol)>) {
-        series::mark(self, series::Mark::Factors(by));
+    fn mark(self, by: Vec<(Symbol, Symbol)>, bounds: Option<[f64; 2]>) {
+        series::mark(self, series::Mark::Factors(by, bounds));
     }
+}
+
+/// Whether its value is constant but for jumps, or is made bit by bit: outside of a function there is no smooth value of such an operation.
+fn rounds_or_works_on_bits(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Floor(_) | Op::And(..) | Op::Or(..) | Op::Xor(..) | Op::AddBits(..) | Op::ShiftUp(..) | Op::ShiftDown(..)
+    )
 }
 
 struct Own<N: Number> {
@@ -319,6 +335,20 @@ pub fn values_of(
     let (of_v, of_y) = (Vec::new(), Vec::new());
     let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: equations.clone(), of_v, of_y };
     own.values(&equations.needed(&roots), &roots, t, v, y).iter().copied().collect()
+}
+
+/// The state after a step that is given as operations: its rates are the next numbers of both blocks.
+pub fn next_state(
+    step: &std::sync::Arc<Equations>,
+    p: &Parameters<Symbol>,
+    t: Symbol,
+    v: &Block<Symbol>,
+    y: &Block<Symbol>,
+) -> Block<Symbol> {
+    let roots: Vec<Id> = step.dv.iter().chain(step.dy.iter().flatten()).copied().collect();
+    let (of_v, of_y) = (Vec::new(), Vec::new());
+    let own = Own { h: p.h, numbers: p.numbers.clone(), sample: p.sample, equations: step.clone(), of_v, of_y };
+    own.values(&step.needed(&roots), &roots, t, v, y)
 }
 
 impl<N: Operand> Own<N> {
@@ -356,8 +386,9 @@ impl<N: Operand> Own<N> {
             made.push(value);
         }
         if N::is_marking() {
-            for (value, by) in self.equations.functions.iter().filter(|(value, _)| needed[*value as usize]) {
-                made[*value as usize].mark(by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect());
+            for (value, by, bounds) in self.equations.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
+                let by = by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect();
+                made[*value as usize].mark(by, bounds.map(|bounds| bounds.map(f64::from_bits)));
             }
         }
         Block::from_iterator(roots.len(), roots.iter().map(|id| made[*id as usize]))

@@ -7,7 +7,7 @@
 use std::hash::Hash;
 
 use super::{Id, Op, Tape, quick::QuickMap};
-use crate::real::Precision;
+use crate::{real::Precision, window::ENDS};
 
 /// Operations over lanes: the input of the interpreter and of a kernel writer.
 ///
@@ -241,16 +241,21 @@ pub struct Split {
     pub body: Body,
 }
 
-/// From this fraction of an interval before a sample's time on the sample is taken: rounding may put t = t₀ + k·h just before it.
-pub const HOLD_SLACK: f64 = 1e-6;
+/// By this factor the number of intervals since the first sample is taken longer: rounding may put it just before a whole number.
+pub const HOLD_SLACK: f64 = 1.0 + 1.0 / (1u64 << 44) as f64;
 
 /// Whether all members share a parameter, or an input, of that number.
 type IsShared<'a> = &'a dyn Fn(u32) -> bool;
 
 /// Cuts a tape. `uniform` says which parameters all members share, `common` which inputs.
 pub fn split(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared) -> Split {
+    split_with_times(tape, next, uniform, common, &|_| false)
+}
+
+/// The same, where `of_times` says which inputs are the times at which samples begin: these follow from the numbers of the samples.
+pub fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared, of_times: IsShared) -> Split {
     let mut tape = tape.clone();
-    let next = look_up_samples(&mut tape, next, uniform);
+    let next = look_up_samples(&mut tape, next, uniform, of_times);
     let next = hoist_signs(&mut tape, &next, uniform);
     let ranks = ranks(&tape, uniform);
     let rank = |id: Id| ranks[id as usize];
@@ -304,6 +309,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared) -> S
     let (mut given, mut params) = (Places::default(), Places::default());
     let mut leaf = |id: Id| match tape.op(id) {
         Op::Step => Some(Op::Uniform(given.of(Given::Step))),
+        Op::Param(i) if ENDS.contains(&i) => Some(Op::Row(ENDS[0] - i + 1)),
         Op::Param(i) if uniform(i) => Some(Op::Uniform(given.of(Given::Param(i)))),
         Op::Param(i) => Some(Op::Row(params.of(i))),
         Op::Uniform(fact) => Some(Op::Uniform(given.of(fact_of(fact)))),
@@ -362,7 +368,7 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
     let since = tape.keep(Op::Sub(t, start));
     let intervals = tape.keep(Op::Div(since, interval));
     let slack = tape.constant(HOLD_SLACK);
-    let late = tape.keep(Op::Add(intervals, slack));
+    let late = tape.keep(Op::Mul(intervals, slack));
     let at = tape.keep(Op::Floor(late));
     let zero = tape.keep(Op::Const(0));
     let above = tape.keep(Op::Less(zero, at));
@@ -371,14 +377,21 @@ fn sample_number(tape: &mut Tape, input: u32, t: Id) -> Id {
     tape.keep(Op::Select(below, at, last))
 }
 
-/// Looks up samples for each member by itself, where members have times of their own.
-fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: IsShared) -> Vec<Id> {
+/// Looks up samples for each member by itself, where members have times of their own, and computes when samples begin.
+fn look_up_samples(tape: &mut Tape, next: &[Id], uniform: IsShared, of_times: IsShared) -> Vec<Id> {
     let ranks = ranks(tape, uniform);
     let old = std::mem::replace(tape, Tape::new(tape.precision()));
     let mut place: Vec<Id> = Vec::with_capacity(old.ops().len());
     for op in old.ops() {
         let moved = op.with(|operand| place[operand as usize]);
         place.push(match (*op, moved) {
+            (_, Op::Sample(input, now)) if of_times(input) => {
+                let samples = input - 1; // the table before it, which has the same grid
+                let number = sample_number(tape, samples, now);
+                let [start, interval] = [Given::Start(samples), Given::Interval(samples)].map(|g| tape.keep(fact(g)));
+                let since = tape.keep(Op::Mul(interval, number));
+                tape.keep(Op::Add(start, since))
+            }
             (Op::Sample(_, t), Op::Sample(input, now)) if matches!(ranks[t as usize], Rank::Member | Rank::Lane) => {
                 let number = sample_number(tape, input, now);
                 let (lanes, first) = (tape.keep(fact(Given::Lanes)), tape.keep(fact(Given::First(input))));
@@ -398,6 +411,7 @@ fn ranks(tape: &Tape, uniform: IsShared) -> Vec<Rank> {
         let rank = match *op {
             Op::Const(_) => Rank::Constant,
             Op::Step | Op::Uniform(_) => Rank::Run,
+            Op::Param(i) if ENDS.contains(&i) => Rank::Step,
             Op::Param(i) if uniform(i) => Rank::Run,
             Op::Param(_) => Rank::Member,
             Op::Time => Rank::Step,

@@ -25,7 +25,7 @@ const INTERVAL: f64 = 0.75;
 
 /// The sample that holds at a time; that of a NaN is the first.
 fn sample(samples: &[f64], t: f64) -> f64 {
-    let at = ((t - START) / INTERVAL + HOLD_SLACK).floor();
+    let at = ((t - START) / INTERVAL * HOLD_SLACK).floor();
     samples[if at > 0.0 { (at as usize).min(samples.len() - 1) } else { 0 }]
 }
 

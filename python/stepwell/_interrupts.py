@@ -1,0 +1,67 @@
+"""Threads: how many there may be, and long computations by NumPy, during which Ctrl-C is heard."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from contextvars import copy_context
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+#: A computation of fewer operations takes some hundredths of a second, which is not worth another thread.
+FEW_OPERATIONS = 1e7
+
+#: How often it is asked whether the computation has ended, in seconds.
+POLL = 0.02
+
+
+#: Computations that were interrupted, and the one that is being waited for.
+_unfinished: list[threading.Thread] = []
+
+
+def _wait_for(worker: threading.Thread) -> None:
+    """Until it has ended; Ctrl-C is heard."""
+    while worker.is_alive():
+        worker.join(POLL)
+    with suppress(ValueError):  # another thread may have waited too
+        _unfinished.remove(worker)
+
+
+def available() -> int:
+    """The number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def heard(operations: float, function: Callable[..., Result], *arguments: Any) -> Result:
+    """The result of a function of NumPy that makes about so many operations without looking for signals.
+
+    A long one is computed by another thread, while this one waits. After Ctrl-C that thread goes on until the function ends:
+    nothing can stop it. The next computation, and the end of the process, wait for that: two at once would wait for each other's
+    cores, a hundred times as long.
+    """
+    for before in tuple(_unfinished):
+        _wait_for(before)
+    if operations < FEW_OPERATIONS or threading.current_thread() is not threading.main_thread():
+        return function(*arguments)
+    results: list[Result] = []
+    errors: list[BaseException] = []
+
+    def compute() -> None:
+        try:
+            results.append(copied.run(function, *arguments))
+        except BaseException as error:
+            errors.append(error)
+
+    copied = copy_context()  # with NumPy's treatment of errors
+    worker = threading.Thread(target=compute)
+    worker.start()
+    _unfinished.append(worker)
+    _wait_for(worker)
+    if errors:
+        raise errors[0]
+    return results[0]

@@ -1,0 +1,104 @@
+"""Functions that were traced before: what a function computes, as far as it can be told without running it.
+
+Two functions are the same if their code is, and so is everything that the code may read: captured variables, globals by the
+names in it, defaults, and the functions among these likewise. Numbers and arrays count by value, so a global that was changed
+since makes another function. What may change unseen, such as an object or a module other than NumPy and ``math``, is told by
+nothing: then a function is like no other and is traced anew.
+"""
+
+from __future__ import annotations
+
+import dis
+import math
+from functools import lru_cache
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+#: Of larger arrays, lists and dictionaries it takes longer to compare the contents than to trace.
+MOST_BYTES, MOST_ITEMS = 1 << 16, 64
+#: What a function may read of these does not change.
+MODULES: tuple[ModuleType, ...] = (np, math)
+#: Functions of Python that read nothing but their arguments.
+PURE = {abs, all, any, bool, divmod, enumerate, float, int, isinstance, len, list, map, max, min, pow, range, reversed, round}
+PURE |= {slice, sorted, str, sum, tuple, zip}
+
+
+class Unknown(Exception):  # noqa: N818 (not an error: the function is traced)
+    """It cannot be told what a function computes."""
+
+
+def told(function: Any) -> Any:
+    """What tells a function from all others.
+
+    Raises:
+        Unknown: if something that it reads may change unseen.
+    """
+    return _of(function, [])
+
+
+@lru_cache(maxsize=1024)
+def _names(code: CodeType) -> tuple[str, ...]:
+    """The names of globals that code may read, with those of the functions within it."""
+    names: set[str] = set()
+    for each in dis.get_instructions(code):
+        if each.opname == "IMPORT_NAME":
+            raise Unknown
+        if each.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            names.add(each.argval)
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            names.update(_names(each))
+    return tuple(sorted(names))
+
+
+def _of(value: Any, seen: list[Any]) -> Any:
+    kind = type(value)
+    if kind is float:
+        return value.hex()
+    if value is None or kind in (int, bool, str, bytes):
+        return kind, value
+    if kind is FunctionType:
+        return _of_function(value, seen)
+    if kind is np.ndarray and value.dtype.kind in "biuf" and value.nbytes <= MOST_BYTES:
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, np.generic) and value.dtype.kind in "biuf":
+        return value.dtype.str, value.tobytes()
+    if kind in (tuple, list) and len(value) <= MOST_ITEMS:
+        return kind, *(_of(each, seen) for each in value)
+    if kind is dict and len(value) <= MOST_ITEMS:
+        return kind, *((_of(key, seen), _of(each, seen)) for key, each in value.items())
+    if isinstance(value, (BuiltinFunctionType, np.ufunc)) or any(value is each for each in MODULES):
+        return id(value)
+    # NumPy's functions that are written in Python or dispatch to other types.
+    if getattr(value, "__module__", "").partition(".")[0] == "numpy" and callable(value) and not isinstance(value, type):
+        return id(value)
+    raise Unknown
+
+
+def _of_function(function: FunctionType, seen: list[Any]) -> Any:
+    for i, each in enumerate(seen):
+        if each is function:
+            return "again", i
+    seen.append(function)
+    names = function.__globals__
+    builtins = names.get("__builtins__")
+    known = vars(builtins) if isinstance(builtins, ModuleType) else builtins or {}
+    read = []
+    for name in _names(function.__code__):
+        if name in names:
+            read.append((name, _of(names[name], seen)))
+        elif not _is_pure(known.get(name)):
+            raise Unknown
+    try:
+        captured = tuple(_of(cell.cell_contents, seen) for cell in function.__closure__ or ())
+    except ValueError:  # an empty cell
+        raise Unknown from None
+    defaults = _of(function.__defaults__, seen), _of(function.__kwdefaults__, seen)
+    return function.__code__, tuple(read), captured, defaults
+
+
+def _is_pure(value: Any) -> bool:
+    """Whether a name of Python's own reads nothing but its arguments; classes of errors do not."""
+    return value in PURE or (isinstance(value, type) and issubclass(value, BaseException))

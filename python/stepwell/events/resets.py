@@ -1,0 +1,241 @@
+"""Events that change the state: a step with such events is made part by part, each from the state that the last one left."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._brief import first_of, share
+from .._checks import Array, Shape
+from ..errors import EventWarning
+from ..reference.types import Whole
+from .collected import Collected
+from .parts import Changes
+from .traced import NewState
+
+#: A member whose state was changed more often than so many times within one step is at rest.
+MOST_IN_A_STEP = 1000
+#: Times between changes of the state shrink geometrically if their ratios differ by no more than this; the limit is then where
+#: the geometric series of times and states ends, if that is within the step.
+SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
+#: In what is left of a step after an event, if it is less than this share of it, that event is not looked for: how far it moved
+#: may be less than roundings. It is looked for from the start of the next step on, as from where the state was changed.
+LEAST_LEFT = 2.0**-36
+#: A member that returns to an event within this share of its step does so in no time, also where the time is zero.
+NO_TIME = 2.0**-100
+#: A member is at an event still, after this changed its state, if g is no more than so many times what it was there, or than the
+#: share ``LEAST_LEFT`` of what it was at the ends of the step; else its state is elsewhere, as of a neuron that is set back.
+AT = 8.0
+
+
+class Stretch(NamedTuple):
+    """Members within a step: from when, how long, from where to where they come without a further event.
+
+    Attributes:
+        member: the members.
+        step: the numbers of their steps.
+        t: where the stretches begin.
+        h: their lengths.
+        v: velocities at their start, shape (*block, n).
+        y: coordinates there.
+        v_end: velocities at their end.
+        y_end: coordinates there.
+        at: of each event the side from which a member came that is at it, since it changed the state there; else 0.
+    """
+
+    member: Whole
+    step: Whole
+    t: Array
+    h: Array
+    v: Array
+    y: Array
+    v_end: Array
+    y_end: Array
+    at: Array
+
+    def some(self, which: Any) -> Stretch:
+        """Some of them."""
+        parts: Any = (each[..., which] for each in self)
+        return Stretch(*parts)
+
+
+class Ahead(NamedTuple):
+    """What ends some stretches: the share of each, infinite without that, whether the run ends there, and whence it goes on.
+
+    ``event`` is the number of the event that changed the state, −1 without one.
+    """
+
+    share: Array
+    stops: Any
+    t: Array
+    v: Array
+    y: Array
+    at: Array
+    event: Whole
+
+
+class Arrived(NamedTuple):
+    """Where members are at the end of a step with events, or where they stopped before.
+
+    Attributes:
+        v: velocities, shape (*block, n).
+        y: coordinates.
+        at: of each event the side from which a member came that is at it still.
+        stops: which a terminal event stopped.
+        rests: the number of the event that changed the state of a member ever again within no time, −1 for others.
+        t: the time at which members stopped or came to rest, NaN for others.
+    """
+
+    v: Array
+    y: Array
+    at: Array
+    stops: Any
+    rests: Whole
+    t: Array
+
+
+class Resets:
+    """Steps with events that change the state, of the members of a run or a world."""
+
+    def __init__(self, run: Collected) -> None:
+        given = run.members.numbers(slice(None))
+        #: The direction of time.
+        self._run, self._way = run, 1.0 if run.plan.dt > 0.0 else -1.0
+        self._new_states = {
+            e: NewState(event, run.plan.system, given) for e, event in enumerate(run.events) if event.then is not None
+        }
+        #: At which of them members are, from which side, since they changed the state at the end of a step.
+        self.at = np.zeros((len(run.events), run.plan.members))
+
+    def begin(self, t: Array, v: Array, y: Array) -> None:
+        """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground."""
+        numbers = self._run.members.numbers(slice(None))
+        for e in self._new_states:
+            begins_there = self._run.quantities[e](t, v, y, numbers) == 0.0
+            self.at[e] = np.where(begins_there, -float(self._run.events[e].direction), 0.0)
+
+    def end(self, e: int, member: Whole) -> Any:
+        """Which of these occurrences end a stretch."""
+        return np.ones(len(member), dtype=bool) if e in self._new_states else self._run.ends(e, member)
+
+    def through(self, stretch: Stretch) -> Arrived:
+        """Go through one step of some members, from whole steps of theirs."""
+        n, end, step, way = len(stretch.member), stretch.t + stretch.h, np.abs(stretch.h), self._way
+        v, y, at = stretch.v_end.copy(), stretch.y_end.copy(), np.zeros_like(stretch.at)
+        times, stops, rests, live = np.full(n, np.nan), np.zeros(n, dtype=bool), np.full(n, -1), np.arange(n)
+        flight, ratio = np.full(n, np.nan), np.full(n, np.nan)
+        for resets in range(MOST_IN_A_STEP + 1):
+            ahead, returns = self._ahead(stretch, step[live])
+            with np.errstate(all="ignore"):
+                last, flight = (
+                    flight,
+                    np.where(((stretch.at != 0.0) & (ahead.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan),
+                )
+                before, ratio = ratio, flight / last
+                rest_of_series = ratio / (1.0 - ratio)
+                limit = ahead.t + flight * rest_of_series
+                settled = (
+                    (np.abs(ratio - before) <= SETTLED)
+                    & (ratio <= LARGEST_RATIO)
+                    & (way * limit < way * end[live])
+                    & (returns < 0)
+                )
+            if settled.any():
+                which = settled & (ahead.share < np.inf) & ~ahead.stops
+                returns = np.where(which, ahead.event, returns)
+                v_limit, y_limit = (
+                    np.where(which, now + (now - earlier) * rest_of_series, earlier)
+                    for now, earlier in ((ahead.v, stretch.v), (ahead.y, stretch.y))
+                )
+                stretch = stretch._replace(t=np.where(which, limit, stretch.t), v=v_limit, y=y_limit)
+            if resets == MOST_IN_A_STEP:
+                returns = np.where((ahead.share < np.inf) & ~ahead.stops, ahead.event, returns)
+            rest, stop = returns >= 0, (returns < 0) & ahead.stops
+            goes_on, arrives = (returns < 0) & (ahead.share < np.inf) & ~stop, (returns < 0) & ~(ahead.share < np.inf)
+            for which, t, state in (
+                (rest, stretch.t, (stretch.v, stretch.y)),
+                (stop, ahead.t, (ahead.v, ahead.y)),
+                (arrives, np.full(len(live), np.nan), (stretch.v_end, stretch.y_end)),
+            ):
+                who = live[which]
+                times[who], v[..., who], y[..., who] = t[which], state[0][..., which], state[1][..., which]
+            rests[live[rest]], stops[live[stop]] = returns[rest], True
+            at[:, live[rest]] = stretch.at[:, rest]
+            soon = np.abs(stretch.h) < LEAST_LEFT * step[live]
+            at[:, live[arrives & soon]] = stretch.at[:, arrives & soon]
+            if not goes_on.any():
+                break
+            live, flight, ratio = live[goes_on], flight[goes_on], ratio[goes_on]
+            stretch = self._anew(stretch.member[goes_on], stretch.step[goes_on], end[live], ahead, goes_on)
+        return Arrived(v, y, at, stops, rests, times)
+
+    def _anew(self, member: Whole, step: Whole, end: Array, ahead: Ahead, which: Any) -> Stretch:
+        """What is left of steps, from the new states on."""
+        t, v, y = ahead.t[which], ahead.v[..., which], ahead.y[..., which]
+        h = self._way * np.maximum(self._way * (end - t), 0.0)
+        return Stretch(member, step, t, h, v, y, *self._run.trials.step(member, t, h, v, y), ahead.at[:, which])
+
+    def _ahead(self, stretch: Stretch, step: Array) -> tuple[Ahead, Whole]:
+        """What ends stretches first, and of those that return to an event within roundings, which; that is taken note of."""
+        run, n = self._run, len(stretch.member)
+        share, returns, rows = np.full(n, np.inf), np.full(n, -1), np.arange(n)
+        numbers, found, sizes = run.members.numbers(stretch.member), [], []
+        ones, zeros = np.ones(n), np.zeros(n)
+        for e, quantity in enumerate(run.quantities):
+            g = quantity(stretch.t, stretch.v, stretch.y, numbers)
+            g_end = quantity(stretch.t + stretch.h, stretch.v_end, stretch.y_end, numbers)
+            head = zeros.astype(np.int64), rows, stretch.member, stretch.step, stretch.t, stretch.h
+            whole = Changes(*head, zeros, ones, g, g_end, stretch.v, stretch.y, stretch.v_end, stretch.y_end)
+            looked = np.flatnonzero(~((stretch.at[e] != 0.0) & (np.abs(stretch.h) < LEAST_LEFT * step)))
+            changes, stuck = run.within(e, whole.some(looked), stretch.at[e, looked])
+            if e in self._new_states:
+                returns[looked[stuck]] = e
+            occurs = run.located(e, changes)
+            if e in self._new_states:  # in no time
+                again = (stretch.at[e, changes.place] != 0.0) & (
+                    self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
+                )
+                returns[changes.place[again]] = e
+            found.append((occurs, changes.place, np.sign(changes.g)))
+            sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
+            ends = self.end(e, occurs.member)
+            np.minimum.at(share, changes.place[ends], occurs.share[ends])
+        share[returns >= 0] = -np.inf  # nothing happens before
+        stops, t, v, y = np.zeros(n, dtype=bool), stretch.t.copy(), stretch.v.copy(), stretch.y.copy()
+        for e, (occurs, place, _) in enumerate(found):
+            here = self.end(e, occurs.member) & (occurs.share == share[place])
+            t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
+            stops[place[here]] |= e not in self._new_states
+        at, event = np.zeros_like(stretch.at), np.full(n, -1)
+        for e, (occurs, place, side) in enumerate(found):
+            run.note(e, occurs.some(occurs.share <= share[place]))
+            if e in self._new_states:
+                here = (occurs.share == share[place]) & ~stops[place]
+                who = place[here]
+                if len(who):
+                    of_these, quantity = run.members.numbers(stretch.member[who]), run.quantities[e]
+                    there = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
+                    v[..., who], y[..., who] = self._new_states[e](t[who], v[..., who], y[..., who], of_these)
+                    now = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
+                    at[e, who] = np.where(now <= np.maximum(AT * there, LEAST_LEFT * sizes[e][who]), side[here], 0.0)
+                    event[who] = e
+        share[returns >= 0] = np.inf
+        return Ahead(share, stops, t, v, y, at, event), returns
+
+
+def warn_of_rest(names: Sequence[str], rests: Whole, times: Array, batch: Shape) -> None:
+    """Warn of members that are at rest at an event, by its number, since these times; −1 for others."""
+    is_at_rest = (rests >= 0).reshape(batch)
+    time = float(np.min(times[rests >= 0]))
+    first = np.flatnonzero((rests >= 0) & (times == time))[0]
+    some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
+    warnings.warn(
+        f"{share(some, batch, is_at_rest.size)} came to rest at event {names[rests[first]]}"
+        f"{first_of(some, place, is_at_rest.size) or ','} at t = {time:.9g}: changes of its state follow each other within no "
+        f"time, so that it does not go on by them",
+        EventWarning,
+        stacklevel=5,
+    )

@@ -1,0 +1,25 @@
+"""What a step must satisfy to be accepted."""
+
+from typing import NamedTuple
+
+
+class Acceptance(NamedTuple):
+    """What a step must satisfy to be accepted.
+
+    Attributes:
+        groups: for each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The
+            error of a group is the length of its numbers. Empty if v is one group and y is another.
+        own: whether each group has tolerances of its own.
+        positive: numbers of v, then of y, by their places, that must not become negative.
+    """
+
+    groups: tuple[int, ...] = ()
+    own: bool = False
+    positive: tuple[int, ...] = ()
+
+    def counts(self, n_v: int, n_y: int) -> tuple[int, int]:
+        """How many groups v and y have, of so many numbers."""
+        if not self.groups:
+            return int(n_v > 0), int(n_y > 0)
+        of_v = len(set(self.groups[:n_v]))
+        return of_v, len(set(self.groups)) - of_v

@@ -1,0 +1,438 @@
+"""Adaptive steps where they were wrong without a word: pulses, jumps, small components, units, states that must stay positive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell import _core, engine
+from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+from stepwell.reference.acceptance import Acceptance
+from stepwell.reference.traced import Tracer
+from stepwell.result import Status
+
+PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
+ONES, NOTHING = np.ones(3), sw.Sampled([0.0], interval=1.0)
+
+
+@sw.system(order=1)
+def gated(t: Any, n: Any, *, begin: float = 5.0, end: float = 6.0) -> Any:
+    """A channel that opens for a while: ṅ = open·(1 − n) − n."""
+    return np.where((t > begin) & (t < end), 1.0, 0.0) * (1 - n) - n
+
+
+def opened(t: Any, begin: Any, end: Any) -> Any:
+    """The solution from n(0) = 0: ½(1 − e^(−2(t − begin))) while open, then its decay."""
+    inside = 0.5 * -np.expm1(-2.0 * np.clip(t - begin, 0.0, end - begin))
+    return inside * np.exp(-np.maximum(t - end, 0.0))
+
+
+@sw.system(order=1, shape=(3,))
+def rober(t: Any, y: Any) -> Any:
+    """Robertson's reaction."""
+    to, back = -0.04 * y[0] + 1e4 * y[1] * y[2], 3e7 * y[1] ** 2
+    return np.array([to, -to - back, back])
+
+
+@sw.system(order=1, shape=(3,))
+def may_leonard(t: Any, n: Any, *, a: float = 0.8, b: float = 1.3) -> Any:
+    """Three species, each of which suppresses the next."""
+    return n * (1 - n - a * np.roll(n, -1) - b * np.roll(n, -2))
+
+
+# ---- states within a step, and what happens within a step
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_pulse_from_rest_is_seen(method: str) -> None:
+    """At rest a step is no longer than a 32nd of the time since the start, so a pulse that lasts for longer is met by stages.
+
+    The error at the end is that of some tens of steps at the jumps, each of which may err by the tolerance of n: 1e-7 is ample.
+    """
+    run = sw.integrate(gated(), method, y=0.0, tolerance=1e-9, at=[6.0, 10.0])
+    assert run.y == pytest.approx([0.43233236, 0.00791844], abs=1e-7)
+    late = sw.integrate(gated(begin=7.3, end=7.6), method, y=0.0, tolerance=1e-9, at=[7.5, 10.0])
+    assert late.y == pytest.approx(opened(late.t, 7.3, 7.6), abs=1e-7)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+@pytest.mark.parametrize("dt", [None, 0.5])
+def test_random_pulses(method: str, dt: float | None) -> None:
+    """No saved state leaves [0, 1], and all are right, wherever the pulse begins and ends, and the state is asked for."""
+    random = np.random.default_rng(7)
+    begin = random.uniform(0.5, 8.0, 300)
+    end = begin + random.uniform(0.3, 2.0, 300)
+    at = np.sort(random.uniform(0.0, 10.0, 12))
+    run = sw.integrate(gated(begin=begin, end=end), method, y=0.0, dt=dt, tolerance=1e-7, at=at)
+    assert (run.status == Status.OK).all()
+    assert run.y == pytest.approx(opened(at[:, np.newaxis], begin, end), abs=1e-5)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_state_within_a_step_is_as_good_as_the_tolerance(method: str) -> None:
+    """The pulse lies within the first step, which is long: at its end its stages see nothing of it, the extra step does."""
+    run = sw.integrate(gated(begin=0.31, end=0.33), method, y=0.0, dt=1.0, tolerance=1e-9, at=[0.329, 0.7])
+    assert run.y == pytest.approx(opened(run.t, 0.31, 0.33), abs=1e-6)
+    assert run.paces is not None
+    assert run.paces.rejected > 0
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_jumps_are_exact(method: str) -> None:
+    """No step crosses a jump, and what begins there is new: as good as without one, and cheaper than to feel for it."""
+    begin, end = np.linspace(3.0, 7.0, 9), np.linspace(3.01, 7.5, 9)
+    at = np.array([2.0, 3.005, 7.0, 7.2, 10.0])
+    felt = sw.integrate(gated(begin=begin, end=end), method, y=0.0, tolerance=1e-10, at=at)
+    run = sw.integrate(gated(begin=begin, end=end), method, y=0.0, tolerance=1e-10, at=at, jumps=np.array([begin, end]))
+    assert run.y == pytest.approx(opened(at[:, np.newaxis], begin, end), abs=1e-9)
+    assert run.paces is not None
+    assert felt.paces is not None
+    assert run.paces.rejected.sum() < 0.5 * felt.paces.rejected.sum()
+    reference = sw.integrate(
+        gated(begin=begin, end=end), method, y=0.0, tolerance=1e-10, at=at, jumps=np.array([begin, end]), backend="numpy"
+    )
+    assert np.array_equal(run.y, reference.y)
+
+
+def test_a_jump_at_the_start_and_at_saved_times() -> None:
+    """Both sides are on their sides, whether the jump counts to the left or to the right of its time."""
+    for at in ([5.0, 6.0, 7.0], [7.0]):
+        for jumps in ([5.0, 6.0], [6.0, 5.0, 9.0, -1.0]):
+            run = sw.integrate(gated(), "dop853", y=0.0, tolerance=1e-11, at=at, t0=5.0, jumps=jumps)
+            assert run.y == pytest.approx(opened(np.array(at), 5.0, 6.0), abs=1e-11)
+            assert run.paces is not None
+            assert run.paces.rejected == 0
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_largest_step(method: str) -> None:
+    """No step is longer; of a decaying state that a pulse meets the steps would be some units long."""
+    at = np.array([7.4, 9.0])
+    run = sw.integrate(gated(begin=7.3, end=7.33), method, y=0.0, tolerance=1e-8, at=at, max_step=np.array([0.02, 0.01]))
+    assert run.y == pytest.approx(np.stack(2 * [opened(at, 7.3, 7.33)], -1), abs=1e-6)
+    assert run.paces is not None
+    assert (run.paces.accepted >= 9.0 / np.array([0.02, 0.01])).all()
+
+
+def test_in_one_piece_or_in_several() -> None:
+    """Jumps, the largest step and what must stay positive go on with the run."""
+    asked: dict[str, Any] = {"tolerance": 1e-6, "jumps": [5.0, 6.0], "max_step": 0.3, "positive": True}
+    whole = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5, 8.0], **asked)
+    first = sw.integrate(gated(), "merson", y=0.0, at=[4.9, 5.5], **asked)
+    rest = sw.integrate(gated(), "merson", at=[8.0], **first.resume)
+    assert np.array_equal(whole.y[2:], rest.y)
+
+
+# ---- the error of each component
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_small_component_is_as_good_as_a_large_one(method: str) -> None:
+    """Robertson's y₂ is 3.6e-5 beside 1. Values at t = 0.4: FACTS, from three solvers."""
+    right = np.array([0.98517211386, 3.386395379e-5, 0.01479402218522])
+    for tolerance in (1e-3, 1e-6):
+        run = sw.integrate(rober(), method, y=[1.0, 0.0, 0.0], tolerance=tolerance, at=[0.4])
+        # The errors of steps die out with the fast mode, in which y₂ lives: what is left is of a few steps.
+        assert run.y[-1] == pytest.approx(right, rel=10.0 * tolerance)
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+def test_units_do_not_matter_component_by_component(method: str) -> None:
+    """In other units, powers of two, every number of every step is that power times what it was: the same bits."""
+
+    @sw.system(order=1, shape=(3,))
+    def lorenz(t: Any, y: Any, *, k: Any = ONES) -> Any:
+        x = y / k
+        return k * np.array([10.0 * (x[1] - x[0]), x[0] * (28.0 - x[2]) - x[1], x[0] * x[1] - 8.0 / 3.0 * x[2]])
+
+    units = 2.0 ** np.array([40.0, -13.0, -90.0])
+    start = np.array([1.0, 2.0, 20.0])
+    plain = sw.integrate(lorenz(), method, y=start, tolerance=1e-6, at=[1.0, 5.0])
+    other = sw.integrate(lorenz(k=units), method, y=start * units, tolerance=1e-6, at=[1.0, 5.0])
+    assert np.array_equal(other.y, plain.y * units)
+
+
+def test_a_cascade_from_zero_goes_on() -> None:
+    """Forty vessels, the first full: the last fills with the fortieth power of the time, in which no method has an order."""
+
+    @sw.system(order=1, shape=(40,))
+    def cascade(t: Any, y: Any) -> Any:
+        return np.concatenate([[-y[0]], y[:-1] - y[1:]])
+
+    start = np.zeros(40)
+    start[0] = 1.0
+    from scipy.stats import poisson
+
+    for method in PAIRS:
+        run = sw.integrate(cascade(), method, y=start, tolerance=1e-6, at=[10.0], max_steps=5000)
+        assert run.status == Status.OK
+        assert run.y[-1] == pytest.approx(poisson.pmf(np.arange(40), 10.0), rel=1e-4, abs=1e-12)
+
+
+def test_rows_and_blocks() -> None:
+    """What is equivalent counts together: turned about, a run takes the same steps, but for roundings."""
+    for scale, turns_alike in (("row", True), ("block", True), ("component", False)):
+
+        @sw.system(shape=(2, 2), scale=scale)
+        def two(t: Any, v: Any, y: Any) -> Any:
+            r = y[1] - y[0]
+            pull = r / (r[0] ** 2 + r[1] ** 2) ** 1.5
+            return np.array([pull, -pull])
+
+        steps = []
+        for angle in (0.0, 0.7):
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            v, y = np.array([[0.0, 0.5], [0.0, -0.5]]) @ turn, np.array([[1.0, 0.0], [-1.0, 0.0]]) @ turn
+            run = sw.integrate(two(), "dop853", v=v, y=y, tolerance=1e-9, at=[5.0])
+            assert run.paces is not None
+            steps.append(int(run.paces.accepted) + int(run.paces.rejected))
+        assert (steps[0] == steps[1]) == turns_alike, (scale, steps)
+
+
+def test_tolerances_of_components() -> None:
+    """As SciPy's: an absolute part for each, in its own units; one that is loose on one component is loose on that alone."""
+    fine = sw.integrate(rober(), "dop853", y=[1.0, 0.0, 0.0], tolerance=(1e-9, np.array([1e-9, 1e-14, 1e-9])), at=[0.4])
+    right = np.array([0.98517211386, 3.386395379e-5, 0.01479402218522])
+    assert fine.y[-1] == pytest.approx(right, rel=1e-8)
+    loose = sw.integrate(rober(), "dop853", y=[1.0, 0.0, 0.0], tolerance=(1e-9, np.array([1e-9, 1e-3, 1e-9])), at=[0.4])
+    assert fine.paces is not None
+    assert loose.paces is not None
+    assert loose.paces.accepted < fine.paces.accepted
+    found = sw.solve_ivp(rober().definition, (0.0, 0.4), [1.0, 0.0, 0.0], rtol=1e-9, atol=[1e-9, 1e-14, 1e-9])
+    assert found.y[:, -1] == pytest.approx(right, rel=1e-8)
+    of_each = np.array([[1e-9], [1e-14], [1e-9]])
+    batch = sw.integrate(rober(), "dop853", y=np.tile([[1.0], [0.0], [0.0]], 2), tolerance=(1e-9, of_each), at=[0.4])
+    assert np.array_equal(batch.y[-1], np.stack(2 * [fine.y[-1]], -1))
+    with pytest.raises(ShapeError, match=r"may be meant for each component of y or for each member"):
+        sw.integrate(rober(), "dop853", y=np.ones((3, 3)), tolerance=(1e-9, np.ones(3)), at=[0.4])
+
+
+# ---- states that must stay positive
+
+
+@pytest.mark.parametrize("method", PAIRS)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_three_species_stay_positive(method: str, tolerance: float) -> None:
+    run = sw.integrate(
+        may_leonard(), method, y=[0.6, 0.6, 0.1], tolerance=tolerance, at=np.linspace(10.0, 300.0, 30), positive=True
+    )
+    assert (run.status == Status.OK).all()
+    assert (run.y >= 0.0).all()
+    assert run.y.max() < 1.2
+
+
+def test_what_cannot_stay_positive_is_told() -> None:
+    """ẏ = −1 is at zero at t = 1, and nothing keeps it there."""
+
+    @sw.system(order=1)
+    def falls(t: Any, y: Any) -> Any:
+        return -1.0 + 0.0 * y
+
+    with pytest.warns(sw.ToleranceWarning):
+        run = sw.integrate(falls(), "merson", y=1.0, tolerance=1e-6, at=[0.5, 2.0], positive=True)
+    assert run.status == Status.UNDERFLOW
+    assert run.paces is not None
+    assert run.paces.t == pytest.approx(1.0, abs=1e-9)
+    assert run.y[0] == pytest.approx(0.5)
+
+
+def test_some_components_alone() -> None:
+    """An oscillation about zero goes on beside a concentration that must not become negative."""
+
+    @sw.system(order=1, shape=(3,))
+    def both(t: Any, y: Any) -> Any:
+        return np.array([y[1], -y[0], -50.0 * y[2]])
+
+    for which in (2, [2], ("y", 2)):
+        run = sw.integrate(both(), "merson", y=[1.0, 0.0, 1.0], tolerance=1e-2, at=np.linspace(0.1, 9.0, 20), positive=which)
+        assert (run.y[:, 2] >= 0.0).all()
+        assert (run.y[:, 0] < -0.5).any()
+    for wrong in (3, ("x", 0), ("y", 0, 0), 1.5, "z"):
+        with pytest.raises((ArgumentError, ShapeError), match="positive"):
+            sw.integrate(both(), "merson", y=[1.0, 0.0, 1.0], tolerance=1e-2, at=[1.0], positive=wrong)
+    with pytest.raises(ArgumentError, match=r"positive: expected a start at which y\[1\] is not negative, got -1"):
+        sw.integrate(both(), "merson", y=[1.0, -1.0, 1.0], tolerance=1e-2, at=[1.0], positive=True)
+    with pytest.raises(UnsupportedError, match="positive: taylor"):
+        sw.integrate(both(), "taylor", y=[1.0, 0.0, 1.0], tolerance=1e-2, at=[1.0], positive=2)
+
+
+# ---- backward, and spans of each member
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+def test_backward(method: str) -> None:
+    """There and back; a run back is that of the reversed equations, to the bit."""
+
+    @sw.system(order=1, shape=(2,))
+    def driven(t: Any, y: Any) -> Any:
+        return np.array([y[1], np.sin(3.0 * t) - 0.1 * y[1] - y[0] ** 3])
+
+    @sw.system(order=1, shape=(2,))
+    def reversed_time(s: Any, y: Any) -> Any:
+        t = -s
+        return np.array([-y[1], -(np.sin(3.0 * t) - 0.1 * y[1] - y[0] ** 3)])
+
+    there = sw.integrate(driven(), method, y=[1.0, 0.0], tolerance=1e-11, at=[5.0])
+    back = sw.integrate(driven(), method, y=there.y[-1], t0=5.0, tolerance=1e-11, at=[2.5, 0.0, -1.0])
+    assert np.array_equal(back.t, [2.5, 0.0, -1.0])
+    # The damped motion is undamped going back: errors of some hundred steps grow by e^0.5.
+    assert back.y[1] == pytest.approx([1.0, 0.0], abs=1e-8)
+    again = sw.integrate(reversed_time(), method, y=there.y[-1], t0=-5.0, tolerance=1e-11, at=[-2.5, 0.0, 1.0])
+    assert np.array_equal(back.y, again.y)
+    asked: dict[str, Any] = {"y": there.y[-1], "t0": 5.0, "tolerance": 1e-11}
+    assert np.array_equal(back.y, sw.integrate(driven(), method, at=[2.5, 0.0, -1.0], backend="numpy", **asked).y)
+    piece = sw.integrate(driven(), method, y=there.y[-1], t0=5.0, tolerance=1e-11, at=[2.5])
+    assert np.array_equal(sw.integrate(driven(), method, at=[0.0, -1.0], **piece.resume).y, back.y[1:])
+
+
+def test_backward_for_built_in_and_large_systems() -> None:
+    """Back where they came from; large systems step by rows and not by a tape."""
+    for scene in (sw.scenes.scene("figure_eight"), sw.scenes.scene("plummer")):
+        there = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, tolerance=1e-10, at=[0.2])
+        back = sw.integrate(scene.system, "dop853", v=there.v[-1], y=there.y[-1], t0=0.2, tolerance=1e-10, at=[0.0])
+        assert back.y[-1] == pytest.approx(scene.y, abs=1e-6)
+
+
+def test_what_does_not_go_backward() -> None:
+    bodies = sw.scenes.scene("figure_eight")
+    with pytest.raises(UnsupportedError, match=r"at: .*leads a state back to its target"):
+        sw.integrate(
+            bodies.system, "dop853", v=bodies.v, y=bodies.y, tolerance=1e-6, at=[-1.0], control=sw.EnergyControl(gain=1.0)
+        )
+    with pytest.raises(ArgumentError, match="at: expected times that descend"):
+        sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[-1.0, -0.5])
+    with pytest.raises(ArgumentError, match="forward in time, or all backward"):
+        sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-6, t0=np.array([0.0, 2.0]), at=[1.0])
+    with pytest.raises(ArgumentError, match="dt: expected a step below zero"):
+        sw.integrate(sw.Oscillator(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[-1.0], dt=0.1)
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+def test_spans_of_each_member(method: str) -> None:
+    """Members with a start and saved times of their own are as alone."""
+
+    @sw.system(order=1)
+    def driven(t: Any, y: Any) -> Any:
+        return np.cos(t) - 0.3 * y
+
+    random = np.random.default_rng(3)
+    t0 = random.uniform(-5.0, 5.0, 17)
+    at = t0 + np.sort(random.uniform(0.0, 9.0, (4, 17)), axis=0)
+    run = sw.integrate(driven(), method, y=np.linspace(0.0, 1.0, 17), t0=t0, tolerance=1e-8, at=at)
+    assert run.t.shape == (4, 17)
+    for member in (0, 7, 16):
+        alone = sw.integrate(
+            driven(), method, y=np.linspace(0.0, 1.0, 17)[member], t0=t0[member], tolerance=1e-8, at=at[:, member]
+        )
+        assert np.array_equal(run.y[:, member], alone.y)
+    reference = sw.integrate(driven(), method, y=np.linspace(0.0, 1.0, 17), t0=t0, tolerance=1e-8, at=at, backend="numpy")
+    assert np.array_equal(run.y, reference.y)
+
+
+# ---- the reference
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+@pytest.mark.parametrize("backward", [False, True])
+@pytest.mark.parametrize(
+    "acceptance",
+    [
+        Acceptance(),
+        Acceptance((0, 1, 2, 3, 4, 5)),
+        Acceptance((0, 0, 1, 2, 3, 3), own=True),
+        Acceptance((0, 0, 0, 1, 1, 2), positive=(1, 5)),
+        Acceptance(own=True, positive=(0,)),
+    ],
+)
+def test_attempts_are_one_graph(method: str, backward: bool, acceptance: Acceptance) -> None:
+    """The same graph of operations as the reference, so equal bits for every input."""
+
+    @sw.system(shape=(3,))
+    def springs(t: Any, v: Any, y: Any, *, k: float = 2.0) -> Any:
+        return -k * np.roll(y, 1) + np.cos(t) * v
+
+    plan = engine.Plan(
+        springs().sized(np.zeros(3), np.zeros(3)), sw.method(method), (), 1.0, acceptance=acceptance, backward=backward
+    )
+    for what in ("attempt", "begin"):
+        tape = _core.Tape()
+        core = tape.trace(engine.model(plan), what)
+        reference = getattr(Tracer(plan.system, tape), what)(
+            plan.method, *([0] if what == "attempt" else []), acceptance, backward=backward
+        )
+        assert [each.id for each in core] == [each.id for each in reference]
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_equal_bits_with_everything(method: str) -> None:
+    """Jumps of each member, largest steps, positive states, tolerances of components; on every way through the core."""
+    random = np.random.default_rng(11)
+    start = random.uniform(0.05, 1.0, (3, 40))
+    asked: dict[str, Any] = {
+        "y": start,
+        "tolerance": (random.uniform(1e-7, 1e-5, (3, 1)), random.uniform(1e-9, 1e-7, 40)),
+        "at": [0.5, 3.0, 9.0],
+        "jumps": np.sort(random.uniform(0.0, 9.0, (3, 40)), axis=0),
+        "max_step": random.uniform(0.1, 2.0, 40),
+        "positive": [0, 2],
+    }
+    runs = [sw.integrate(may_leonard(), method, backend=backend, **asked) for backend in ("rust", "numpy")]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    for name in ("t", "h", "accepted", "rejected"):
+        assert np.array_equal(getattr(runs[0].paces, name), getattr(runs[1].paces, name))
+
+
+# ---- where else the options go
+
+
+def test_inputs_know_their_jumps() -> None:
+    """Held samples are met at their times: as good as a closed form, and no step is rejected for them."""
+    values = np.array([0.0, 1.0, -2.0, 0.5, 0.5, 3.0])
+
+    @sw.system(order=1)
+    def follows(t: Any, y: Any, *, u: Any = NOTHING) -> Any:
+        return u - y
+
+    y, at = 0.0, np.arange(1.0, 7.0)
+    right = []
+    for value in values:  # over each second, y goes to the value by 1 − 1/e
+        y = value + (y - value) * np.exp(-1.0)
+        right.append(y)
+    for method in PAIRS:
+        run = sw.integrate(follows(u=sw.Sampled(values, interval=1.0)), method, y=0.0, tolerance=1e-10, at=at)
+        assert run.y == pytest.approx(right, abs=1e-8)
+        reference = sw.integrate(
+            follows(u=sw.Sampled(values, interval=1.0)), method, y=0.0, tolerance=1e-10, at=at, backend="numpy"
+        )
+        assert np.array_equal(run.y, reference.y)
+
+
+def test_scenes_sweeps_and_solve_ivp() -> None:
+    """The same options, and the same numbers."""
+    options: dict[str, Any] = {"jumps": [7.3, 7.33], "max_step": 0.4, "positive": True}
+    system, at = gated(begin=7.3, end=7.33), [7.32, 8.0]
+    run = sw.integrate(system, "merson", y=0.1, tolerance=1e-8, at=at, **options)
+    scene = sw.scenes.Scene(system, y=0.1, horizon=8.0, **options)
+    assert np.array_equal(scene.run("merson", tolerance=1e-8, at=at).y, run.y)
+    pytest.importorskip("xarray")
+    found = sw.sweep(gated, {"begin": ("run", [7.3]), "end": ("run", [7.33])}, "merson", y=0.1, tolerance=1e-8, at=at, **options)
+    assert found.y_last.values[0] == run.y[-1]
+    with pytest.raises(ArgumentError, match="max_step: goes with tolerance= and at= only"):
+        sw.integrate(system, "merson", y=0.1, dt=0.1, steps=2, max_step=0.1)
+
+
+@pytest.mark.parametrize("method", [*PAIRS, "taylor"])
+def test_equal_bits_of_a_batch_with_two_blocks(method: str) -> None:
+    """Each component of v and of y is one group, and of members at rest no number of the batch counts as one of the block."""
+
+    @sw.system
+    def hangs(t: Any, v: Any, y: Any) -> Any:
+        return -np.sin(y)
+
+    asked: dict[str, Any] = {"v": np.array([0.0, 0.0, 1.0]), "y": np.array([1.0, 0.0, 0.0]), "tolerance": 1e-6, "at": [0.01, 4.0]}
+    runs = [sw.integrate(hangs(), method, backend=backend, **asked) for backend in ("rust", "numpy")]
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert runs[0].paces is not None
+    assert runs[0].paces.accepted[0] < 100

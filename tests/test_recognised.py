@@ -1,0 +1,184 @@
+"""Own systems that are made anew at each call are traced once, and never again from what has changed since."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.equations import recognised
+from stepwell.systems import own
+
+SCALE = 2.0
+TABLE = np.array([1.0, 2.0])
+LISTED = [1.0, 2.0]
+NAMED = {"k": 1.0}
+
+
+class Settings:
+    k = 1.0
+
+
+SETTINGS = Settings()
+
+
+def helper(y: Any) -> Any:
+    return SCALE * np.sin(y)
+
+
+def of_global() -> Any:
+    return lambda t, v, y: -SCALE * y
+
+
+def of_helper() -> Any:
+    return lambda t, v, y: -helper(y)
+
+
+def of_array() -> Any:
+    return lambda t, v, y: -TABLE[0] * y
+
+
+def of_list() -> Any:
+    return lambda t, v, y: -LISTED[0] * y
+
+
+def of_dictionary() -> Any:
+    return lambda t, v, y: -NAMED["k"] * y
+
+
+def of_object() -> Any:
+    return lambda t, v, y: -SETTINGS.k * y
+
+
+CELL = types.SimpleNamespace(k=1.0)
+
+
+def of_closure() -> Any:
+    k = CELL.k
+    return lambda t, v, y: -k * y
+
+
+def of_inner() -> Any:
+    def outer(t: Any, v: Any, y: Any) -> Any:
+        def inner(x: Any) -> Any:
+            return SCALE * x
+
+        return -inner(y)
+
+    return outer
+
+
+def of_default() -> Any:
+    def scaled(y: Any, k: float = CELL.k) -> Any:
+        return k * y
+
+    return lambda t, v, y: -scaled(y)
+
+
+CHANGES: dict[str, tuple[Callable[[], Any], Callable[[pytest.MonkeyPatch], None]]] = {
+    "a global": (of_global, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "a global of a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "helper", lambda y: 7.0 * y)),
+    "an array in place": (of_array, lambda patch: TABLE.__setitem__(0, TABLE[0] + 1.0)),
+    "a list": (of_list, lambda patch: LISTED.__setitem__(0, LISTED[0] + 1.0)),
+    "a dictionary": (of_dictionary, lambda patch: patch.setitem(NAMED, "k", 5.0)),
+    "an attribute of an object": (of_object, lambda patch: patch.setattr(SETTINGS, "k", 5.0)),
+    "a captured variable": (of_closure, lambda patch: patch.setattr(CELL, "k", 5.0)),
+    "a global of a function within it": (of_inner, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "a default": (of_default, lambda patch: patch.setattr(CELL, "k", 5.0)),
+}
+
+
+def end(function: Any, **given: Any) -> float:
+    system = sw.system(function)(**given)
+    runs = [sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3, backend=backend) for backend in ("rust", "numpy")]
+    assert runs[0].y[-1] == runs[1].y[-1]  # the reference runs the function itself
+    return float(runs[0].y[-1])
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_has_changed_is_traced_anew(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, act = CHANGES[change]
+    before = end(make())
+    assert end(make()) == before
+    act(monkeypatch)
+    assert end(make()) != before
+
+
+def test_the_same_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    traced: list[Any] = []
+    trace = own.OwnSystem._trace
+
+    def counted(self: Any) -> None:
+        traced.append(self)
+        trace(self)
+
+    monkeypatch.setattr(own.OwnSystem, "_trace", counted)
+
+    def made(scale: float) -> Any:
+        @sw.system
+        def duffing(t: Any, v: Any, y: Any, *, beta: Any = 1.0, drive: Any = 0.0) -> Any:
+            return drive * math.cos(1.0) - scale * y - beta * y**3 + np.dot(TABLE, TABLE)
+
+        return duffing
+
+    for beta in (1.0, 2.0, [1.0, 2.0]):
+        for drive in (0.5, sw.Sinusoid(1.0, 2.0), sw.Sinusoid(0.5, 3.0), sw.Sampled([0.0, 1.0], 0.1)):
+            sw.integrate(made(1.0)(beta=beta, drive=drive), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    assert len(traced) == 3  # a number, a sinusoid, samples
+    sw.integrate(made(2.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(made(-0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    sw.integrate(made(0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    assert len(traced) == 6
+    sw.integrate(made(1.0)(), "rk4", v=np.zeros((2, 3)), y=np.ones((2, 3)), dt=0.1, steps=1)
+    assert len(traced) == 6  # batches change nothing
+
+
+def test_functions_of_the_time_and_invariants_count() -> None:
+    def made(k: float) -> Any:
+        @sw.system
+        def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+            return push - y
+
+        @pushed.invariant
+        def energy(v: Any, y: Any) -> Any:
+            return k * (v * v + y * y)
+
+        return pushed
+
+    start: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 2}
+    ends = {sw.integrate(made(0.5)(push=lambda t, a=a: a * t), "rk4", **start).y[-1].item() for a in (1.0, 2.0)}
+    assert len(ends) == 2
+    assert sw.integrate(made(0.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(0.5, rel=1e-4)
+    assert sw.integrate(made(1.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(1.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda: SETTINGS.k,
+        lambda: __import__("time").time(),
+        lambda: globals()["SCALE"],
+        lambda: getattr(SETTINGS, "k"),  # noqa: B009
+        types.SimpleNamespace,
+        lambda: np.zeros(1) if not_there else 0,  # type: ignore[name-defined]  # noqa: F821
+    ],
+)
+def test_what_may_change_unseen_is_like_nothing_else(function: Any) -> None:
+    with pytest.raises(recognised.Unknown):
+        recognised.told(function)
+
+
+def test_numbers_are_told_apart_by_their_bits() -> None:
+    def of(value: Any) -> Any:
+        return recognised.told(lambda: value)
+
+    different = [0.0, -0.0, 1.0, 1, True, "1", b"1", None, (1.0,), [1.0], np.array([1.0]), np.float32(1.0), np.array([1])]
+    found = [of(each) for each in different]
+    assert len(set(found)) == len(found)
+    assert of(math.nan) == of(math.nan)
+    assert of(np.array([1.0, np.nan])) == of(np.array([1.0, np.nan]))

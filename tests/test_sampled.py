@@ -1,0 +1,253 @@
+"""Sampled inputs: what a step sees of samples that are held, and of the curves through them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.errors import UnknownNameError
+from stepwell.reference import signal
+
+METHODS = sw.methods()
+#: At the shortest steps here DOP853 and the series are at rounding; these show their order before.
+ORDERS = {each.name: min(each.order, 5) for each in METHODS}
+INTERVAL, SAMPLES, OMEGA, V, Y = 0.1, 20, 2.0, 0.3, 1.0
+VALUES = np.random.default_rng(1).normal(size=SAMPLES)
+END = INTERVAL * SAMPLES
+EPS = 2.0**-52
+
+
+def true_end(values: Any, start: float, omega: float = OMEGA) -> tuple[Any, Any]:
+    """The oscillator ÿ = −ω²y + a at ``END``, piece by piece: about a/ω² it turns by ω·t, without a spring it is a parabola."""
+    v, y, t = V, Y, 0.0
+    for value, until in zip(values, [*(start + INTERVAL * np.arange(1, len(values))), END], strict=True):
+        until = min(max(until, t), END)
+        h, t = until - t, until
+        if omega:
+            c, s, rest = np.cos(omega * h), np.sin(omega * h), value / omega**2
+            v, y = v * c - omega * (y - rest) * s, rest + (y - rest) * c + v / omega * s
+        else:
+            v, y = v + value * h, y + v * h + 0.5 * value * h * h
+    return v, y
+
+
+def error(method: str, steps: int, start: float = 0.0, omega: float = OMEGA, **how: Any) -> float:
+    """Of the state at ``END``."""
+    system = sw.Oscillator(omega, a=sw.Sampled(VALUES, INTERVAL, start), form="physical")
+    run = sw.integrate(system, method, v=V, y=Y, dt=END / steps, steps=steps, **how)
+    v, y = true_end(VALUES, start, omega)
+    return float(max(abs(run.v[-1] - v), abs(run.y[-1] - y)))
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_a_method_has_its_order_where_samples_begin_with_steps(name: str) -> None:
+    """Halving the step divides the error by 2^p up to the next order, a tenth of it here; one order less would halve that."""
+    coarse, fine = error(name, 80), error(name, 160)
+    assert fine < max(coarse / 2.0 ** (ORDERS[name] - 0.3), 1e-11)
+
+
+@pytest.mark.parametrize("steps", [20, 40, 100])
+@pytest.mark.parametrize("name", ORDERS)
+def test_without_a_spring_the_velocity_is_the_sum_of_the_samples(name: str, steps: int) -> None:
+    """Every method adds h times the mean of its rates, so nothing but rounding of some hundred additions is left."""
+    system = sw.Oscillator(0.0, a=sw.Sampled(VALUES, INTERVAL), form="physical")
+    run = sw.integrate(system, name, v=V, y=Y, dt=END / steps, steps=steps)
+    assert abs(run.v[-1] - (V + INTERVAL * VALUES.sum())) < 1000 * EPS
+
+
+@pytest.mark.parametrize("share", [1e-9, 1e-7, 1e-6, 1e-5, -1e-6])
+@pytest.mark.parametrize("name", ["rk4", "merson", "fehlberg_5", "dop853", "pefrl", "leapfrog"])
+def test_samples_that_begin_a_little_off_a_step(name: str, share: float) -> None:
+    """The mean over a step is that of the true input, so v is right at its end; the place errs by (h/2)·δ·|a₂ − a₁| a sample.
+
+    The errors turn with the oscillator, which also makes v of y by ω; two more for what the method itself makes of them.
+    """
+    steps, shift = 200, share * INTERVAL
+    own = error(name, steps)
+    bound = 2.0 * OMEGA * 0.5 * (END / steps) * abs(shift) * abs(np.diff(VALUES)).sum()
+    assert error(name, steps, shift) < own * (1.0 + 100 * abs(share)) + bound + 1e-12
+
+
+@pytest.mark.parametrize("name", [name for name, order in ORDERS.items() if order >= 2])
+def test_elsewhere_the_error_is_of_second_order(name: str) -> None:
+    """An error of each of 20 samples of at most (h²/8)·|a₂ − a₁|, the most that a mean leaves of a place, times ω for v."""
+    for steps in (90, 170, 310, 610):
+        h = END / steps
+        own = error(name, 2 * steps) * 5.0  # of the method itself, of at least second order
+        assert error(name, steps, 0.0137) < own + OMEGA * h * h / 8.0 * abs(np.diff(VALUES)).sum()
+
+
+@pytest.mark.parametrize("name", ["rk4", "leapfrog", "verlet", "false_euler"])
+def test_a_step_over_several_samples_sees_their_mean(name: str) -> None:
+    """Without a spring v is then the integral of the samples, but for what begins and ends with half a step."""
+    values = np.random.default_rng(2).normal(size=(200, 3))
+    system = sw.Oscillator(0.0, a=sw.Sampled(values, 0.01, 0.003), form="physical")
+    run = sw.integrate(system, name, v=V, y=Y, dt=0.07, steps=20)
+    time = 0.07 * 20
+    until = 0.003 + 0.01 * np.arange(201)
+    lengths = np.diff(np.clip(until, 0.003, time))
+    true = V + 0.003 * values[0] + lengths @ values
+    # What carries something in place of v sees, at either end, the mean of a step for that of half a one.
+    slack = 0.07 * np.abs(values).max() if sw.method(name).carry else 1000 * EPS
+    assert np.abs(run.v[-1] - true).max() < slack
+    other = sw.integrate(system, name, v=V, y=Y, dt=0.07, steps=20, backend="numpy")
+    np.testing.assert_array_equal(run.v, other.v)
+    v, y = np.full(3, V), np.full(3, Y)
+    world = sw.World(system, name, v=v, y=y, dt=0.07)
+    world.step(20)
+    np.testing.assert_array_equal(world.y, run.y[-1])
+
+
+KINDS: dict[str, Any] = {
+    "hold": {"interval": 0.1},
+    "hold, not with steps": {"interval": 0.083, "start": 0.017},
+    "hold, within steps": {"interval": 0.013},
+    "linear": {"interval": 0.083, "interpolation": "linear"},
+    "cubic": {"interval": 0.083, "interpolation": "cubic"},
+}
+
+
+@sw.system
+def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+    return push - y - 0.1 * y**3
+
+
+def systems(kind: str) -> dict[str, tuple[sw.System, Any, Any]]:
+    """Small and large ones, of each way in which inputs are looked up."""
+    r = np.random.default_rng(5)
+    given = KINDS[kind]
+    common, own = sw.Sampled(r.normal(size=31), **given), sw.Sampled(r.normal(size=(31, 3)), **given)
+    large = -np.eye(140, k=0) + 0.1 * r.normal(size=(140, 140)) / 140
+    return {
+        "oscillator": (sw.Oscillator([1.0, 2.0, 3.0], a=common, x=own), 0.1, 1.0),
+        "own": (pushed(push=own), 0.1, np.ones(3)),
+        "linear": (sw.LinearSystem(large, r.normal(size=(140, 2)), x=[common, own]), np.ones((70, 3)), np.ones((70, 3))),
+    }
+
+
+@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet", "pefrl", "taylor", "dop853", "semi_false_heun"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_core_and_reference_agree_to_the_bit(kind: str, method: str) -> None:
+    for name, (system, v, y) in systems(kind).items():
+        if name == "linear" and (sw.method(method).needs_acceleration or method == "taylor"):
+            continue
+        start: dict[str, Any] = {"v": v, "y": y, "dt": 0.05, "steps": 37, "every": 5, "t0": -0.2}
+        run, other = (sw.integrate(system, method, **start, backend=backend) for backend in ("rust", "numpy"))
+        np.testing.assert_array_equal(run.y, other.y, err_msg=name)
+        np.testing.assert_array_equal(run.v, other.v, err_msg=name)
+        if system.linear and kind != "hold, within steps" and method != "taylor":
+            made = [sw.integrate(system, method, **start, backend=backend, form="matrix") for backend in ("rust", "numpy")]
+            np.testing.assert_array_equal(made[0].y, made[1].y, err_msg=name)
+            assert made[0].y == pytest.approx(run.y, abs=1e-11)
+
+
+def test_large_own_equations() -> None:
+    """Past what becomes one tape for a step: rates are told the window of the step that asks."""
+
+    @sw.system
+    def ring(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
+        return push * np.cos(y) - (2.0 * y - np.roll(y, 1) - np.roll(y, -1)) ** 3
+
+    r = np.random.default_rng(3)
+    for values in (r.normal(size=30), r.normal(size=(30, 2))):
+        system = ring(push=sw.Sampled(values, 0.035))
+        for method in ("dop853", "leapfrog", "verlet"):
+            start: dict[str, Any] = {"v": 0.0, "y": r.normal(size=(60, 2)), "dt": 0.01, "steps": 40, "every": 10}
+            run, other = (sw.integrate(system, method, **start, backend=backend) for backend in ("rust", "numpy"))
+            np.testing.assert_array_equal(run.y, other.y)
+            np.testing.assert_array_equal(run.v, other.v)
+
+
+def test_a_line_is_what_numpy_interpolates() -> None:
+    times = np.linspace(-0.5, 2.5, 301)
+    for values in (VALUES, np.random.default_rng(4).normal(size=(20, 3))):
+        sampled = sw.Sampled(values, INTERVAL, 0.05, "linear")
+        found = np.array([sampled.signal().at(t) for t in times])
+        rows = values.reshape(20, -1).T
+        expected = np.stack([np.interp(times, sampled.times, row) for row in rows], axis=-1).reshape(found.shape)
+        # A slope times a time, and a sum: some roundings of values of a few units.
+        np.testing.assert_allclose(found, expected, atol=100 * EPS)
+
+
+def test_cubics_go_through_the_samples_and_are_exact_for_polynomials_of_third_degree() -> None:
+    times, inside = np.linspace(-0.5, 2.5, 301), np.linspace(0.0, 1.9, 97)
+    sampled = sw.Sampled(VALUES, INTERVAL, 0.0, "cubic")
+    signal_of = sampled.signal()
+    for t, value in zip(sampled.times, VALUES, strict=True):
+        assert abs(signal_of.at(t) - value) < 100 * EPS
+    assert all(signal_of.at(t) == VALUES[0] for t in times[times < 0.0])
+    assert all(signal_of.at(t) == VALUES[-1] for t in times[times > 1.91])
+    cubic = np.polynomial.Polynomial([0.3, -1.0, 0.5, 2.0])
+    of_cubic = sw.Sampled(cubic(sampled.times), INTERVAL, 0.0, "cubic").signal()
+    for t in inside:
+        assert abs(of_cubic.at(t) - cubic(t)) < 1e-13  # derivatives are differences of values over an interval of 0.1
+
+
+@pytest.mark.parametrize(("interpolation", "order"), [("linear", 2), ("cubic", 4)])
+def test_errors_of_curves_by_the_interval(interpolation: Any, order: int) -> None:
+    """Of sin 3t: halving the interval divides the largest error by 2^p, up to a tenth for higher orders."""
+    errors = []
+    for n in (64, 128):
+        at = np.linspace(0.0, 2.0, n + 1)
+        curve = sw.Sampled(np.sin(3.0 * at), 2.0 / n, 0.0, interpolation).signal()
+        errors.append(max(abs(curve.at(t) - np.sin(3.0 * t)) for t in np.linspace(0.0, 2.0, 997)))
+    assert errors[1] < errors[0] / 2.0 ** (order - 0.2)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize("interpolation", ["hold", "linear", "cubic"])
+def test_few_samples(interpolation: Any, n: int) -> None:
+    """Cubics of few samples are the polynomial through them, of as low a degree."""
+    at = 0.25 * np.arange(n)
+    polynomial = np.polynomial.Polynomial([1.0, 2.0, -1.0, 0.5][:n])
+    given = sw.Sampled(polynomial(at), 0.25, 0.0, interpolation)
+    run = sw.integrate(sw.Oscillator(a=given), "rk4", v=0.0, y=0.0, dt=0.05, steps=15)
+    assert np.isfinite(run.y).all()
+    if interpolation == "cubic":
+        assert all(abs(given.signal().at(t) - polynomial(t)) < 1e-14 for t in np.linspace(0.0, at[-1], 9))
+
+
+def test_smooth_inputs_keep_the_order_of_a_method() -> None:
+    """Cubics through sin 3t at intervals of 0.3 steps, of fourth order as the method is; halving both divides the error by 16."""
+    exact = sw.integrate(sw.Oscillator(2.0, a=sw.Sinusoid(1.0, 3.0), form="physical"), "dop853", v=V, y=Y, dt=0.005, steps=400)
+    errors = []
+    for steps in (40, 80):
+        h = END / steps
+        at = np.arange(4 * steps) * (0.3 * h) - 0.1
+        driven = sw.Oscillator(2.0, a=sw.Sampled(np.sin(3.0 * at), 0.3 * h, -0.1, "cubic"), form="physical")
+        errors.append(abs(sw.integrate(driven, "rk4", v=V, y=Y, dt=h, steps=steps).y[-1] - exact.y[-1]))
+    assert errors[1] < errors[0] / 2.0**3.7
+
+
+def test_jumps() -> None:
+    held = sw.Sampled([0.0, 0.0, 1.0, 1.0, -1.0], 0.5, 1.0)
+    np.testing.assert_array_equal(held.jumps(0.0, 9.0), [2.0, 3.0])
+    np.testing.assert_array_equal(held.jumps(2.0, 3.0), [])
+    np.testing.assert_array_equal(sw.Sampled([0.0, 1.0, 4.0], 0.5, 1.0, "linear").jumps(0.0, 9.0), [1.0, 1.5, 2.0])
+    assert not len(sw.Sampled([1.0, 1.0], 0.5, 0.0, "linear").jumps(-1.0, 9.0))
+    assert not len(sw.Sinusoid(1.0, 2.0).jumps(0.0, 9.0))
+    system = pushed(push=held)
+    np.testing.assert_array_equal(system.jumps(0.0, 9.0), [2.0, 3.0])
+    two = sw.Oscillator(a=held, x=sw.Sampled([[0.0, 0.0], [0.0, 1.0]], 2.0, 0.0))
+    np.testing.assert_array_equal(two.jumps(0.0, 9.0), [2.0, 3.0])
+    assert not len(sw.Pendulum().jumps(0.0, 9.0))
+
+
+def test_the_window_of_a_step_back() -> None:
+    """It is that of the same stretch of time, stepped forward."""
+    for carries in (False, True):
+        assert signal.of_step(1.0, -0.25, carries)[:2] == (
+            signal.of_step(0.75, 0.25, False)[:2] if not carries else (0.875, 1.125)
+        )
+        assert signal.of_step(1.0, -0.25, carries)[2] == 0.25
+    assert signal.of_slot(1.0, 0.5) == (0.75, 1.0, 0.25)
+    assert signal.of_slot(1.0, -0.5) == (1.0, 1.25, 0.25)
+
+
+def test_what_is_between_is_said() -> None:
+    assert "linear" in repr(sw.Sampled([0.0, 1.0], 1.0, interpolation="linear"))
+    with pytest.raises(UnknownNameError, match=r"interpolation: there is no 'lineer'; did you mean 'linear'\?"):
+        sw.Sampled([0.0, 1.0], 1.0, interpolation="lineer")  # type: ignore[arg-type]
+    assert sw.Sampled([0.0, 1.0], 1.0) != sw.Sampled([0.0, 1.0], 1.0, interpolation="linear")
