@@ -18,7 +18,7 @@ from ..method_records import Method
 from ..method_records import method as find_method
 from ..stability import eigen, exact, maps, parts
 from ..stability.analysis import Analysis, analyse, state
-from ..stability.eigen import Complex
+from ..stability.eigen import EPS, Complex
 from ..systems import System
 from ..systems.base import a_system
 from .at_state import by_growth, linearised
@@ -40,10 +40,10 @@ SAME = 1e-8
 #: surface of equilibria, or a double root.
 SINGULAR = 1e-10
 
-#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by half
-#: of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a rounding
-#: only, or a part of the distance is left by each step, and the eigenvalue is as large as that distance, of either sign. Two more
-#: steps at a p-fold root make the eigenvalue (1 − 2/p)^(p − 1) ≤ 0.14 times as large.
+#: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by
+#: half of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a
+#: rounding only, or a part of the distance is left by each step, and the eigenvalue is as large as that distance, of either sign.
+#: Two more steps at a p-fold root make the eigenvalue (1 − 2/p)^(p − 1) ≤ 0.14 times as large.
 ZERO_RATE, LEFT = 1e-9, 2.0
 
 
@@ -324,7 +324,8 @@ def _known(system: System, at: Array, matrix: Array, rates: Array, weakest: Arra
     beside = np.where(np.isfinite(beside), beside, matrix[:, :, np.newaxis])
     own, others = eigen.eigenvalues(matrix), eigen.eigenvalues(beside)
     moved = np.abs(own[:, np.newaxis, np.newaxis] - others[np.newaxis]).min(axis=1).max(axis=1)
-    least = np.maximum(2.0 * moved, ZERO_RATE * np.abs(own).max())
+    # Where all are zero, as of a mass that nothing holds, what is left of them is rounding of the elements, in many digits.
+    least = np.maximum(2.0 * moved, np.maximum(ZERO_RATE * np.abs(own).max(), EPS * EPS * np.abs(matrix).max()))
     if len(matrix) > exact.MAX_ROWS:
         rounding = eigen.eigen(matrix).tolerance(0.0).max()
         return own, np.maximum(least, np.minimum(rounding, eigen.REFINE_ABOVE * np.abs(own).max()))
