@@ -403,7 +403,7 @@ def _warn(run: Run, before: Whole | None, start: tuple[Array, Array] | None) -> 
         pair = run.collision(first, step)
         if pair.distance < np.inf:
             met = f"; bodies {pair.bodies[0]} and {pair.bodies[1]} were {pair.distance:.3g} apart before it"
-    if start is not None and step == run.start_step + 1:
+    if start is not None and step == run.start_step + 1 and not met:
         from ._stops import of_the_start  # only such runs need it
 
         t = run.t0 + run.start_step * run.dt
