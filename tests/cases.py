@@ -13,6 +13,9 @@ import numpy as np
 import own_systems as own
 import pytest
 import stepwell as sw
+from stepwell._core import Tape
+from stepwell.reference.series import expanded
+from stepwell.reference.traced import Tracer
 
 Make = Callable[[np.random.Generator, int], sw.System]
 
@@ -359,3 +362,12 @@ def assert_same(a: sw.Run, b: sw.Run) -> None:
     np.testing.assert_array_equal(a.first_bad_step, b.first_bad_step)
     if a.carry is not None or b.carry is not None:
         np.testing.assert_array_equal(a.carry, b.carry)
+
+
+def has_branches(system: Any) -> bool:
+    """Whether functions in the rates have branches that a series must stay on."""
+    tape = Tape()
+    tracer = Tracer(system, tape)
+    v, y, _ = tracer.state()
+    one = tape.number(1.0)
+    return bool(expanded(tracer.of_unit_step(), 2, tape.time(), (one, one), v, y)[1])

@@ -301,7 +301,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: run(linear([0.0, 1.0]), "verlet"),
         E.UnsupportedError,
-        "verlet needs a second-order system, ÿ = a(t, y); LinearSystem(2 states, 1 of them velocities, 1 inputs, 0 outputs) is",
+        "verlet needs a second-order system, ÿ = a(t, y); LinearSystem(2 states, 1 of them velocities, 1 input, 0 outputs) is",
     ),
     (
         lambda: run(sw.LinearSystem([[-1.0, -1.0], [1.0, 0.0]]), "verlet"),
@@ -373,7 +373,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (
         lambda: sw.export(sw.Chain(10**7), "rk4", "c"),
         E.UnsupportedError,
-        "at most 20000 are written out; export a smaller system",
+        "at most 400000 are written; export a smaller system",
     ),
     (
         lambda: run(y=np.ones(1000), steps=10**12, every=1),

@@ -790,7 +790,7 @@ def test_every_bit_of_long_steps(language: str, tmp_path: Path) -> None:
     """Springs, chains, particles that meet surfaces and bodies, with more operations than are written one by one."""
     rng = np.random.default_rng(3)
     springs, at = net(20)
-    floors = [sw.Floor(0.1, friction=0.3), sw.Sphere((0.0, 0.5), 0.4)]
+    floors = [sw.Floor(restitution=0.1, friction=0.3), sw.Sphere((0.0, 0.5), 0.4)]
     particles, places = sw.Particles(np.ones(150), floor=floors), rng.normal(size=(150, 2))
     bodies, apart = sw.NBody(np.ones(60), force="newton", softening=0.1), rng.normal(size=(60, 2))
     every = [

@@ -25,9 +25,9 @@ FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
 CHANGED, CHANGED_OF_TERMS = 0.5, 0.25
 #: The part of a number by which it is changed to find a derivative: a third of its digits, for a central difference.
 PART = 2.0**-17
-#: Changes of an invariant by v and by y cancel but for this share: differences are right to PART², some 1e-10, and to roundings
-#: of the invariant over its change, some 2⁻⁵²/PART or 3e-11.
-CONSTANT = 1e-6
+#: Changes of an invariant by v and by y cancel but for this share. Differences are right to the square of the part by which an angle
+#: changes, 1e-5 where a state has some hundred turns a unit of time; damping and drives leave more than a thousandth.
+CONSTANT = 1e-4
 #: Numbers of a state for whom a gradient is found by differences.
 MOST_IN_GRADIENT = 64
 #: So many places between the ends of a motion are looked at for a barrier, and so many between two of them, again and again.
@@ -62,14 +62,14 @@ def told(run: Run, start: State | None) -> str | None:
     made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
     if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
         return None
-    if paces is None and run.method.limit == 0.0:
-        return None
+    if paces is None and (run.method.limit == 0.0 or not isinstance(system, (Pendulum, OwnSystem))):
+        return None  # other systems have no barrier
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
         for name in names:
-            if isinstance(system, OwnSystem) and not _is_constant(run, name):
-                continue  # it was declared to be recorded, as the energy of what is damped or driven
-            if (text := _of_one(run, name, start)) is not None:
+            text = _of_one(run, name, start, made)
+            # An invariant may have been declared to be recorded, as the energy of what is damped or driven.
+            if text is not None and (not isinstance(system, OwnSystem) or _is_constant(run, name)):
                 return text
     return None
 
@@ -93,15 +93,21 @@ def _is_constant(run: Run, name: str) -> bool:
     return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
 
 
-def _of_one(run: Run, name: str, start: State) -> str | None:
+def _of_one(run: Run, name: str, start: State, made: int) -> str | None:
     """What is to be said of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
     system = run.system
-    if isinstance(system, Pendulum) or system.v_shape != () or system.y_shape != ():
+    # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
+    few = run.status.size * PLACES <= MOST_NUMBERS // 10
+    places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, made // 100)
+    is_line = isinstance(system, OwnSystem) and system.v_shape == () and system.y_shape == ()
+    if not is_line or places < FINER:
+        if not isinstance(system, Pendulum) and run.paces is None:
+            return None
         first, last = _values(system, name, _ends(run, start))
         if isinstance(system, Pendulum) and (text := _of_a_barrier(run, name, first, _upright(run, start))) is not None:
             return text
     else:
-        first, last, barrier = _searched(run, name, start)
+        first, last, barrier = _searched(run, name, start, places)
         if (text := _of_a_barrier(run, name, first, barrier)) is not None:
             return text
     return None if run.paces is None else _of_a_change(run, name, start, (first, last))
@@ -204,13 +210,12 @@ def _upright(run: Run, start: State) -> Barrier:
     return Barrier(place, np.where((least < place) & (place < most), 2.0 * run.system.omega * run.system.omega, -np.inf))
 
 
-def _searched(run: Run, name: str, start: State) -> tuple[Array, Array, Barrier]:
+def _searched(run: Run, name: str, start: State, places: int) -> tuple[Array, Array, Barrier]:
     """An invariant at the start and at the end, and its barrier: the highest of many places, and of more and more around it.
 
     It is higher than what is beside it, since a motion may err beyond where it turns; and rest takes the least energy there.
     """
     system, (least, most), ends = run.system, _range(run, start), _ends(run, start)
-    places = max(FINER, min(PLACES, MOST_NUMBERS // max(1, least.size)))
     y = _between(least, most, places)
     first, last, *_ = values = _values(system, name, (np.concatenate([ends[0], 0.0 * y]), np.concatenate([ends[1], y])))
     height = np.where(np.isfinite(values[2:]), values[2:], -np.inf)

@@ -37,10 +37,10 @@ ONSET = 1.0 / (1 << 40)
 #: have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 #: that follows.
 PUSHED = 1.0 / 64.0
-#: An estimate that is smaller than this, relative to the change in the step, is only rounding: all stages saw the same rates, as
-#: at rest. The next step is then no longer than QUIET times the time since the start, or than this one; so what begins later is
-#: not stepped over, unless it lasts for less than that.
-UNSEEN, QUIET = 1.0 / (1 << 46), 1.0 / 32.0
+#: A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next is then no longer
+#: than QUIET times the time since the start, or than this one; so what begins later is not stepped over, unless it lasts for less
+#: than that.
+QUIET = 1.0 / 32.0
 #: The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size. Where rates are smooth, that
 #: is a constant of the motion and not of the step: 5 to 20 in nine of ten steps of eight motions at tolerances of 1e-3 to 1e-12.
 SMOOTH = 32.0
@@ -206,7 +206,7 @@ class Jumps(NamedTuple):
         """How many jumps are at or before t."""
         if self.before.ndim == 1:
             return np.searchsorted(self.before, t, side="right")
-        return np.sum(self.before <= t, axis=0)
+        return np.count_nonzero(self.before <= t, axis=0)
 
     def wall(self, t: Any) -> Any:
         """The next time at which a step from t must end, infinite if there is none."""
@@ -446,15 +446,16 @@ def attempt(
     # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅
     # may be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
     if coarse := getattr(pair, "COARSE", None):
-        other = over(sizes(*tableau.combined(coarse, increments), block_axes, groups), bound) / r
-        smooth = less(other * other * (other * (r * pace.relative)), SMOOTH * SMOOTH)
+        second = sizes(*tableau.combined(coarse, increments), block_axes, groups)
+        other = over(second, bound) / r
+        smooth = less(other * other * over(second, longer(pace.longest, new)), SMOOTH * SMOOTH)
         r = where(less(0.0, r) & smooth, r / np.sqrt(1.0 + 0.01 * (other * other)), r)
     # Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
     r = where(less(total(new) + total(error), np.inf), r, np.inf)
     for row in acceptance.positive:
         r = where(less(component(v1, y1, block_axes, row), 0.0), longer(r, OUTSIDE), r)
-    unseen = reduce(operator.and_, at_most(error, UNSEEN * absolute(new - old)))
-    following, goes_on = decided(pace, order > LOW, r, unseen, least, outlook)
+    rests = at_most(total(error) + total(absolute(new - old)), 0.0)
+    following, goes_on = decided(pace, order > LOW, r, rests, least, outlook)
     v1, y1, work = system.project(v1, y1)
     done = work if system.push is None else s.work / step
     if done is not None:
@@ -462,10 +463,10 @@ def attempt(
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
-def decided(pace: Pace, high: bool, r: Any, unseen: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:
+def decided(pace: Pace, high: bool, r: Any, rests: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:
     """The pace after an attempt with this error, and whether the state advances; ``new`` are the sizes that it would have.
 
-    ``unseen`` is whether the estimate is only rounding.
+    ``rests`` is whether nothing moved.
     """
     step, is_extra, ends, runs = outlook
     good = at_most(r, 1.0)  # NaN is not
@@ -488,7 +489,7 @@ def decided(pace: Pace, high: bool, r: Any, unseen: Any, new: Any, outlook: Outl
     t = where(takes, reached, pace.t)
     grown = where(takes & ends, pace.h, step * factor)
     quiet = longer(step, QUIET * (reached - pace.begin))
-    grown = pace.shortened(where(takes & unseen & less(quiet, grown), quiet, grown), t)
+    grown = pace.shortened(where(takes & rests & less(quiet, grown), quiet, grown), t)
     following = pace._replace(
         t=t,
         h=where(decides, grown, pace.h),
@@ -581,6 +582,8 @@ def component(v: Array, y: Array, block_axes: tuple[int, int], place: int) -> An
 def rows_of(block: Array, axes: int) -> list[Any]:
     """The numbers of a block, each of all members."""
     block = np.asarray(block)
+    if block.dtype == object and block.size and not hasattr(block.flat[0], "and_bits"):  # as a series has them
+        block = block.astype(np.float64)
     return list(block.reshape((-1, *block.shape[axes:])))
 
 

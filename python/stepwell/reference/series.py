@@ -409,10 +409,13 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     for k in range(order):
         book.advance(k)
         by = None if k == 0 and _is(unit, 1.0) else unit * (1.0 / (k + 1))
+        by_each = len(seeds) * [by]
+        if np.ndim(by):
+            by_each = [each for block in blocks for each in np.broadcast_to(by, block.shape).flat]
         terms = []
-        for seed, rate in zip(seeds, found, strict=True):
+        for seed, rate, factor in zip(seeds, found, by_each, strict=True):
             known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
-            terms.append(known if known is None or by is None else by * known)
+            terms.append(known if known is None or factor is None else factor * known)
             seed.terms.append(terms[-1])
         for time, length in clocks:
             time.terms.append(length if k == 0 else None)

@@ -151,9 +151,9 @@ def reach(
     motion = longer(longer(moved, over(second, bound)), over(lost, bound))
     falls = logarithm(longer(one, other)) - logarithm(motion)
     by_radius = falls * (-1.0 / (order - 2)) + (math.log2(SHARE) - math.log2(order - 1) / (order - 2))
-    # A motion that is lost in rounding has no radius: it goes on as before.
+    # A motion that is lost in rounding has no radius: it goes on as before. What is at rest has none either, and may wait longer.
     is_lost = functools.reduce(operator.and_, at_most(first, lost), less(by_radius, 0.0))
-    by_radius = where(is_lost, 0.0, by_radius)
+    by_radius = where(at_most(total(first), 0.0), by_error, where(is_lost, 0.0, by_radius))
     far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error)) * unit
     limited = where(less(1.0, pace.most), pace.most, 1.0)
     most = where(less(pace.most, MAX_FACTOR), limited, MAX_GROWTH) * pace.before

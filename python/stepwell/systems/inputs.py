@@ -149,9 +149,9 @@ class Sampled(Fixed, Value):
         before = np.floor((times[0] - first) / dt)
         ends = first + dt * (before + np.arange(np.ceil((times[-1] - times[0]) / dt) + 2.0))
         off = self.values - self.values[0]  # so that less cancels
-        until = np.concatenate([np.zeros((1, *self.batch)), np.cumsum(off, axis=0)]) * self.interval
+        until = np.concatenate([np.zeros((1, *off.shape[1:])), np.cumsum(off, axis=0)]) * self.interval
         at = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, None)
-        since = np.maximum(ends - times[at], 0.0).reshape(-1, *(1,) * len(self.batch))
+        since = np.maximum(ends - times[at], 0.0).reshape(-1, *(1,) * (off.ndim - 1))
         means = np.diff(until[at] + off[at] * since, axis=0) / dt + self.values[0]
         return Sampled(np.concatenate([means, self.values[-1:]]), dt, float(ends[0]))
 

@@ -38,9 +38,8 @@ const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 /// That part. A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of such a length: so it must
 /// be long beside the roundings of time, and short beside the motion that follows.
 const PUSHED: f64 = 1.0 / 64.0;
-/// An estimate that is smaller than this, relative to the change in the step, is only rounding: all stages saw the same rates, as at rest.
-/// The next step is then no longer than QUIET times the time since the start, or than this one.
-const UNSEEN: f64 = 1.0 / (1u64 << 46) as f64;
+/// A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next step is then no longer than
+/// QUIET times the time since the start, or than this one.
 const QUIET: f64 = 1.0 / 32.0;
 /// The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size: a constant of smooth motions.
 const SMOOTH: f64 = 32.0;
@@ -466,7 +465,8 @@ pub fn judge<N: Number>(
     if let Some(coarse) = made.errors.get(1) {
         let other = over(coarse, &bound) / r;
         // Where rates jump, the finer estimate may be next to nothing by chance: it is corrected only where both are as of smooth rates.
-        let smooth = (other * other * (other * (r * pace.relative))).below(N::of(SMOOTH * SMOOTH));
+        let size: Vec<N> = scales.longest.iter().zip(&made.new).map(|(so_far, new)| longer(*so_far, *new)).collect();
+        let smooth = (other * other * over(coarse, &size)).below(N::of(SMOOTH * SMOOTH));
         r = N::choose(zero.below(r) & smooth, r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
     }
     // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
@@ -475,10 +475,10 @@ pub fn judge<N: Number>(
     for number in &made.positive {
         r = N::choose(number.below(zero), longer(r, N::of(OUTSIDE)), r);
     }
-    let changes = made.new.iter().zip(&made.old).map(|(new, old)| N::of(UNSEEN) * absolute(*new - *old));
-    let rounding = made.errors.first().into_iter().flatten().zip(changes).map(|(error, change)| error.at_most(change));
-    let unseen = rounding.reduce(|all, one| all & one).unwrap_or_else(|| zero.at_most(zero));
-    pace.decided(order > LOW, (r, unseen), (&scales.longest, &least), outlook)
+    let changes: Vec<N> = made.new.iter().zip(&made.old).map(|(new, old)| absolute(*new - *old)).collect();
+    let moved = made.errors.first().map_or(total(&changes), |error| total(error) + total(&changes));
+    let rests = moved.at_most(zero);
+    pace.decided(order > LOW, (r, rests), (&scales.longest, &least), outlook)
 }
 
 /// The largest error of a group over what is tolerated. A group that is zero, as it has always been, tolerates no error and has none.
@@ -548,11 +548,11 @@ impl<N: Number> Pace<N> {
     }
 
     /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate is of a
-    /// high order; `unseen`: it is only rounding; `longest` and `new` are the largest sizes before, and those that the groups would have.
+    /// high order; `rests`: nothing moved; `longest` and `new` are the largest sizes before, and those that the groups would have.
     fn decided(
         &self,
         high: bool,
-        (r, unseen): (N, N::Truth),
+        (r, rests): (N, N::Truth),
         (longest, new): (&[N], &[N]),
         outlook: Outlook<N>,
     ) -> (Pace<N>, Vec<N>, N::Truth) {
@@ -579,7 +579,7 @@ impl<N: Number> Pace<N> {
         let t = N::choose(takes, reached, self.t);
         let grown = N::choose(takes & ends, self.h, step * factor);
         let quiet = longer(step, number(QUIET) * (reached - self.begin));
-        let grown = self.shortened(N::choose(takes & unseen & quiet.below(grown), quiet, grown), t);
+        let grown = self.shortened(N::choose(takes & rests & quiet.below(grown), quiet, grown), t);
         let next = Pace {
             t,
             h: N::choose(decides, grown, self.h),

@@ -147,10 +147,10 @@ fn reach<N: Number>(
     let motion = longer(longer(moved, over(&second, &bound)), over(&lost, &bound));
     let falls = logarithm(longer(one, other)) - logarithm(motion);
     let by_radius = falls * number(-1.0 / (p - 2.0)) + number(SHARE.log2() - (p - 1.0).log2() / (p - 2.0));
-    // A motion that is lost in rounding has no radius: it goes on as before.
+    // A motion that is lost in rounding has no radius: it goes on as before. What is at rest has none either, and may wait longer.
     let is_lost = first.iter().zip(&lost).map(|(rate, lost)| rate.at_most(*lost));
     let is_lost = is_lost.fold(by_radius.below(zero), |all, each| all & each);
-    let by_radius = N::choose(is_lost, zero, by_radius);
+    let by_radius = N::choose(total(&first).at_most(zero), by_error, N::choose(is_lost, zero, by_radius));
     let far = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error)) * unit;
     let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
     let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * pace.before;
