@@ -212,7 +212,7 @@ def test_outputs_are_their_formula() -> None:
 def test_outputs_without_inputs_and_with_zero_ones() -> None:
     C = [[1.0, 2.0], [0.0, 1.0]]
     bare = sw.LinearSystem(-np.eye(2), None, C)
-    idle = sw.LinearSystem(-np.eye(2), np.ones((2, 2)), C, np.ones((2, 2)), x=[None, 0.0])
+    idle = sw.LinearSystem(-np.eye(2), np.ones((2, 2)), C, np.ones((2, 2)), x=[None, 0.0], velocities=1)
     for system in (bare, idle):
         run = sw.integrate(system, "rk4", v=1.0, y=2.0, dt=0.1, steps=2, every=1)
         np.testing.assert_array_equal(run.z, np.stack([run.v[:, 0] + 2 * run.y[:, 0], run.y[:, 0]], axis=1))

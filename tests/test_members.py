@@ -74,7 +74,7 @@ def test_a_stop_at_an_event_cannot_be_resumed_and_says_how_many() -> None:
     given: dict[str, Any] = {"v": 0.0, "dt": 0.1, "steps": 100, "events": floor}
     one = sw.integrate(sw.Oscillator(), "rk4", y=1.0, **given)
     with pytest.raises(
-        sw.StepwellError, match=r"^resume: the run stopped at an event, at a time of its own; begin a new run: v="
+        sw.StepwellError, match=r"^resume: the run stopped at an event, at a time of its own; begin a new run from there: v="
     ):
         _ = one.resume
     two = sw.integrate(sw.Oscillator([1.0, 2.0]), "rk4", y=1.0, **given)

@@ -93,7 +93,8 @@ def _eigenvalues(
         if system.linear
         else maps.jacobian(system, method, np.asarray(dt), t, *start)
     )
-    rate, step = (member(np.broadcast_to(each, (n, n, *batch)), index) for each in (rates, step))
+    aligned = (each.reshape(n, n, *(len(batch) + 2 - each.ndim) * (1,), *each.shape[2:]) for each in (rates, step))
+    rate, step = (member(np.broadcast_to(each, (n, n, *batch)), index) for each in aligned)
     return float(np.abs(eigen.eigenvalues(step)).max()), float(eigen.eigenvalues(rate).real.max())
 
 

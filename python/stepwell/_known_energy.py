@@ -25,9 +25,9 @@ FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
 CHANGED, CHANGED_OF_TERMS = 0.5, 0.25
 #: The part of a number by which it is changed to find a derivative: a third of its digits, for a central difference.
 PART = 2.0**-17
-#: Changes of an invariant by v and by y cancel but for this share. Differences are right to the square of the part by which an angle
-#: changes, 1e-5 where a state has some hundred turns a unit of time; damping and drives leave more than a thousandth.
-CONSTANT = 1e-4
+#: Changes of an invariant by v and by y cancel but for this share. Differences are right to the square of the part by which an
+#: angle changes, 1e-5 where a state has some hundred turns a unit of time; damping and drives leave more than a thousandth.
+CONSTANT = 1e-3
 #: Numbers of a state for whom a gradient is found by differences.
 MOST_IN_GRADIENT = 64
 #: So many places between the ends of a motion are looked at for a barrier, and so many between two of them, again and again.

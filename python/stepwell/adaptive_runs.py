@@ -250,7 +250,7 @@ def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
         return
     word = "descend" if sign < 0.0 else "ascend"
     start = sign * np.asarray(since)
-    at = f"{start.item():g}" if start.size == 1 else f"{start.min():g} to {start.max():g}"
+    at = f"{start.flat[0]:g}" if start.min() == start.max() else f"{start.min():g} to {start.max():g}"
     begin = f"the last time of the run that goes on, {at}, on" if goes_on else f"t0 = {at} on"
     shown = (sign * times).reshape(len(times), -1)[:5, 0].tolist()
     raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown}{'…' * (len(times) > 5)}")
@@ -389,7 +389,13 @@ def _tolerances(tolerance: Any, system: System, acceptance: Acceptance, batch: S
         raise ShapeError(f"tolerance: expected a number or a pair (relative, absolute), got {len(parts)} of them")
     relative = _checks.numbers("tolerance", parts[0], positive=True)
     absolute = None if len(parts) == 1 else _checks.not_negative("tolerance", parts[1])
+    axes = len(system.y_shape)
+    of_members = [
+        part.ndim > axes and part.shape[:axes] == axes * (1,) and axes > 0 for part in (relative, absolute) if part is not None
+    ]
     each = [relative] if absolute is None else [relative, absolute]
+    each = [part.reshape(part.shape[axes:]) if one else part for part, one in zip(each, of_members, strict=True)]
+    relative, absolute = each[0], each[1] if len(each) > 1 else None
     of_components = [_is_of_components(part, system, batch) for part in each]
     if not any(of_components):
         return engine.Tolerances(relative, absolute)
@@ -401,6 +407,8 @@ def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
     """Whether a tolerance is one for each component of y, shape (*block, …), and not one for each member."""
     axes = len(system.y_shape)
     fits = bool(axes) and part.ndim >= axes and part.shape[:axes] == system.y_shape
+    if fits and not system.groups and part.ndim <= len(batch):
+        return False  # the components of its blocks count together, so it is meant for members
     if fits and part.ndim <= len(batch) and part.shape == batch[len(batch) - part.ndim :]:
         raise ShapeError(
             f"tolerance: an array of shape {part.shape} may be meant for each component of y or for each member; give it the "

@@ -155,7 +155,8 @@ def paces(
         if (jumps := jumps_of(plan, pacing)) is not None:
             t0 = jumps.begun(t0)
         if step is None:
-            later = np.where(pacing.at > plan.t0, pacing.at - plan.t0, np.inf).min(axis=0)
+            at = pacing.at.reshape(len(pacing.at), *(pacing.at.shape[1:] or np.ndim(plan.t0) * (1,)))
+            later = np.where(at > plan.t0, at - plan.t0, np.inf).min(axis=0)
             step = -np.where(later < np.inf, BLIND * later, BLIND)
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
     h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
