@@ -60,7 +60,7 @@ def names() -> str:
 
 
 def asks() -> str:
-    """What each method asks of a system, when it looks at it, and what it carries."""
+    """What each method asks of a system, when it checks it, and what it carries."""
     head = "name", "asks for", "rates at (of a step)", "carries", "starts"
     return table(
         head,

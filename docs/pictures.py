@@ -1,6 +1,6 @@
 """Draws the pictures of README.md and of the pages in docs anew into docs/images. Takes some minutes.
 
-Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and look at what it drew.
+Run ``.venv/bin/python docs/pictures.py`` after a change to a chart or a method, and check what it drew.
 """
 
 from __future__ import annotations

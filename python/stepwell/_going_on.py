@@ -6,7 +6,6 @@ begins anew at the saved state.
 
 from __future__ import annotations
 
-import hashlib
 from math import prod
 from string import hexdigits
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from . import _checks, engine
 from ._checks import Array, Shape
 from .errors import ArgumentError
 from .systems import System
-from .systems.own import OwnSystem
 
 if TYPE_CHECKING:
     from .result import Run
@@ -29,6 +27,8 @@ LENGTH = 64
 
 def identity(system: System, batch: Shape, v: Array, y: Array) -> str:
     """By what a system, with its control, and a state of a batch are known: equal only if all of their bits are."""
+    import hashlib  # only runs that go on need it
+
     found = hashlib.sha256(f"{system.kernel} {batch}".encode())
     for name, value in system.parameters(batch):
         found.update(f" {name} ".encode())
@@ -51,8 +51,8 @@ def _bits(rows: Array) -> bytes:
 def _word(system: System, value: Any) -> bytes:
     if isinstance(value, (str, int, float, bytes)):
         return repr(value).encode()
-    assert isinstance(system, OwnSystem)  # whose function is a list of operations
-    return system.digest.encode()
+    digest: str = system.digest  # type: ignore[attr-defined]  # of an own system, whose function is a list of operations
+    return digest.encode()
 
 
 def a_digest(carried_for: Any) -> str:

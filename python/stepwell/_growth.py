@@ -25,9 +25,9 @@ BY_STEPS, BY_MOTION = 0.5, 0.25
 MOST_NUMBERS = 1_000_000
 
 #: Of systems of up to so many numbers a state the limit is told, too.
-FEW = 8
+SMALL_SYSTEM = 8
 
-#: A world looks at its state after so many calls of ``step``, then after twice as many more, and so on up to the last number:
+#: A world checks its state after so many calls of ``step``, then after twice as many more, and so on up to the last number:
 #: what grows by a thousandth a step has grown a million times by then.
 FIRST_LOOK, LAST_LOOK = 8, 16_384
 
@@ -103,7 +103,7 @@ def _limit(system: System, method: Method, dt: float, t: float, start: tuple[Arr
     from .stability import maps
     from .stability.limit import limit_of
 
-    if sum(maps.size(system)) > FEW or index:
+    if sum(maps.size(system)) > SMALL_SYSTEM or index:
         return "use a shorter step; stability_limit says how short"
     v, y = (None, None) if system.linear else start
     limit = limit_of(system, method, v, y, t).stable
@@ -139,7 +139,7 @@ def warn_of(run: Any, start: tuple[Array, Array] | None) -> None:
 
 
 def watched(loop: Any, system: System, method: Method, dt: float, v: Array, y: Array) -> Callable[..., None]:
-    """The ``step`` of a world's loop, which looks at the state from time to time, and warns once of growth by steps alone."""
+    """The ``step`` of a world's loop, which checks the state from time to time, and warns once of growth by steps alone."""
     make: Callable[..., None] = loop.step
     if v.size + y.size > MOST_NUMBERS:
         return make
@@ -148,7 +148,7 @@ def watched(loop: Any, system: System, method: Method, dt: float, v: Array, y: A
     left = every = FIRST_LOOK
 
     def look() -> int:
-        """How many calls there are until the next look; below zero if there is none."""
+        """How many calls there are until the next check; below zero if there is none."""
         nonlocal every
         after = lengths(system, *(np.asarray(block, dtype=np.float64) for block in (v, y)))
         if np.any(after > GROWN * before):

@@ -11,7 +11,6 @@ from . import _checks, engine
 from ._brief import counted, first_of, share
 from ._checks import Array, Shape
 from .errors import ToleranceWarning
-from .reference.adaptive import OUTSIDE
 from .result import Run, Status
 from .systems import System
 
@@ -83,6 +82,8 @@ def _of_rates(run: Run, index: Shape, status: Status) -> str:
     where = "at the start" if float(run.paces.t[index]) == _start(run, index) else "there"
     if wrong := _not_finite(rates, index):
         return f": {wrong} {where}"
+    from .reference.adaptive import OUTSIDE  # which imports much
+
     if run.stand.pace[engine.ERROR][index] == OUTSIDE:
         return "; every step leads a component below zero that positive= keeps from there"
     if status == Status.NOT_FINITE:

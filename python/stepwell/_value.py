@@ -118,7 +118,7 @@ class Fixed(metaclass=Maker):
     """An object that cannot be changed, since what was made of it would not see the change.
 
     Attributes cannot be assigned, except those that begin with ``_``. Its arrays are read-only, and copies of what it was given:
-    whoever gave them may go on to write into theirs. ``changed`` makes another object.
+    the caller may go on to write into theirs. ``changed`` makes another object.
     """
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -180,7 +180,7 @@ def aligned(attributes: dict[str, Any]) -> None:
 
 
 def read_only(attributes: dict[str, Any]) -> None:
-    """Replace arrays by read-only ones that nobody else can write to, and dictionaries of them by some that cannot be changed."""
+    """Replace arrays by read-only ones that no other code can write to, and dictionaries of them by some that cannot be changed."""
     for name, value in attributes.items():
         if isinstance(value, np.ndarray):
             attributes[name] = frozen(name, value)
@@ -189,7 +189,7 @@ def read_only(attributes: dict[str, Any]) -> None:
 
 
 def frozen(name: str, array: Any) -> Any:
-    """An array that nobody else can write to: itself if it is read-only and owns its numbers, or else a read-only copy.
+    """An array that no other code can write to: itself if it is read-only and owns its numbers, or else a read-only copy.
 
     A view that is read-only does not suffice: what it views may still be written to.
     """

@@ -1,6 +1,6 @@
 """What a step computes only if something holds, such as a contact: values that only one side of a choice reads.
 
-A tape has no branches: it computes both sides of a choice and takes one. In a file the dear side stands in an ``if``. A choice by
+A tape has no branches: it computes both sides of a choice and takes one. In a file the expensive side stands in an ``if``. A choice by
 ``p and q`` is one by q within one by p, so that q is computed where p holds. What is computed has the same bits, and what is not
 computed was not taken.
 """
@@ -65,7 +65,7 @@ class Branched:
         order: the numbers of those that are needed, each after its operands.
         nodes: the operations, by their numbers; those that were split off choices have numbers of their own.
         items: values and branches in the order in which they are computed.
-        dear: of each choice that a branch makes, whether its sides are computed within it.
+        expensive: of each choice that a branch makes, whether its sides are computed within it.
         same: of a choice within another one the outer one, of which it is a side: one variable serves both.
     """
 
@@ -75,14 +75,14 @@ class Branched:
         self.nodes: dict[int, Node] = {}
         self.order: list[int] = []
         self._paths: dict[int, Path] = {}
-        self._joint: set[int] = set()  # choices with two dear sides, by one condition even if it is made of several
+        self._joint: set[int] = set()  # choices with two expensive sides, by one condition even if it is made of several
         self._cheap: set[Path] = set()  # sides that are computed always
         self._kinds: dict[int, str] = {}
         self._take()
         self._split()
         self._simplify()
         self._split()
-        self.dear = {line: dear for line in self.order if any(dear := self._are_dear(line))}
+        self.expensive = {line: expensive for line in self.order if any(expensive := self._are_dear(line))}
         self.same: dict[int, int] = {}
         #: What is there without an operation; it is read where it is needed.
         self._done = self._leaves | {line for line in self.order if not self.nodes[line].of}
@@ -94,7 +94,7 @@ class Branched:
     def is_straight(self) -> bool:
         """Whether there is no branch that can be written."""
         kept = [each for branch in branches(self.items) for each in branch.keeps]
-        return not self.dear or any(self.kind(each) == "bits" for each in kept)
+        return not self.expensive or any(self.kind(each) == "bits" for each in kept)
 
     def kind(self, line: int) -> str:
         """Of a value: "truth", "bits" or "number"; "any" of a constant that may be each."""
@@ -206,9 +206,9 @@ class Branched:
             self._find_dear_paths()
             order: list[int] = []
             for line in self.order:
-                dear = self._are_dear(line)
-                if any(dear) and not (self.nodes[line].name == "choose" and len(self._side(line, dear[0])) == 1):
-                    order += self._in_parts(line, dear[0])
+                expensive = self._are_dear(line)
+                if any(expensive) and not (self.nodes[line].name == "choose" and len(self._side(line, expensive[0])) == 1):
+                    order += self._in_parts(line, expensive[0])
                 order.append(line)
             if order == self.order:
                 return
@@ -261,10 +261,14 @@ class Branched:
         for line in self.order:
             for of in self.nodes[line].of:
                 readers[of].add(line)
-        for line, dear in self.dear.items():
-            for inner, other, is_dear in zip(self.nodes[line].of[1:], self.nodes[line].of[:0:-1], dear, strict=True):
-                if is_dear and not all(dear) and inner in self.dear and readers[inner] == {line}:
-                    own = [of for of, is_dear in zip(self.nodes[inner].of[1:], self.dear[inner], strict=True) if not is_dear]
+        for line, expensive in self.expensive.items():
+            for inner, other, is_expensive in zip(self.nodes[line].of[1:], self.nodes[line].of[:0:-1], expensive, strict=True):
+                if is_expensive and not all(expensive) and inner in self.expensive and readers[inner] == {line}:
+                    own = [
+                        of
+                        for of, is_expensive in zip(self.nodes[inner].of[1:], self.expensive[inner], strict=True)
+                        if not is_expensive
+                    ]
                     if own == [other]:
                         self.same[inner] = line
 
@@ -277,16 +281,16 @@ class Branched:
         for line in here:
             if line in self._done:
                 continue
-            if line not in self.dear:
+            if line not in self.expensive:
                 items.append(line)
                 self._done.add(line)
                 continue
             condition = self.nodes[line].of[0]
             group = [line]
             for other in here[here.index(line) + 1 :]:
-                if other in self.dear and other not in self._done and self.nodes[other].of[0] == condition:
+                if other in self.expensive and other not in self._done and self.nodes[other].of[0] == condition:
                     ahead = self._ahead(other)
-                    if not any(each in self.dear for each in ahead):
+                    if not any(each in self.expensive for each in ahead):
                         items += ahead
                         self._done.update(ahead)
                         group.append(other)
@@ -310,7 +314,7 @@ class Branched:
     def _of_side(self, path: Path, condition: int, side: bool, group: Sequence[int]) -> list[Item]:
         inner = (*path, (condition, side))
         found: set[int] = set()
-        waiting = [self.nodes[line].of[2 - side] for line in group if self.dear[line][not side]]
+        waiting = [self.nodes[line].of[2 - side] for line in group if self.expensive[line][not side]]
         while waiting:
             each = waiting.pop()
             if each not in self._done and each not in found and self._paths[each][: len(inner)] == inner:

@@ -110,14 +110,14 @@ class Statements:
                 continue
             name, kind = self._name(line), self._branched.kind(line)
             self._variables.add(name)
-            dear, sides = self._branched.dear[line], self._branched.nodes[line].of[1:]
-            if all(dear) and name not in self._declared:
+            expensive, sides = self._branched.expensive[line], self._branched.nodes[line].of[1:]
+            if all(expensive) and name not in self._declared:
                 word = self._variable(line).text.text
                 out.append(Assignment(word, kind, "", role=self._role(name)))
             copies += [
                 Copy(name, kind, value, line, truth)
-                for is_dear, value, truth in zip(dear, sides, (True, False), strict=True)
-                if not all(dear) and not is_dear
+                for is_expensive, value, truth in zip(expensive, sides, (True, False), strict=True)
+                if not all(expensive) and not is_expensive
             ]
         for line in branch.keeps:
             if self._name(line) not in self._variables:
@@ -132,7 +132,7 @@ class Statements:
             for line in branch.sets:
                 value = self._branched.nodes[line].of[1:][side]
                 is_set = value is not None and self._branched.same.get(value) == line
-                if self._branched.dear[line][side] and not is_set:
+                if self._branched.expensive[line][side] and not is_set:
                     copies.append(Copy(self._name(line), self._branched.kind(line), value, line))
             sides.append(self._written(branch.sides[side], copies))
         for line in branch.sets:

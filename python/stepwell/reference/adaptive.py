@@ -47,7 +47,7 @@ SMOOTH = 32.0
 #: The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 OUTSIDE = 16.0
 
-#: The first step is the fraction FIRST of the time in which the state changes, at the start and in two looks ahead: rather too
+#: The first step is the fraction FIRST of the time in which the state changes, at the start and at two times ahead: rather too
 #: short than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹² roundings.
 #: After a jump it is MIN_FACTOR times the step before.
 FIRST, MOVES = 0.01, 1.0 / (1 << 40)

@@ -27,7 +27,7 @@ MAX_DIFFERENCE = 1e-8
 #: Steps are held short, so that what acts for a moment is not stepped over: to a power of two of at most this share of the
 #: horizon, so that a horizon that is a little longer leaves the run as it is, and of the check to this part of it. A step looks
 #: at a dozen times within it, so both runs see what lasts for two steps of the reference. The two lengths are in no simple ratio,
-#: so the runs do not look at the same times: what only one of them sees is where they disagree, which ends what is known.
+#: so the runs do not check the same times: what only one of them sees is where they disagree, which ends what is known.
 LONGEST_STEP, PART_OF_CHECK = 1e-3, 1.0 / 1.618
 
 #: Times at which they are compared, and from how many of them the reference can be continued.

@@ -29,7 +29,7 @@ pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 /// always be all wrong, however short.
 pub(crate) const ONSET: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// The first step is the fraction FIRST of the time in which the state changes, at the start and in two looks ahead: rather too short
+/// The first step is the fraction FIRST of the time in which the state changes, at the start and at two times ahead: rather too short
 /// than too long, since it then grows by MAX_FACTOR a step. It is at least MOVES times the time of the start, 2¹² roundings. After a jump
 /// it is MIN_FACTOR times the step before.
 const FIRST: f64 = 0.01;
