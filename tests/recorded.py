@@ -263,6 +263,8 @@ def paced() -> Iterator[Recorded]:
             v, y = (rng.normal(size=(*shape, *_axes(members))) for shape in (made.v_shape, made.y_shape))
             return made, {"v": 0.3 * v, "y": y}
 
+        if np.ndim(tolerance) and system.startswith("linear"):  # whose components have tolerances of their own, or could have
+            tolerance = tolerance[np.newaxis]
         t0 = (0.0, 0.25)[i % 2]
         at = [t0 + t for t in ((0.0, 0.11, 0.5, 0.53), (1.0,), (0.3, 0.7, 1.1))[i % 3]]
         yield _fixed(f"{method}, {system}, tolerance, {_called(members)}", ask, method=method, tolerance=tolerance, at=at, t0=t0)

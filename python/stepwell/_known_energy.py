@@ -14,7 +14,7 @@ from .systems import Pendulum, RigidBody, System
 
 State = tuple[Array, Array]
 #: What steps own equations, by the name that the core knows.
-OWN = "equations"
+KERNEL_OF_EQUATIONS = "equations"
 Members = np.ndarray[Any, np.dtype[np.bool_]]
 
 #: It is looked at where a run made so many function evaluations, and has at most so many numbers: that is little work against it.
@@ -42,7 +42,7 @@ def keeps_energy(run: Run) -> bool:
     system: System = run.system.uncontrolled
     if run.force is not None or getattr(system, "torques_act", False) or system.contacts:
         return False
-    if system.kernel == OWN:
+    if system.kernel == KERNEL_OF_EQUATIONS:
         return True  # its energy is what was declared to be constant
     terms = [getattr(system, name, None) for name in ("damping", "drag", "friction")]
     if any(term is not None and np.any(term) for term in terms):
@@ -63,14 +63,14 @@ def told(run: Run, start: State | None) -> str | None:
     made = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
     if made < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS or not run.status.size:
         return None
-    if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == OWN)):
+    if paces is None and (run.method.limit == 0.0 or not (isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS)):
         return None  # other systems have no barrier
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
         for name in names:
             text = _of_one(run, name, start, made)
             # An invariant may have been declared to be recorded, as the energy of what is damped or driven.
-            if text is not None and (system.kernel != OWN or _is_constant(run, name)):
+            if text is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
                 return text
     return None
 
@@ -100,7 +100,7 @@ def _of_one(run: Run, name: str, start: State, made: int) -> str | None:
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
     places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, made // 100)
-    is_line = system.kernel == OWN and system.v_shape == () and system.y_shape == ()
+    is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
     if not is_line or places < FINER:
         if not isinstance(system, Pendulum) and run.paces is None:
             return None
@@ -116,7 +116,7 @@ def _of_one(run: Run, name: str, start: State, made: int) -> str | None:
 
 def _names(system: System) -> list[str]:
     """The invariants that it is known to have."""
-    if system.kernel == OWN:
+    if system.kernel == KERNEL_OF_EQUATIONS:
         return list(system.quantities)
     return ["energy"] if type(system).energy is not System.energy else []
 

@@ -180,7 +180,7 @@ def aligned(attributes: dict[str, Any]) -> None:
 
 
 def read_only(attributes: dict[str, Any]) -> None:
-    """Replace arrays by read-only ones that no other code can write to, and dictionaries of them by some that cannot be changed."""
+    """Replace arrays by read-only ones that no other code can write to, and dictionaries of them by fixed ones."""
     for name, value in attributes.items():
         if isinstance(value, np.ndarray):
             attributes[name] = frozen(name, value)

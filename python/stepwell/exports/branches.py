@@ -1,6 +1,7 @@
 """What a step computes only if something holds, such as a contact: values that only one side of a choice reads.
 
-A tape has no branches: it computes both sides of a choice and takes one. In a file the expensive side stands in an ``if``. A choice by
+A tape has no branches: it computes both sides of a choice.
+In a file the expensive side stands in an ``if``. A choice by
 ``p and q`` is one by q within one by p, so that q is computed where p holds. What is computed has the same bits, and what is not
 computed was not taken.
 """
