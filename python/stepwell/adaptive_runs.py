@@ -396,7 +396,7 @@ def _tolerances(tolerance: Any, system: System, acceptance: Acceptance, batch: S
     each = [relative] if absolute is None else [relative, absolute]
     each = [part.reshape(part.shape[axes:]) if one else part for part, one in zip(each, of_members, strict=True)]
     relative, absolute = each[0], each[1] if len(each) > 1 else None
-    of_components = [_is_of_components(part, system, batch) for part in each]
+    of_components = [not one and _is_of_components(part, system, batch) for part, one in zip(each, of_members, strict=True)]
     if not any(of_components):
         return engine.Tolerances(relative, absolute)
     of_groups = [_of_groups(part, own, system, acceptance) for part, own in zip(each, of_components, strict=True)]
