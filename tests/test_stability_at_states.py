@@ -124,7 +124,7 @@ def test_overflow_is_said() -> None:
         (
             {"system": sw.Pendulum(), "dt": [0.1, 0.2, 0.3], "at": ([0.0, 0.0], 0.0)},
             ShapeError,
-            r"broadcast.*: dt \(3,\), v \(2,\)",
+            r"broadcast.*: dt and system \(3,\), v \(2,\)",
         ),
         ({"system": sw.Pendulum([1.0, 2.0, 3.0]), "dt": 0.1, "at": (0.0, [1.0, 1.0])}, ShapeError, r"system \(3,\), y \(2,\)"),
         ({"system": sw.Pendulum(), "dt": 0.1, "at": ([0.0] * 2, [0.0] * 3)}, ShapeError, r"v \(2,\), y \(3,\)"),

@@ -539,13 +539,13 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "a history without an interval": ({"outcomes": "history"}, "every: expected how many steps are between the states"),
     "an interval of nothing": ({"outcomes": "last", "every": 3}, "every: goes with the outcome 'history' or a function"),
     "an unknown quantity": ({"outcomes": sw.sweeps.Mean("momentum")}, "of: there is no 'momentum'"),
-    "a component of a number": ({"outcomes": sw.sweeps.Mean(("y", 0))}, "of: expected a component of y, whose shape is (), got"),
+    "a component of a number": ({"outcomes": sw.sweeps.Mean(("y", 0))}, "of: a component of y of shape () is (\"y\"), got"),
     "a store without an ending": ({"store": "somewhere"}, "store: expected a path that ends in .zarr or .nc, got 'somewhere'"),
     "an engine": ({"engine": "dask"}, "engine: expected None, an executor of concurrent.futures or a client of dask.distributed"),
     "no memory": ({"memory": 100.0}, "memory: one member takes some"),
     "no steps": ({"steps": 0}, "steps: expected 1 or more"),
     "units": ({"units": {"y": 3}}, "units: expected words by name"),
-    "a dimension of a result": ({"axes": {"omega": ("y_last", [1.0, 2.0])}}, "axes: there is a dimension or coordinate 'y_last'"),
+    "a dimension of a result": ({"axes": {"omega": ("y_last", [1.0, 2.0])}}, "axes: 'y_last' is the name of a result; give the dimension another name"),
     "a method that cannot": ({"system": partial(Oscillator, damping=0.1), "method": "verlet"}, "verlet needs forces that do not"),
 }  # fmt: skip
 

@@ -114,7 +114,11 @@ def test_a_store_holds_float32_and_goes_on_with_no_other(tmp_path: Any) -> None:
         ({"tolerance": 1e-3, "at": [1.0]}, UnsupportedError, "dtype: float32 goes with fixed steps only, and tolerance="),
         ({"outcomes": "lyapunov"}, ArgumentError, "dtype: goes without Lyapunov exponents"),
         ({"axes": {"omega": [1.0, 1e39, 1.0]}}, ArgumentError, "axes: omega: expected numbers up to 3.4e38"),
-        ({"axes": {"dt": [0.1, 1e-50, 0.1]}, "dt": None}, ArgumentError, "dt: expected a number above zero in float32"),
+        (
+            {"axes": {"dt": [0.1, 1e-50, 0.1]}, "dt": None},
+            ArgumentError,
+            "dt: expected a number of size 1.4e-45 to 3.4e38 units of time in float32",
+        ),
         ({"y": 1e39}, ArgumentError, "y: expected numbers up to 3.4e38"),
         ({"method": "taylor"}, UnsupportedError, "dtype: float32 does not go with taylor"),
         ({"dtype": "float16"}, DTypeError, "dtype: expected 'float64' or 'float32', got 'float16'"),
