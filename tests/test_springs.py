@@ -435,7 +435,7 @@ def test_an_undamped_net_takes_energy_control_and_a_damped_one_does_not() -> Non
         ({"fixed": [3]}, ArgumentError, "fixed: expected particles below 3, .* got 3"),
         ({"fixed": [0, 1, 2]}, ArgumentError, "fixed: expected at least one particle that is free, got all 3"),
         ({"fixed": "0"}, DTypeError, "fixed: expected numbers of particles"),
-        ({"gravity": [0.0, 0.0, 0.0, -9.81]}, ShapeError, "gravity: expected a vector of 1 to 3 numbers"),
+        ({"gravity": [0.0, 0.0, 0.0, -9.81]}, ShapeError, "gravity: expected a number, or a vector of 1 to 3 numbers"),
         ({"dim": 4}, ArgumentError, "dim: expected 1 to 3|dim: expected"),
     ],
 )

@@ -545,7 +545,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no memory": ({"memory": 100.0}, "memory: one member takes some"),
     "no steps": ({"steps": 0}, "steps: expected 1 or more"),
     "units": ({"units": {"y": 3}}, "units: expected words by name"),
-    "a dimension of a result": ({"axes": {"omega": ("y_last", [1.0, 2.0])}}, "axes: 'y_last' is the name of a result; give the dimension another name"),
+    "a dimension of a result": ({"axes": {"omega": ("y_last", [1.0, 2.0])}}, "axes: 'y_last' is the name of a result"),
     "a method that cannot": ({"system": partial(Oscillator, damping=0.1), "method": "verlet"}, "verlet needs forces that do not"),
 }  # fmt: skip
 
