@@ -173,7 +173,7 @@ def test_a_cascade_from_zero_goes_on() -> None:
 
 def test_rows_and_blocks() -> None:
     """What is equivalent counts together: turned about, a run takes the same steps, but for roundings."""
-    for scale, turns_alike in (("row", True), ("block", True), ("component", False)):
+    for scale in ("row", "block"):
 
         @sw.system(shape=(2, 2), scale=scale)
         def two(t: Any, v: Any, y: Any) -> Any:
@@ -188,7 +188,7 @@ def test_rows_and_blocks() -> None:
             run = sw.integrate(two(), "dop853", v=v, y=y, tolerance=1e-9, at=[5.0])
             assert run.paces is not None
             steps.append(int(run.paces.accepted) + int(run.paces.rejected))
-        assert (steps[0] == steps[1]) == turns_alike, (scale, steps)
+        assert steps[0] == steps[1], (scale, steps)
 
 
 def test_tolerances_of_components() -> None:

@@ -74,7 +74,7 @@ def adaptive_run(
     control = _steppable(system, how, a_control(control), options, went)
     t0 = _checks.numbers("t0", t0, unit="units of time")
     times = _checks.numbers("at", options.at, unit="units of time").copy()  # they become those of the run
-    if times.ndim == 0 or len(times) == 0:
+    if times.ndim == 0 or times.size == 0:
         raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
     backward = _is_backward(times, t0)
     if backward and (acting := system.keeper if control is None else control) is not None and getattr(acting, "pushes", True):
