@@ -293,7 +293,6 @@ def test_what_the_tape_takes_for_an_earlier_value_keeps_its_derivative() -> None
 @pytest.mark.parametrize(
     ("what", "says"),
     [
-        (lambda tape, x: x.floor() * x, "floor"),
         (lambda tape, x: trig.sin(x), "rounds|exclusive or"),
         (lambda tape, x: (x * 0.5 + trig.MAGIC) - trig.MAGIC, "rounds"),
         (lambda tape, x: (x - 2.0**52) + 2.0**52, "rounds"),
@@ -341,3 +340,10 @@ def test_a_fused_tape_is_refused() -> None:
     fused, (root,) = tape.fused([x * y + x])
     with pytest.raises(UnsupportedError, match="fused"):
         gradient(fused, root, [fused.state(0)])
+
+
+def test_the_derivative_of_a_floor_is_zero_between_its_jumps() -> None:
+    """So that of ⌊x⌋·x is ⌊x⌋."""
+    tape = _core.Tape()
+    x = tape.state(0)
+    assert value(tape, gradient(tape, x.floor() * x, [x], {}), 2.5)[0] == 2.0
