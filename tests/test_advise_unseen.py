@@ -223,6 +223,7 @@ def pulsed(begin: float, width: float, horizon: float, v: float, y: float, push:
         pulsed(31.0, 0.4, 40.0, 0.0, 1e-2, -5.0, 0.5),
         pulsed(2.1e-6, 1.3e-7, 5e-6, 0.0, 0.0, 1e9, 3e5),
         pulsed(1.7e5, 4e3, 4e5, 1e-3, 0.0, 1e-6, 1e-4),
+        pulsed(6.457835693660228e-4, 0.011481, 0.028513966597504523, 0.0, 0.0, 859449.876, 1379.57),
     ],
 )
 def test_a_push_for_a_moment_is_not_stepped_over(scene: Scene) -> None:
@@ -431,6 +432,17 @@ def test_what_is_too_large_or_too_long_is_refused_at_once() -> None:
         sw.advise(large)
     with pytest.raises(ArgumentError, match=r"frame: expected at most 100 times the horizon of 62\.83.* got 1e\+09"):
         sw.advise("oscillator", frame=1e9)
+    for frame in (2e-5, 1e-9, 1e-300):
+        with pytest.raises(sw.errors.TooLargeError, match=r"frame: expected at most 1000000 frames in the horizon, .* units of time"):
+            sw.advise("oscillator", frame=frame)
+
+
+@pytest.mark.usefixtures("unmeasured")
+def test_what_is_good_enough_in_the_longest_steps_is_advised_however_many_frames_there_are() -> None:
+    """Runs of all methods use up what a search may spend, and what was run already is no further run."""
+    advice = sw.advise("oscillator", frame=1e-4, tolerance=1e-2, cost="evaluations", fixed=True)
+    assert advice.best is not None
+    assert advice.best.substeps == 1
 
 
 @pytest.mark.usefixtures("unmeasured")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from bisect import bisect_right
 from dataclasses import replace
 from typing import Any
 
@@ -16,9 +15,9 @@ from ..integration import integrate
 from ..result import Run
 from .base import Scene
 
-#: The method of the reference solution, its tolerance, and how many times that the run which checks it has. Where the reference
-#: stops early, larger tolerances are tried: from rest no step is short enough for a tight one to meet the onset of a force.
-METHOD, TIGHT_TOLERANCES, CHECK_RATIO = "dop853", (1e-14, 1e-12, 1e-10), 10.0
+#: The method of the reference solution, its tolerance, and that of the run which checks it. A part of it that stops early is made
+#: with so many times its tolerance: from rest no step is short enough for a tight one to meet the onset of a force.
+METHOD, TIGHT_TOLERANCE, CHECK_TOLERANCE, LOOSER = "dop853", 1e-14, 1e-13, (1e2, 1e4)
 
 #: The two agree where their difference, relative to the blocks' largest lengths, is below this: a thousandth of the least error
 #: that a chart of such a scene shows. Except for rounding, the reference is ten times as accurate as the run that checks it.
@@ -49,33 +48,57 @@ class Tight:
         part: its longest step, as a part of that of the reference.
     """
 
-    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCES[0], part: float = 1.0) -> None:
+    def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE, part: float = 1.0) -> None:
         self.scene, self.tolerance, self.part = replace(scene, control=None), tolerance, part
         longest = part * 2.0 ** math.floor(math.log2(LONGEST_STEP * scene.horizon))
-        options = scene.adaptive_options | {"max_step": min(longest, scene.max_step or math.inf)}
-        start = self._run(np.zeros(1), {"v": scene.v, "y": scene.y, "tolerance": tolerance, **options}).resume
-        #: Arguments to continue the run, each with the time from which it continues.
-        self._on: list[tuple[float, dict[str, Any]]] = [(0.0, start)]
+        self._options = scene.adaptive_options | {"max_step": min(longest, scene.max_step or math.inf)}
+        #: Places from which it goes on: the time, the state, and arguments to continue the run.
+        self._places: list[tuple[float, tuple[Array, Array], dict[str, Any]]] = []
+        self._place(0.0, (scene.v, scene.y), None)
 
     def __call__(self, t: Array) -> tuple[Array, Array]:
         """Both blocks at these times."""
         asked, place = np.unique(np.asarray(t, dtype=np.float64), return_inverse=True)
-        since = bisect_right(self._on, float(asked[0]), key=lambda on: on[0]) - 1
-        run = self._run(asked, self._on[max(0, since)][1])
-        return run.v[place.reshape(-1)], run.y[place.reshape(-1)]
+        since = np.maximum(np.searchsorted([begin for begin, _, _ in self._places], asked, side="right") - 1, 0)
+        runs = [self._part(asked[since == i], i)[0] for i in np.unique(since).tolist()]
+        v, y = (np.concatenate([getattr(run, name) for run in runs]) for name in "vy")
+        return v[place.reshape(-1)], y[place.reshape(-1)]
 
     def followed(self, times: Array) -> tuple[Array, Array]:
         """The states at these times, ascending; NaN from where it stopped. At some of them the run can be continued later."""
         runs = []
         for part in np.array_split(times, RESTARTS):
-            runs.append(run := self._run(part, self._on[-1][1]))
+            run, tight = self._part(part, -1)
+            runs.append(run)
             if run.status:
                 break
-            self._on.append((float(part[-1]), run.resume))
+            self._place(float(part[-1]), (run.v[-1], run.y[-1]), run.resume if tight else None)
         missing = len(times) - sum(len(run.t) for run in runs)
         blocks = (np.concatenate([getattr(run, name) for run in runs]) for name in "vy")
         v, y = (np.concatenate([block, np.full((missing, *block.shape[1:]), np.nan)]) for block in blocks)
         return v, y
+
+    def _place(self, time: float, state: tuple[Array, Array], on: dict[str, Any] | None) -> None:
+        """Another place from which it goes on: as the run does, or with its tolerance from the state alone."""
+        if on is None:
+            on = self._run(np.array([time]), self._fresh(time, state, self.tolerance)).resume
+        self._places.append((time, state, on))
+
+    def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:
+        """Arguments of a run that begins with this state."""
+        return {"v": state[0], "y": state[1], "t0": time, "tolerance": tolerance} | self._options
+
+    def _part(self, at: Array, i: int) -> tuple[Run, bool]:
+        """The run from a place on, to these times, and whether it has the tolerance that was asked for."""
+        time, state, on = self._places[i]
+        run = self._run(at, on)
+        if not run.status:
+            return run, True
+        for ratio in LOOSER:
+            run = self._run(at, self._fresh(time, state, ratio * self.tolerance))
+            if not run.status:
+                break
+        return run, False
 
     def _run(self, at: Array, on: dict[str, Any]) -> Run:
         with warnings.catch_warnings():
@@ -121,17 +144,11 @@ def with_truth(scene: Scene, agrees: float = MAX_DIFFERENCE) -> Scene:
             f"with adaptive steps, which do not go with {what}; give the solution as a function of times"
         )
     times = np.linspace(0.0, scene.horizon, SAMPLES + 1)
-    exact, until = None, -1.0
-    for tolerance in TIGHT_TOLERANCES:
-        tight = Tight(scene, tolerance)
-        states = tight.followed(times)
-        known = _agreeing(states, Tight(scene, CHECK_RATIO * tolerance, PART_OF_CHECK).followed(times), agrees)
-        first = len(times) if known.all() else int(np.argmin(known))
-        if (last := float(times[max(first - 1, 0)])) > until:
-            exact, until = tight, last
-        if np.isfinite(states[1][-1]).all():
-            break
-    return replace(scene, exact=exact, until=until)
+    tight = Tight(scene)
+    states = tight.followed(times)
+    known = _agreeing(states, Tight(scene, CHECK_TOLERANCE, PART_OF_CHECK).followed(times), agrees)
+    first = len(times) if known.all() else int(np.argmin(known))
+    return replace(scene, exact=tight, until=float(times[max(first - 1, 0)]))
 
 
 def _agreeing(run: tuple[Array, Array], check: tuple[Array, Array], agrees: float) -> Mask:
