@@ -251,6 +251,7 @@ def test_the_command_says_when_nothing_fits(capsys: Any) -> None:
         (["advise", "cloverr"], "did you mean 'clover'?"),
         (["advise", "clover", "--frame", "x"], "--frame: expected a time such as 0.02 or 1/60, or any, got 'x'"),
         (["advise", "clover", "--frame", "1/0"], "--frame: expected a time"),
+        (["advise", "oscillator", "--frame", "1e-12", "-o", "a.json"], "frame: expected at most 1000000 frames in the horizon"),
         (["advise", "clover", "--tolerance", "0"], "tolerance: expected numbers above zero"),
         (["advise", "clover", "--methods", "rk5"], "did you mean 'rk4'?"),
         (["advise", "clover", "-o", "a.txt"], "-o: expected a file ending in .json"),

@@ -47,6 +47,9 @@ SINGLE_WORK = 0.5
 #: The longest frame, in horizons: a run must reach its end.
 LONGEST_FRAME = 100.0
 
+#: The most frames in a horizon: the state is known at the end of each, and each takes a step or more.
+MAX_FRAMES = 1_000_000
+
 #: The most numbers of a state: with more, no useful run would be short enough to be tried.
 MAX_NUMBERS = 100_000
 
@@ -120,12 +123,15 @@ def advise(
             f"frame: expected at most {LONGEST_FRAME:g} times the horizon of {scene.horizon:g} units of time, got {frame:g}"
         )
 
-    if frame is not None and not scene.horizon < frame * _checks.LAST_STEP:
-        frames = f"{_checks.LAST_STEP:.0e} frames or fewer in the horizon of {scene.horizon:g} units of time"
-        raise ArgumentError(f"frame: expected {frames}, got a frame of {frame:g}")
+    most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
+    if frame is not None and scene.horizon / frame > (frames := min(MAX_FRAMES, int(most))):
+        raise TooLargeError(
+            f"frame: expected at most {frames} frames in the horizon, each of which takes a step or more in every run; got "
+            f"{scene.horizon / frame:.3g} of {frame:g} in {scene.horizon:g} units of time; give a longer frame, or a scene "
+            f"with a shorter horizon"
+        )
 
     known = motion_of(scene, frame, tolerance, single=dtype != "float64")
-    most = MAX_EVALUATIONS / max(1.0, (scene.v.size + scene.y.size) / 8) ** SIZE_EXPONENT
     trials = Trials(known, tolerance, LONG_RUN_SHARE * most)
     narrow = Trials(known, tolerance, LONG_RUN_SHARE * most, "float32")
     adaptive = AdaptiveTrials(known, ERROR_SHARE * tolerance, most)

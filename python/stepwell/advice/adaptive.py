@@ -1,6 +1,7 @@
 """Trial runs of a scene with adaptive steps: how wrong a method is with a tolerance, and how many steps it tries.
 
-Steps do not depend on the output times, so the error can be measured at any times without changing the run.
+Steps depend on the output times only where a state within a step shows that it missed something, so the error is measured at many
+times, and at those of the run that an advice shows.
 """
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ class AdaptiveTrials:
                 ends = np.concatenate([[0.0], marks, self.marks[-1:]])
                 around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
                 closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
-                trial = trial._replace(error=max(trial.error, float(error.max()), float(closer.max())))
+                shown, _ = self._errors(method, tolerance, self.grid.asked)
+                trial = trial._replace(error=max(trial.error, *(float(each.max()) for each in (error, closer, shown))))
             self._confirmed[key] = trial
         return self._confirmed[key]
 

@@ -28,6 +28,9 @@ LINES = 6
 #: And says of so many rejected ones of each kind why, and names the others.
 REASONS = 2
 
+#: A run of a row may try so many times its steps: they depend a little on the times at which it is asked for its state.
+MORE_STEPS = 10
+
 #: The columns of the table; those whose name ends in ``>`` are flush right.
 COLUMNS = ("method", "steps>", "dt>", "error>", "predicted>", "evaluations>", "ns>", "objects>", "blows up at dt>")
 
@@ -277,7 +280,7 @@ class Advice:
         options: dict[str, Any] = {
             "tolerance": row.tolerance,
             "at": self.asked,
-            "max_steps": row.steps + 1,
+            "max_steps": MORE_STEPS * row.steps,
         } | scene.adaptive_options
         return integrate(scene.system, row.method, v=scene.v, y=scene.y, **options)
 

@@ -203,7 +203,7 @@ class Search:
             return None
         begin = candidate.within_limit(least)
         for n in sorted({begin, *rungs(begin, 2 * begin)}):
-            if not self.affordable(candidate, n, least):
+            if n > least and not self.affordable(candidate, n, least):
                 return None
             if self.confirmed(candidate, n) and candidate.keeps_margin(n):
                 return n
