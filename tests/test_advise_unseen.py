@@ -433,7 +433,7 @@ def test_what_is_too_large_or_too_long_is_refused_at_once() -> None:
     with pytest.raises(ArgumentError, match=r"frame: expected at most 100 times the horizon of 62\.83.* got 1e\+09"):
         sw.advise("oscillator", frame=1e9)
     for frame in (2e-5, 1e-9, 1e-300):
-        with pytest.raises(sw.errors.TooLargeError, match=r"frame: expected at most 1000000 frames in the horizon, .* units of time"):
+        with pytest.raises(sw.errors.TooLargeError, match=r"frame: expected at most 1000000 frames .* units of time"):
             sw.advise("oscillator", frame=frame)
 
 

@@ -7,6 +7,7 @@ uses eigenvalues, ``result`` presents what was found.
 
 from __future__ import annotations
 
+import heapq
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,7 +27,7 @@ from .candidates import ERROR_SHARE, Adaptive, Candidate, Fixed, Single
 from .motion import SINGLE_STEP_ROUNDING, Grid, Motion, motion_of
 from .result import Advice, Rejected, Row, Shortfall
 from .search import LONG_RUN_SHARE, MAX_COST_RATIO, MAX_EVALUATIONS, SIZE_EXPONENT, Found, Missed, Search
-from .trials import Times, Trial, Trials, step_times, tried_times
+from .trials import ASYMPTOTIC_ERROR, Times, Trial, Trials, step_times, tried_times
 
 if TYPE_CHECKING:
     from .._words import Cost, Dtypes
@@ -362,6 +363,8 @@ def _row(
 
 def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
     trial = missed.trial
+    if search.allowed(candidate) < trial.error < ASYMPTOTIC_ERROR:
+        trial = candidate.measured(missed.k)
     detail = f"dt = {trial.dt:.3g}" if candidate.by == "step" else f"{trial.steps} steps"
     tried = f"with {candidate.said(missed.k)} ({detail})"
     too_expensive = f"costs over {MAX_COST_RATIO:g} times the least"
@@ -386,11 +389,7 @@ def _missed(candidate: Candidate, missed: Missed, search: Search) -> Rejected:
 
 def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spent: _Spending, budget: float | None) -> Shortfall:
     """What would have to give: the least error within the budget of all that was tried, and the budget for the tolerance."""
-    least, best = math.inf, None
-    for each in candidates:
-        for k, trial in each.seen.items():
-            if trial.error < least and spent.fits(each, k, budget):
-                least, best = trial.error, (each, k)
+    least, best = _least(candidates, spent, budget)
     needs = [(spent.longest(each, found[each.name].k), each.name) for each in candidates if each.name in found]
     needed, by = min(needs) if needs else (None, None)
     if best is None:
@@ -398,3 +397,24 @@ def _shortfall(candidates: Sequence[Candidate], found: Mapping[str, Found], spen
     chosen, k = best
     tolerance = chosen.tolerance(k) if isinstance(chosen, Adaptive) else None
     return Shortfall(least, chosen.method.name, k if tolerance is None else None, needed, by, tolerance, chosen.dtype)
+
+
+def _least(candidates: Sequence[Candidate], spent: _Spending, budget: float | None) -> tuple[float, tuple[Candidate, int] | None]:
+    """The least error within the budget, and whose it is.
+
+    Of a run that was not good enough only a part of its errors is known, which is less than the largest: so the least of them is
+    measured until one that was measured is the least.
+    """
+    waiting = [
+        (trial.error, i, k, False)
+        for i, each in enumerate(candidates)
+        for k, trial in each.seen.items()
+        if trial.error < math.inf and spent.fits(each, k, budget)
+    ]
+    heapq.heapify(waiting)
+    while waiting:
+        error, i, k, measured = heapq.heappop(waiting)
+        if measured:
+            return error, (candidates[i], k)
+        heapq.heappush(waiting, (candidates[i].measured(k).error, i, k, True))
+    return math.inf, None

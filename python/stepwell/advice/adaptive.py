@@ -77,16 +77,27 @@ class AdaptiveTrials:
         if key not in self._confirmed:
             trial = self.look(method, tolerance)
             if trial.error <= self.allowed:
-                times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.attempt_evaluations))
-                marks = self.marks[:: math.ceil(len(self.marks) / times)]
-                error, _ = self._errors(method, tolerance, marks)
-                ends = np.concatenate([[0.0], marks, self.marks[-1:]])
-                around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
-                closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
-                shown, _ = self._errors(method, tolerance, self.grid.asked)
-                trial = trial._replace(error=max(trial.error, *(float(each.max()) for each in (error, closer, shown))))
+                trial = self._measured(method, tolerance, trial)
             self._confirmed[key] = trial
         return self._confirmed[key]
+
+    def measured(self, method: Method, tolerance: float) -> Trial:
+        """The same of a run that need not be good enough: of such ``look`` knows the error at the output times only."""
+        trial = self.confirm(method, tolerance)
+        if self.allowed < trial.error < math.inf:
+            trial = self._confirmed[method.name, tolerance] = self._measured(method, tolerance, trial)
+        return trial
+
+    def _measured(self, method: Method, tolerance: float, trial: Trial) -> Trial:
+        """A run that is known in part, at all marks and around the worst of them, and as an advice shows it."""
+        times = max(FIRST_SAMPLES, int(CONFIRMING_SHARE * self.most / method.attempt_evaluations))
+        marks = self.marks[:: math.ceil(len(self.marks) / times)]
+        error, _ = self._errors(method, tolerance, marks)
+        ends = np.concatenate([[0.0], marks, self.marks[-1:]])
+        around = [np.linspace(ends[i], ends[i + 2], REFINED_SAMPLES + 1) for i in np.argsort(error)[-REFINED_MARKS:]]
+        closer, _ = self._errors(method, tolerance, np.unique(np.concatenate(around)))
+        shown, _ = self._errors(method, tolerance, self.grid.asked)
+        return trial._replace(error=max(trial.error, *(float(each.max()) for each in (error, closer, shown))))
 
     def _errors(self, method: Method, tolerance: float, at: Array, share: float = 1.0) -> tuple[Array, Run]:
         run = self._integrated(method, tolerance, at, share)

@@ -65,6 +65,9 @@ class Candidate(Protocol):
     def confirm(self, k: int) -> Trial:
         """The same, measured more closely."""
 
+    def measured(self, k: int) -> Trial:
+        """The same of a run that need not be good enough."""
+
     def within_limit(self, k: int) -> int:
         """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
 
@@ -102,6 +105,8 @@ class Fixed:
     def confirm(self, k: int) -> Trial:
         """The same run, at every step."""
         return self.trials.confirm(self.method, self.grid.dt(k), self.grid.steps(k))
+
+    measured = confirm
 
     def within_limit(self, k: int) -> int:
         """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
@@ -193,6 +198,10 @@ class Adaptive:
     def confirm(self, k: int) -> Trial:
         """The same, at many more times."""
         return self.trials.confirm(self.method, self.tolerance(k))
+
+    def measured(self, k: int) -> Trial:
+        """The same of a run that need not be good enough."""
+        return self.trials.measured(self.method, self.tolerance(k))
 
     def within_limit(self, k: int) -> int:
         """Steps that blow up are rejected."""
