@@ -409,8 +409,8 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     for k in range(order):
         book.advance(k)
         by = None if k == 0 and _is(unit, 1.0) else unit * (1.0 / (k + 1))
-        by_each = len(seeds) * [by]
-        if np.ndim(by):
+        by_each: list[Any] = len(seeds) * [by]
+        if by is not None and np.ndim(by):
             by_each = [each for block in blocks for each in np.broadcast_to(by, block.shape).flat]
         terms = []
         for seed, rate, factor in zip(seeds, found, by_each, strict=True):
