@@ -91,7 +91,7 @@ def taken_up(
     numbers, n_v = engine.pace_numbers(plan), prod(plan.system.v_shape)
     pace, state = carry[:numbers].copy(), carry[numbers:]
     pace[engine.WORK] = 0.0  # no control has done anything yet in this run
-    # A run that saved its start alone did not know of a later time, of which the first step from rest is a part.
+    # A run that saved its start alone did not know of a time of the run, of which the first step from rest may be a part.
     begins = not pace[engine.COUNTS].any() and not pace[engine.HELD].any() and bool((pace[engine.STEP] == engine.BLIND).any())
     if begins or carried_for != identity(plan.system, plan.batch, v, y):
         return _begun_anew(plan, pacing, pace), v, y, True

@@ -84,8 +84,8 @@ def integrate(
         v: velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.
         y: coordinate block at the start, likewise.
         dt: the step, in units of time, below zero to go back; if None in a continued run, that of it. With a tolerance, the step
-            to try first; if None, a hundredth of the time in which the state changes at the start, or from rest a millionth of
-            the time to the first saved state.
+            to try first; if None, a hundredth of the time in which the state changes at the start, or from rest 2⁻²⁰ units of
+            time, or that part of a run of less than 2⁻¹⁵ units.
         steps: number of steps, one or more.
         every: save the state every so many steps, and at the first and the last; None saves the last alone.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
@@ -98,8 +98,8 @@ def integrate(
             merson, fehlberg, fehlberg_5, dop853, taylor.
         at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
             time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
-            from its start. Steps do not depend on these times, but for the first from rest; and where the extra step errs by
-            more than is tolerated, the step missed something and is rejected.
+            from its start. Steps do not depend on these times, unless the extra step errs by more than is tolerated: the
+            step missed something and is rejected.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force

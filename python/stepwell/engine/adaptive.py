@@ -25,8 +25,10 @@ PACE_NUMBERS = 20
 #: Places among them; the counts are of accepted, rejected and extra steps.
 TIME, STEP, TARGET, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 4, 5, 6, 7, 18
 MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
-#: The first step where the state tells nothing: this part of the time to the first saved state.
+#: The first step where the state tells nothing, in units of time; in a run of less than SHORT of them, this part of its time. So
+#: steps of other runs do not depend on when states are saved.
 BLIND = 1.0 / (1 << 20)
+SHORT = 32.0 * BLIND
 
 
 class Tolerances(NamedTuple):
@@ -139,8 +141,8 @@ def paces(
 ) -> Array:
     """Where members stand before they begin, shape (numbers, *batch), or (numbers,) if it is the same for all.
 
-    Of ``pacing`` it takes the first time, of which a part is the first step where the state tells nothing, and a jump at the
-    start.
+    Of ``pacing`` it takes the time of the run, of which a part may be the first step where the state tells nothing, and a jump at
+    the start.
     """
     from ..reference import adaptive  # only such runs need it
 
@@ -155,9 +157,8 @@ def paces(
         if (jumps := jumps_of(plan, pacing)) is not None:
             t0 = jumps.begun(t0)
         if step is None:
-            at = pacing.at.reshape(len(pacing.at), *(pacing.at.shape[1:] or np.ndim(plan.t0) * (1,)))
-            later = np.where(at > plan.t0, at - plan.t0, np.inf).min(axis=0)
-            step = -np.where(later < np.inf, BLIND * later, BLIND)
+            span = pacing.at[-1] - plan.t0
+            step = -BLIND * np.where((span > 0.0) & (span < SHORT), span, 1.0)
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
     h, *both, longest, begin = (np.asarray(number).item() if np.size(number) == 1 else number for number in each)
     tolerance = both[0], both[1], float(tolerances.absolute is None)
