@@ -83,7 +83,7 @@ def test_what_has_no_formula_is_charted_as_far_as_it_is_known(scene):
     few |= dict.fromkeys(("cloth", "jelly_cube", "plummer", "rope_bridge"), 1000)
     steps = few.get(scene.name, 10_000)
     chart = sw.charts.work_precision(scene, ["rk4"], [steps, 2 * steps], tolerances=[1e-6])
-    cut = scene.name in ("double_pendulum", "energy_control", "triple_pendulum")  # the others are known over all of it
+    cut = scene.name in ("energy_control", "triple_pendulum")  # the others are known over all of it
     assert (chart.cut, chart.floor, chart.scene.control) == (cut, pytest.approx(1e-7), None)
     assert (0 < chart.scene.horizon < scene.horizon) == cut
     coarse, fine = (point.state_error for point in chart.curves[0].points)
@@ -282,7 +282,8 @@ def test_the_error_falls_with_the_tolerance(charts):
             seen = [(p.tolerance, p.state_error) for p in curve.points if 1e-11 < p.tolerance < 2e-3]
             slope_seen = np.polyfit(*np.log10(seen).T, 1)[0]
             assert 0.7 < slope_seen < 1.15, curve.name
-            assert all(a.cost <= b.cost for a, b in itertools.pairwise(curve.points))
+            # Of the loosest tolerance a fifth of the steps is rejected, which costs more than a tighter one.
+            assert all(a.cost <= b.cost for a, b in itertools.pairwise(p for p in curve.points if p.tolerance < 5e-3))
 
 
 def test_rejected_steps_are_counted():
