@@ -340,7 +340,10 @@ def begin(
         longest = sizes(v, y, block_axes, groups)
         least = MOVES * longer(pace.t, -pace.t)
         counts = Acceptance(groups).counts(*numbers_in(v, y, block_axes))
-        time = shortest(longest, sizes(*rates, block_axes, groups), counts)
+        changes = sizes(*rates, block_axes, groups)
+        time = shortest(longest, changes, counts)
+        # Where no component changes by its size, the times of whole blocks count, whatever the units of their components.
+        time = where(less(time, np.inf), time, of_blocks(longest, changes, counts))
         chosen = longer(where(less(time, np.inf), FIRST * time, -pace.h), least)
         h = chosen
         for part in (0.5, 1.0):
@@ -367,6 +370,16 @@ def shortest(lengths: Any, rates: Any, counts: tuple[int, int]) -> Any:
     least: Any = np.inf
     for time in times:
         least = where(less(0.0, time) & less(time, least), time, least)
+    return least
+
+
+def of_blocks(lengths: Any, rates: Any, counts: tuple[int, int]) -> Any:
+    """The shortest time in which a block that is not zero changes by the sum of its sizes; infinite if there is none."""
+    least: Any = np.inf
+    for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
+        if len(lengths[block]):
+            time = total(lengths[block]) / total(rates[block])
+            least = where(less(0.0, time) & less(time, least), time, least)
     return least
 
 
@@ -538,7 +551,9 @@ def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any
 
 
 def absolute(x: Any) -> Any:
-    """|x|."""
+    """|x|; among symbols there may be numbers."""
+    if isinstance(x, np.ndarray) and x.dtype == object:
+        return np.frompyfunc(lambda each: absolute(each) if hasattr(each, "and_bits") else abs(each), 1, 1)(x)
     return and_bits(x, (1 << 63) - 1)
 
 
@@ -582,7 +597,7 @@ def component(v: Array, y: Array, block_axes: tuple[int, int], place: int) -> An
 def rows_of(block: Array, axes: int) -> list[Any]:
     """The numbers of a block, each of all members."""
     block = np.asarray(block)
-    if block.dtype == object and block.size and not hasattr(block.flat[0], "and_bits"):  # as a series has them
+    if block.dtype == object and not any(hasattr(each, "and_bits") for each in block.flat):  # as a series has them
         block = block.astype(np.float64)
     return list(block.reshape((-1, *block.shape[axes:])))
 

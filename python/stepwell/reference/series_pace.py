@@ -39,6 +39,12 @@ SHRINK = 0.25
 LEAST_ORDER, MOST_ORDER = 4, 20
 ORDER_BY_LOGARITHM = 0.6
 
+#: The last two terms may vanish by chance, as at the turning point of a pendulum at a right angle, of whose series only every
+#: fourth term is left. So a step is rejected whose end shows that it erred by this many times what is tolerated.
+DEFECT = 8.0
+#: Some roundings of the time, which is the difference of larger ones in rates that are about to end in a pole.
+TIME_ROUNDING = 1.0 / (1 << 46)
+
 #: 1.5·2⁵², to which a whole number is added that stands in the low bits of the sum.
 MAGIC = 6755399441055744.0
 #: 2^r on [−½, ½], and log₂(1 + f)/f for 1 + f between √½ and √2: fitted at Chebyshev's nodes, wrong by 3.5e-6 and, times f, by
@@ -72,15 +78,24 @@ def attempt(
     outlook, groups = pace.outlook(budget), acceptance.groups
     unit = unit_of(pace.before)
     terms, branches = expanded(system.s, order, pace.t, (unit, unit), v, y)
-    far, moved = reach(order, pace, unit, block_axes, acceptance, v, y, terms)
+    far, moved, allowed = reach(order, pace, unit, block_axes, acceptance, v, y, terms)
     bound = pace.wall - pace.t
     ends = less(bound, far)
     step = where(ends, bound, far)
-    share = where(outlook.is_extra, pace.extra, step) * (1.0 / unit)
+    length = where(outlook.is_extra, pace.extra, step)
+    share = length * (1.0 / unit)
     v1, y1 = (value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     new = sizes(v1, y1, block_axes, groups)
+    slope_v, slope_y = (value(terms[0][i], [(k + 1.0) * term[i] for k, term in enumerate(terms[1:], 1)], share) for i in range(2))
+    end = pace.t + length
+    rate_v, rate_y = system.s.dv(end, v1, y1), system.s.dy(end, v1, y1)
+    defect = sizes(slope_v - unit * rate_v, slope_y - unit * rate_y, block_axes, groups)
+    # Rates that change in a step by their own size change by this in some roundings of the time.
+    rounded = sizes(slope_v, slope_y, block_axes, groups) * (TIME_ROUNDING * longer(end, -end) * (1.0 / unit))
+    stays = functools.reduce(operator.and_, at_most(share * defect, allowed + rounded))
     v1, y1, work = system.project(v1, y1)
-    stays = on_branches(branches, share, moved) if branches else None
+    if branches:
+        stays = stays & on_branches(branches, share, moved)
     following, goes_on = decided(pace, step, ends, new, stays, 0.5 / moved * unit, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
@@ -119,8 +134,11 @@ def reach(
     v: Array,
     y: Array,
     terms: Sequence[tuple[Array, Array]],
-) -> tuple[Any, Any]:
-    """How far the series is as good as is tolerated, and the motion in one unit of time over the tolerated error.
+) -> tuple[Any, Any, Any]:
+    """How far the series is as good as is tolerated, the motion in a unit of time over the tolerated error, what a step may err.
+
+    That is of each group the defect times the step: by how much the series and the rates at its end differ. It is p + 1 times the
+    first term that is left out.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
@@ -157,7 +175,7 @@ def reach(
     far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error)) * unit
     limited = where(less(1.0, pace.most), pace.most, 1.0)
     most = where(less(pace.most, MAX_FACTOR), limited, MAX_GROWTH) * pace.before
-    return pace.shortened(where(less(most, far), most, far), pace.t), moved
+    return pace.shortened(where(less(most, far), most, far), pace.t), moved, DEFECT * (order + 1.0) * (bound + lost)
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
@@ -203,15 +221,14 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
 def decided(pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
     """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
 
-    ``stays`` is whether functions stay on their branch, None without any; ``tolerable`` a step that may leave it.
+    ``stays`` is whether the end agrees with the rates and functions stay on their branch; ``tolerable`` a step that may leave it.
     """
     finite = less(total(new), np.inf)  # NaN is not
     # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
     fits = finite & (ends | less(pace.t, pace.t + 0.25 * step))
-    good = fits if stays is None else fits & stays
+    good = fits & stays
     shorter = SHRINK * where(less(step, pace.before), step, pace.before)
-    if stays is not None:
-        shorter = where(stays, shorter, longer(shorter, tolerable))
+    shorter = where(stays, shorter, longer(shorter, tolerable))
     reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good

@@ -315,6 +315,15 @@ impl<N: Number> Pace<N> {
         };
         let least = N::of(MOVES) * longer(self.t, -self.t);
         let time = shortest(&rates);
+        // Where no component changes by its size, the times of whole blocks count, whatever the units of their components.
+        let changes = acceptance.sizes(rates[0].as_slice(), rates[1].as_slice());
+        let of_block = |least: N, block: std::ops::Range<usize>| {
+            let time = total(&longest[block.clone()]) / total(&changes[block.clone()]);
+            let shorter = N::choose(zero.below(time) & time.below(least), time, least);
+            if block.is_empty() { least } else { shorter }
+        };
+        let blocks = [0..counts[0], counts[0]..counts[0] + counts[1]].into_iter().fold(N::of(f64::INFINITY), of_block);
+        let time = N::choose(time.below(N::of(f64::INFINITY)), time, blocks);
         let chosen = longer(N::choose(time.below(N::of(f64::INFINITY)), N::of(FIRST) * time, -self.h), least);
         let mut h = chosen;
         for part in [0.5, 1.0] {

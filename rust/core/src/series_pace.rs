@@ -25,6 +25,11 @@ const SHARE: f64 = 0.5;
 /// A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first twofold: so many
 /// are left before what it met.
 const SHRINK: f64 = 0.25;
+/// The last two terms may vanish by chance, as at the turning point of a pendulum at a right angle, of whose series only every fourth term
+/// is left. So a step is rejected whose end shows that it erred by this many times what is tolerated.
+const DEFECT: f64 = 8.0;
+/// Some roundings of the time, which is the difference of larger ones in rates that are about to end in a pole.
+const TIME_ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
 /// The bits of an exponent.
 const EXPONENT: u64 = 0x7FF << 52;
 
@@ -44,10 +49,12 @@ pub fn terms<N: Number>(
 }
 
 /// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. Also the largest
-/// sizes so far. A step that is made once more needs no branches: it was on them.
+/// sizes so far. `rates` are those of a step of 1, by which the end of a step is checked; a step that is made once more needs neither them
+/// nor branches.
 #[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
 pub fn attempt<N: Number>(
     (terms, branches): Known<N>,
+    rates: Option<&dyn System<N>>,
     projected: &dyn System<N>,
     acceptance: &Acceptance,
     (pace, scales): (Pace<N>, &Scales<N>),
@@ -57,15 +64,35 @@ pub fn attempt<N: Number>(
 ) -> (Pace<N>, Vec<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
     let unit = unit_of(pace.before);
-    let (far, moved) = reach(acceptance, (&pace, scales), unit, [v, y], terms);
+    let Reach { far, moved, allowed } = reach(acceptance, (&pace, scales), unit, [v, y], terms);
     let bound = pace.wall - pace.t;
     let ends = bound.below(far);
     let step = N::choose(ends, bound, far);
-    let share = N::choose(outlook.is_extra, pace.extra, step) * (N::of(1.0) / unit);
+    let length = N::choose(outlook.is_extra, pace.extra, step);
+    let share = length * (N::of(1.0) / unit);
     let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), share), value(y, terms.iter().map(|term| &term.1), share));
     let new = acceptance.sizes(new_v.as_slice(), new_y.as_slice());
+    let agrees = rates.and_then(|s| {
+        let slope = |of: &dyn Fn(&(Block<N>, Block<N>)) -> Block<N>| {
+            let rest: Vec<Block<N>> = (2..).zip(&terms[1..]).map(|(k, term)| of(term).map(|x| N::of(f64::from(k)) * x)).collect();
+            value(&of(&terms[0]), rest.iter(), share)
+        };
+        let end = pace.t + length;
+        let slopes = [slope(&|term| term.0.clone()), slope(&|term| term.1.clone())];
+        let rates = [s.dv(end, &new_v, &new_y), s.dy(end, &new_v, &new_y)];
+        let [v, y] = [0, 1].map(|i| slopes[i].zip_map(&rates[i], |slope, rate| slope - unit * rate));
+        let defect = acceptance.sizes(v.as_slice(), y.as_slice());
+        // Rates that change in a step by their own size change by this in some roundings of the time.
+        let per = N::of(TIME_ROUNDING) * longer(end, -end) * (N::of(1.0) / unit);
+        let rounded = acceptance.sizes(slopes[0].as_slice(), slopes[1].as_slice()).into_iter().map(|size| size * per);
+        let allowed = allowed.iter().zip(rounded).map(|(allowed, rounded)| *allowed + rounded);
+        defect.into_iter().zip(allowed).map(|(size, allowed)| (share * size).at_most(allowed)).reduce(|all, each| all & each)
+    });
     let (new_v, new_y) = projected.project(new_v, new_y);
-    let stays = on_branches(branches, share, moved);
+    let stays = match (agrees, on_branches(branches, share, moved)) {
+        (Some(agrees), Some(stays)) => Some(agrees & stays),
+        (agrees, stays) => agrees.or(stays),
+    };
     let tolerable = N::of(0.5) / moved * unit;
     let (next, longest, took) =
         decided(&pace, (step, ends), (&scales.longest, &new), (stays, tolerable), outlook.is_extra, outlook.runs);
@@ -96,15 +123,26 @@ fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a B
     start.zip_map(&rest, |start, rest| start + share * rest)
 }
 
-/// How far the series is as good as is tolerated, and the motion in one unit of time over the tolerated error. In `before` the pace has the
-/// length of the last step that was taken; a held one does not count, for it is made once more and must be the same.
+/// What [`reach`] finds.
+struct Reach<N> {
+    /// How far the series is as good as is tolerated.
+    far: N,
+    /// The motion in one unit of time over the tolerated error.
+    moved: N,
+    /// What a step may err: of each group the defect times the step, that is by how much the series and the rates at its end differ. It
+    /// is p + 1 times the first term that is left out.
+    allowed: Vec<N>,
+}
+
+/// How far the series is as good as is tolerated. In `before` the pace has the length of the last step that was taken; a held one does not
+/// count, for it is made once more and must be the same.
 fn reach<N: Number>(
     acceptance: &Acceptance,
     (pace, scales): (&Pace<N>, &Scales<N>),
     unit: N,
     [v, y]: [&Block<N>; 2],
     terms: &[(Block<N>, Block<N>)],
-) -> (N, N) {
+) -> Reach<N> {
     let (zero, number, order) = (N::of(0.0), N::of, terms.len());
     let of = |k: usize| {
         let (v, y) = &terms[k - 1];
@@ -154,7 +192,8 @@ fn reach<N: Number>(
     let far = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error)) * unit;
     let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
     let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * pace.before;
-    (pace.shortened(N::choose(most.below(far), most, far), pace.t), moved)
+    let allowed = bound.iter().zip(&lost).map(|(bound, lost)| number(DEFECT * (p + 1.0)) * (*bound + *lost)).collect();
+    Reach { far: pace.shortened(N::choose(most.below(far), most, far), pace.t), moved, allowed }
 }
 
 /// Whether all functions stay on their branch within a step, or all its motion is tolerated as an error; none without branches.
@@ -189,7 +228,7 @@ fn furthest<N: Number>(terms: &[Option<N>], share: N, part: impl Fn(N) -> N) -> 
 }
 
 /// What comes after a step, which may end at the wall, the largest sizes so far, and whether the state goes on. `longest` and `new` are the
-/// largest sizes before, and those that the groups would have. `stays`: whether functions stay on their branch, none without any;
+/// largest sizes before, and those that the groups would have. `stays`: whether the end agrees with the rates and functions stay on their branch, none if neither is asked;
 /// `tolerable`: a step that may leave it.
 fn decided<N: Number>(
     pace: &Pace<N>,

@@ -332,16 +332,16 @@ impl AttemptsOf<'_> {
         let (v, y) = self.state();
         let (terms, branches) = series_pace::terms(order, self.scaled(Symbol::of(1.0)).as_ref(), &self.pace().0, &v, &y);
         let numbers = ids(terms.iter().flat_map(|(v, y)| [v, y]));
-        (self.attempt_by((&terms, &branches)), numbers)
+        (self.attempt_by((&terms, &branches), Some(self.scaled(Symbol::of(1.0)).as_ref())), numbers)
     }
 
     /// One attempt by coefficients of a series.
-    fn attempt_by(&self, terms: series_pace::Known<Symbol>) -> Vec<Id> {
+    fn attempt_by(&self, terms: series_pace::Known<Symbol>, rates: Option<&dyn System<Symbol>>) -> Vec<Id> {
         let ((v, y), (pace, scales)) = (self.state(), self.pace());
         let budget = Symbol::new(Op::Param(BUDGET));
         let projected = self.projected();
         let (pace, longest, v, y) =
-            series_pace::attempt(terms, projected.as_ref(), self.acceptance, (pace, &scales), budget, &v, &y);
+            series_pace::attempt(terms, rates, projected.as_ref(), self.acceptance, (pace, &scales), budget, &v, &y);
         self.next(&pace, &longest, &v, &y)
     }
 
@@ -371,7 +371,7 @@ fn trace_by_terms(tape: Tape, given: &Given, how: &How, shape: Shape, numbers: u
         let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
         let terms: Terms<Symbol> = (0..numbers / state).map(of).collect();
-        let mut next = scene.attempt_by((&terms, &[]));
+        let mut next = scene.attempt_by((&terms, &[]), None);
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
     }))
