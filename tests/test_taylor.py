@@ -697,8 +697,8 @@ def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> N
 def test_coefficients_that_vanish_by_chance_are_not_believed(angle: float, tolerance: float) -> None:
     """At a right angle the series of a pendulum has every fourth term alone; for some orders the last two are not among them.
 
-    The first step was then as long as a period and the pendulum ended at 1e5 rad. The energy may change by some tens of steps that
-    each err by some tolerances of the largest v and y, which take a unit of it at most: a hundredth, or a thousand tolerances.
+    The first step was then as long as a period, and the pendulum ended at 1e5 rad. Some tens of steps may each change the energy
+    by some tolerances of the largest v and y, whose energy is about 1: by a thousand tolerances in all, or a hundredth.
     """
     run = sw.integrate(sw.Pendulum(1.0), "taylor", v=0.0, y=angle, tolerance=tolerance, at=[22.0])
     assert run.energy[-1] == pytest.approx(1.0 - np.cos(angle), abs=min(0.01, 1000.0 * tolerance))
