@@ -29,6 +29,7 @@ __all__ = [
     "isa",
     "isa_levels",
     "listen",
+    "operations",
     "program",
     "run",
     "series_evaluations",
@@ -65,7 +66,8 @@ class ModelSpec:
     ``matrix`` is the nodes and the number of rows in the v slot, for the transition-matrix form of the system "matrix": ``n`` and
     ``n_v`` (whole), ``p`` (n·n rows, row by row), ``q`` (n rows for each node and, within it, each input), ``inputs``.
 
-    ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length.
+    ``order`` is that of a series with adaptive steps; 0 for that of its steps of fixed length. ``acceptance`` is the tuple of
+    ``reference.acceptance.Acceptance``, and ``backward`` says that adaptive steps go back in time.
 
     Operations that are given as ``step()`` make the step in place of the method: their rates are the next numbers of the state,
     and their parameters are those of the system.
@@ -82,6 +84,8 @@ class ModelSpec:
         fused: bool = False,
         order: int = 0,
         single: bool = False,
+        acceptance: tuple[tuple[int, ...], bool, tuple[int, ...]] | None = None,
+        backward: bool = False,
     ) -> ModelSpec: ...
 
 @final

@@ -34,7 +34,10 @@ const TIME_ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
 const EXPONENT: u64 = 0x7FF << 52;
 
 /// Coefficients of v and y, and the branches of functions that the rates are on.
-pub type Known<'a, N> = (&'a [(Block<N>, Block<N>)], &'a [Branch<N>]);
+pub type Known<'a, N> = (&'a [Term<N>], &'a [Branch<N>]);
+
+/// The coefficients of v and y of one power.
+type Term<N> = (Block<N>, Block<N>);
 
 /// The coefficients at the start of a step, and the branches of functions that the rates are on. The system is scaled to a step of 1.
 pub fn terms<N: Number>(
@@ -73,7 +76,7 @@ pub fn attempt<N: Number>(
     let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), share), value(y, terms.iter().map(|term| &term.1), share));
     let new = acceptance.sizes(new_v.as_slice(), new_y.as_slice());
     let agrees = rates.and_then(|s| {
-        let slope = |of: &dyn Fn(&(Block<N>, Block<N>)) -> Block<N>| {
+        let slope = |of: &dyn Fn(&Term<N>) -> Block<N>| {
             let rest: Vec<Block<N>> = (2..).zip(&terms[1..]).map(|(k, term)| of(term).map(|x| N::of(f64::from(k)) * x)).collect();
             value(&of(&terms[0]), rest.iter(), share)
         };
@@ -141,7 +144,7 @@ fn reach<N: Number>(
     (pace, scales): (&Pace<N>, &Scales<N>),
     unit: N,
     [v, y]: [&Block<N>; 2],
-    terms: &[(Block<N>, Block<N>)],
+    terms: &[Term<N>],
 ) -> Reach<N> {
     let (zero, number, order) = (N::of(0.0), N::of, terms.len());
     let of = |k: usize| {
