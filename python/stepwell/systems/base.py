@@ -144,7 +144,7 @@ class System(Fixed, Value, ABC):
 
     @property
     def groups(self) -> tuple[int, ...]:
-        """The group of each number of v, then of y, whose errors count together: see ``reference/acceptance.py``."""
+        """The group of each number of v, then of y, whose errors count together; see ``reference/acceptance.py``."""
         return ()
 
     def alone(self, h: float, batch: Shape) -> Any:
