@@ -28,6 +28,8 @@ ATTEMPTS, MOST_RATES, MOST_NUMBERS = 1000, 32, 100_000
 #: A mode is stiff if it decays rather than turns, has had the time to decay by so many of its time constants, and the step is
 #: at least this share of the longest at which the method is stable for it.
 DECAYED, SHARE_OF_LIMIT = 100.0, 0.2
+#: Roundings of the time by which rates are looked at beyond where a member stopped.
+BEYOND = 8.0
 #: The part of a number by which it is changed to find a derivative: half of its digits.
 PART = 2.0**-26
 
@@ -60,6 +62,8 @@ def _why(run: Run, index: Shape) -> str:
         held = _held_by_stability(run, index, accepted + rejected)
         tried = f"{counted(accepted + rejected, 'attempt')}, {rejected} of them rejected{mean}"
         return f"{WHY_STOPPED[status]}: {tried}{held}; max_steps= allows more"
+    if status == Status.UNDERFLOW and (beyond := _of_rates_beyond(run, index)):
+        return f"{WHY_STOPPED[Status.NOT_FINITE]}: {beyond} beyond"
     return f"{WHY_STOPPED[status]}{_of_rates(run, index, status)}"
 
 
@@ -71,6 +75,16 @@ def _of_member(run: Run, times: Any, index: Shape) -> Any:
 def _start(run: Run, index: Shape) -> float:
     """The time at which a member began."""
     return float(_of_member(run, run.t0, index))
+
+
+def _of_rates_beyond(run: Run, index: Shape) -> str:
+    """Which rate is not finite some roundings of the time behind where a member stopped; empty if all are."""
+    assert run.paces is not None
+    assert run.stand is not None
+    t, (v, y) = run.paces.t, (run.stand.v, run.stand.y)
+    ahead = BEYOND * np.where(run.paces.h < 0.0, -1.0, 1.0) * np.spacing(np.abs(t))
+    dv, dy = _rates(run.system, run.status.shape, t, (v, y))
+    return _not_finite(_rates(run.system, run.status.shape, t + ahead, (v + ahead * dv, y + ahead * dy)), index)
 
 
 def _of_rates(run: Run, index: Shape, status: Status) -> str:

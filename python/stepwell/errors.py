@@ -121,8 +121,8 @@ class EventWarning(UserWarning):
         >>> with warnings.catch_warnings(record=True) as caught:
         ...     warnings.simplefilter("always", sw.EventWarning)
         ...     run = sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.01, steps=300, events=ground)
-        >>> bool(run.status == sw.Status.REST), run.stopped_at.round(6)  # √(2/9.81)·(1 + 0.5)/(1 − 0.5)
-        (True, array(1.354571))
+        >>> bool(run.status == sw.Status.REST), float(run.stopped_at.round(6))  # √(2/9.81)·(1 + 0.5)/(1 − 0.5)
+        (True, 1.354571)
     """
 
 

@@ -195,7 +195,7 @@ def integrate(
         run, begun = adaptive_run(
             system, how, v, y, dt, options, record, t0, went, control, fused, threads, backend, progress, asked
         )
-        warn_of_nonsense(run, begun)
+        warn_of_nonsense(run, begun if _is_one_motion(asked) else None)
         return run
     if max_steps is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")
@@ -355,10 +355,15 @@ def integrate(
         run.recorded["energy"] = run.energy
     if out.diverged:
         _warn(run, before, None if carried else (v, y))
-    begun = None if carried or before is not None else (v, y)
+    begun = None if carried or before is not None or not _is_one_motion(asked) else (v, y)
     warn_of_nonsense(run, begun)
     _growth.warn_of(run, begun)
     return run
+
+
+def _is_one_motion(events: Sequence[Event] | None) -> bool:
+    """Whether no event changes the state, so that its end tells of its start."""
+    return not any(event.then for event in events or ())
 
 
 def _asked(events: Any, form: str) -> list[Event]:

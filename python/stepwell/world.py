@@ -47,7 +47,7 @@ class World:
         fused: compute each step with fused multiply-adds; see ``integrate``.
         dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
         events: quantities whose changes of sign are located, as of ``integrate``; those of the last call of ``step`` are in
-            ``world.events``. No event stops a member of a world.
+            ``world.events``. No event stops a member of a world; one with ``then=`` changes its state within the step.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -178,7 +178,7 @@ class World:
             from .events import event, frames  # only such worlds need it
 
             self._asked = event.several(events)
-            self._frames = frames.Frames(plan, self._asked, v, y, loop.step, lambda: loop.step_number)
+            self._frames = frames.Frames(plan, self._asked, v, y, loop)
             step = self._frames.step
         #: ``step(n=1)`` makes n steps in place.
         object.__setattr__(self, "step", step)

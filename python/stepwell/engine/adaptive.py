@@ -179,6 +179,16 @@ def begun(plan: Plan, paces: Array, v: Array, y: Array) -> Pace:
     return adaptive.begin(system, pace, v, y, plan.block_axes, plan.acceptance.groups, series=plan.method.has_series)
 
 
+def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Array:
+    """The numbers of members that begin again at these times, with the tolerances and counts of before."""
+    from ..reference import adaptive
+
+    pace, zero = pace_of(plan, numbers), np.zeros(plan.batch)
+    anew = pace._replace(t=t, h=zero - BLIND, target=t, extra=zero, held=zero, begin=t, wall=zero + np.inf)
+    anew = anew._replace(before=zero + 1.0, most=zero + adaptive.MAX_FACTOR)
+    return numbers_of(begun(plan, numbers_of(anew), v, y))
+
+
 def of_unit_step(plan: Plan, batch: Shape) -> Any:
     """The NumPy reference of the system, scaled to a step of 1, or of −1 where its time runs backward."""
     from ..reference import adaptive

@@ -23,19 +23,27 @@ LOCATED_AT_ONCE = 1 << 12
 
 #: What stands for the slope of a quantity that begins at zero without one, on the side from which it came.
 LEAST_SLOPE = float(np.finfo(float).tiny)
+#: A slope towards the other side is none, if it is less than this share of that at the end of the step: what a bounce without
+#: speed leaves of it.
+NO_SLOPE = 2.0**-24
 
 #: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
 Known = Callable[[int, Whole, Whole], Changes]
 
 
 class Stops(NamedTuple):
-    """Which of some members stop, in which of some steps, at which time and in which state."""
+    """Which of some members stop, in which of some steps, at which time and in which state.
+
+    Of each event ``side`` is the sign of g before it where it stops a member, else 0, and ``size`` the largest |g| around it.
+    """
 
     which: Any
     step: Whole
     t: Array
     v: Array
     y: Array
+    side: Array
+    size: Array
 
 
 class Collected:
@@ -85,7 +93,8 @@ class Collected:
         )
         g = steps.g
         if at is not None:
-            g, slope = np.where(at != 0.0, 0.0, g), np.where((at != 0.0) & (slope == 0.0), at * LEAST_SLOPE, slope)
+            lies = (slope == 0.0) | ((slope * at < 0.0) & (np.abs(slope) <= NO_SLOPE * np.abs(slope_end)))
+            g, slope = np.where(at != 0.0, 0.0, g), np.where((at != 0.0) & lies, at * LEAST_SLOPE, slope)
         whole = Parts(np.arange(len(t)), steps.low, steps.high, g, steps.g_end, slope, slope_end, steps.v_end, steps.y_end)
         parts, stuck = parted(look, whole)
         if at is not None:
@@ -124,11 +133,11 @@ class Collected:
             ends = each.some(self.ends(e, each.member))
             np.minimum.at(last, ends.place, ends.row)
         stops = last < steps
-        in_last: list[tuple[Found, Whole]] = []
+        in_last: list[tuple[Found, Changes]] = []
         for e, (each, event) in enumerate(zip(changes, self.events, strict=True)):
             if stops.any():
                 mine = each.some(each.row == last[each.place])
-                in_last.append((self.located(e, mine), mine.place))
+                in_last.append((self.located(e, mine), mine))
                 each = each.some(each.row < last[each.place])
             if len(each.row):
                 kept = ordinals(each.member) + self.count[e, each.member] <= event.most
@@ -137,24 +146,30 @@ class Collected:
         return self._stopped(index, in_last, last, stops) if stops.any() else None
 
     def ends(self, e: int, member: Whole) -> Any:
-        """Which of these further occurrences, in the order of time of each member, end its run."""
-        terminal = self.events[e].terminal
-        return ordinals(member) + self.count[e, member] >= terminal if terminal else np.zeros(len(member), dtype=bool)
+        """Which of these further occurrences, in the order of time of each member, end its run or change its state."""
+        event = self.events[e]
+        if event.then is not None:
+            return np.ones(len(member), dtype=bool)
+        return ordinals(member) + self.count[e, member] >= event.terminal if event.terminal else np.zeros(len(member), dtype=bool)
 
-    def _stopped(self, index: Whole, in_last: list[tuple[Found, Whole]], last: Whole, stops: Any) -> Stops:
+    def _stopped(self, index: Whole, in_last: list[tuple[Found, Changes]], last: Whole, stops: Any) -> Stops:
         """Let members stop at the first terminal event of their last step."""
         end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
         v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
-        for e, (each, member) in enumerate(in_last):
+        side, size = np.zeros((2, len(self.events), len(index)))
+        for e, (each, changes) in enumerate(in_last):
+            member = changes.place
             first = np.flatnonzero(self.ends(e, each.member))
             first = first[np.unique(member[first], return_index=True)[1]]
-            first = first[each.share[first] < end[member[first]]]
+            first = first[each.share[first] <= end[member[first]]]
             ends, who = each.some(first), member[first]
+            side[:, who] = np.where(ends.share < end[who], 0.0, side[:, who])
+            side[e, who], size[e, who] = np.sign(changes.g[first]), np.maximum(np.abs(changes.g), np.abs(changes.g_end))[first]
             end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
-        for e, (each, member) in enumerate(in_last):
-            self.note(e, each.some(each.share <= end[member]))  # what comes after the end of a member is not there
+        for e, (each, changes) in enumerate(in_last):
+            self.note(e, each.some(each.share <= end[changes.place]))  # what comes after the end of a member is not there
         self.stopped_at[index[stops]] = times[stops]
-        return Stops(stops, last, times, v, y)
+        return Stops(stops, last, times, v, y, side, size)
 
     def note(self, e: int, found: Found) -> None:
         """Count and keep these."""
@@ -192,7 +207,7 @@ class Collected:
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""
         ends = any(event.terminal or event.then for event in self.events)
-        return self.sign * self.stopped_at.reshape(self.plan.batch) if ends else None
+        return np.asarray(self.sign * self.stopped_at.reshape(self.plan.batch)) if ends else None
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Those of each event, by name."""
@@ -201,7 +216,8 @@ class Collected:
             self.locate_waiting(e)
             found = self.found[e]
             member, step, share, t, v, y = (np.concatenate(each, axis=-1) for each in zip(nothing(blocks), *found, strict=True))
-            order = np.lexsort((share, step, member))
+            # A step that is made in parts has shares of each part.
+            order = np.lexsort((share, np.sign(self.plan.dt) * t, step, member))
             v, y = (np.ascontiguousarray(np.moveaxis(each[..., order], -1, 0)) for each in (v, y))
             numbers = count.reshape(self.plan.batch)
             made[event.name] = Occurrences(event.name, numbers, member[order], step[order], self.sign * t[order], v, y)

@@ -269,11 +269,11 @@ class _Resetting(_Driver):
             known, may = self._may(now, index, out)
             changes = [self.changes(e, each, known) for e, each in enumerate(may)]
             # Of all members up to the end of the first step in which one of them goes on from another state, or stops.
-            rows = [each.row[self.resets.end(e, each.member)] for e, each in enumerate(changes)]
+            rows = [each.row[self.ends(e, each.member)] for e, each in enumerate(changes)]
             row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
             at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
             for e, each in enumerate(changes):
-                ends = self.resets.end(e, each.member) & (each.row == row)
+                ends = self.ends(e, each.member) & (each.row == row)
                 at_event[each.place[ends]] = True
             now = now._replace(steps=min(row + 1, steps))
             if now.steps < steps:
@@ -287,7 +287,8 @@ class _Resetting(_Driver):
             gone: Any = np.zeros(len(index), dtype=bool)
             if row < steps:
                 slot, gone = self._through(now, index, out, known, np.flatnonzero(at_event), row)
-            self._save(done, now.steps, index, out.v, out.y)
+            later = int(done > 0)  # what was saved at the start is the state there, not what is made again of a carry
+            self._save(done + later, now.steps - later, index, out.v[later:], out.y[later:])
             at = At(slot, out.y[-1], out.first_bad, True)
             self.slot[..., index], self.first_bad[index] = at.slot, at.bad
             if gone.any():

@@ -1,13 +1,13 @@
-"""Events of a world: looked for after each of its steps."""
+"""Events of a world: looked for after each of its steps, which is made again in parts where one changes the state."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .. import _checks, engine
+from .. import _checks, _core, engine
 from .._checks import Array
 from ..errors import UnsupportedError
 from ..reference.types import Whole
@@ -15,6 +15,7 @@ from .collected import Collected
 from .event import Event
 from .members import Members
 from .parts import Changes
+from .resets import Resets, Stretch
 from .result import Occurrences
 from .trials import Trials
 
@@ -27,8 +28,7 @@ class Frames(Collected):
         events: what was asked for.
         v: the arrays that are stepped.
         y: likewise.
-        steps: the core's ``step``.
-        number: tells at which step the world stands.
+        loop: the core's world.
     """
 
     def __init__(
@@ -37,41 +37,56 @@ class Frames(Collected):
         events: Sequence[Event],
         v: Array,
         y: Array,
-        steps: Callable[[int], None],
-        number: Callable[[], int],
+        loop: _core.World,
     ) -> None:
         if stops := [each for each in events if each.terminal]:
             raise UnsupportedError(
                 f"events: no event stops a member of a world, got {stops[0]!r}; read world.events after a step, and write "
                 f"into world.v and world.y"
             )
-        if changing := [each for each in events if each.then is not None]:
-            raise UnsupportedError(
-                f"events: no event changes the state of a world by then=, got {changing[0]!r}; "
-                f"integrate(…, dt=…, steps=…) takes it"
-            )
         super().__init__(plan, events)
-        self._blocks, self._steps, self._number = (v, y), steps, number
+        self._blocks, self._loop = (v, y), loop
         self._told: dict[str, Occurrences] | None = None
         self._all = np.arange(plan.members)
+        self._resets = Resets(self) if any(event.then for event in events) else None
+        #: Which members are at rest at an event; and the state and quantities that the last call left.
+        self._rests = np.zeros(plan.members, dtype=bool)
+        self._left: tuple[list[Array], list[Array]] | None = None
 
     def step(self, n: int = 1) -> None:
         """Make n steps in place; what happened in them is then in ``World.events``."""
         n = _checks.count("n", n, 0)
         self.clear()
         self._told = None
-        g = self._quantities(self._number())
+        g = self._quantities(self._loop.step_number)
         self.before[:] = np.nan
+        if self._resets is not None:
+            self._taken_up(self._resets, g)
         for _ in range(n):
-            step, before = self._number(), [each.copy() for each in self._blocks]
-            self._steps(1)
-            after = self._quantities(self._number())
+            step, before = self._loop.step_number, [each.copy() for each in self._blocks]
+            self._loop.step(1)
+            after = self._quantities(self._loop.step_number)
             may = [self.may_change(e, self._all, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
-            if np.any(may):
-                self._found(step, may, g, after, before)
-            g = after
+            if np.any(may) or (self._resets is not None and self._resets.at.any()):
+                g = self._found(step, may, g, after, before)
+            else:
+                g = after
         for e in range(len(self.events)):
             self.locate_waiting(e)
+        if self._resets is not None:
+            self._left = [each.copy() for each in self._blocks], g
+
+    def _taken_up(self, resets: Resets, g: list[Array]) -> None:
+        """At which events members are: as the last call left them, but for those that the user has moved since."""
+        if self._left is None:
+            t: Any = np.array(self.plan.t0 + self._loop.step_number * self.plan.dt)
+            resets.begin(t, *self._flat(self._blocks))
+            return
+        blocks, last = self._left
+        for now, then in zip(self._flat(self._blocks), self._flat(blocks), strict=True):
+            self._rests &= (now == then).all(axis=tuple(range(now.ndim - 1)))
+        for e, (now, then) in enumerate(zip(g, last, strict=True)):
+            resets.begin_again(e, now, now != then)
 
     @property
     def told(self) -> dict[str, Occurrences]:
@@ -92,8 +107,8 @@ class Frames(Collected):
         shapes = self.plan.system.v_shape, self.plan.system.y_shape
         return tuple(each.reshape(*shape, len(self._all)) for each, shape in zip(blocks, shapes, strict=True))
 
-    def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> None:
-        """Take what happened in a step."""
+    def _found(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
+        """Take what happened in a step; the quantities at its end."""
         if self.plan.force is not None:  # which may be another one than in the last call
             force = np.array(self.plan.force)
             self.members = Members(self.plan._replace(force=force))
@@ -108,4 +123,36 @@ class Frames(Collected):
             v, y, v_end, y_end = (each[..., place] for each in states)
             return Changes(row, place, place, number, times, lengths, low, high, *values, v, y, v_end, y_end)
 
-        self.take(self._all, 1, [self.changes(e, each & finite, known) for e, each in enumerate(may)])
+        changes = [self.changes(e, each & finite & ~self._rests, known) for e, each in enumerate(may)]
+        if self._resets is None:
+            self.take(self._all, 1, changes)
+            return after
+        goes_through = self._resets.at.any(axis=0) & finite
+        for e, each in enumerate(changes):
+            goes_through[each.place[self.ends(e, each.member)]] = True
+        self.take(self._all, 1, [each.some(~goes_through[each.place]) for each in changes])
+        index = np.flatnonzero(goes_through)
+        if not len(index):
+            return after
+        lying = self._rests[index]
+        v, y = (each[..., index].copy() for each in states[:2])  # of members at rest that stay so
+        if not lying.all():
+            moves = index[~lying]
+            begin, end = np.full(len(moves), t), self.plan.t0 + (step + 1) * self.plan.dt
+            both = (each[..., moves] for each in states)
+            arrived = self._resets.through(Stretch(moves, np.full(len(moves), step), begin, end - begin, *both, self._resets.at[:, moves]))
+            v[..., ~lying], y[..., ~lying] = arrived.v, arrived.y
+            self._resets.at[:, moves], self._rests[moves] = arrived.at, arrived.rests >= 0
+        self._write(step + 1, index, v, y)
+        self.before[:, index] = np.nan
+        return self._quantities(step + 1)
+
+    def _write(self, step: int, index: Whole, v: Array, y: Array) -> None:
+        """Set members where they are at this step; what the method carries of the others stays."""
+        carry = self._loop.carry() if self.plan.method.carry is not None else None
+        for block, new in zip(self._blocks, (v, y), strict=True):
+            block.reshape(*new.shape[:-1], len(self._all))[..., index] = new
+        if carry is not None:
+            slot = carry.reshape(*v.shape[:-1], len(self._all))
+            slot[..., index] = engine.to_slot(self.members.plan(index)._replace(first=step), v, y)
+            self._loop.carry_on(carry)

@@ -104,10 +104,13 @@ class Members:
             control=control,
             rubbing=None if self._rubbing is None else some(self._rubbing),
         )
+        t0: Any = self._plan.t0
+        if np.ndim(t0):
+            t0 = np.broadcast_to(t0, self._plan.batch).reshape(-1)[index]
         force = None
         if self._force is not None:
             force = np.broadcast_to(some(self._force), (*system.v_shape, *batch))
-        return self._plan._replace(system=taken, batch=batch, force=force)
+        return self._plan._replace(system=taken, batch=batch, t0=t0, force=force)
 
     def numbers(self, index: Any) -> dict[str, Any]:
         """The parameters of these members that are numbers, by name."""

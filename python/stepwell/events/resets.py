@@ -114,12 +114,28 @@ class Resets:
         """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground."""
         numbers = self._run.members.numbers(slice(None))
         for e in self._new_states:
-            begins_there = self._run.quantities[e](t, v, y, numbers) == 0.0
-            self.at[e] = np.where(begins_there, -float(self._run.events[e].direction), 0.0)
+            self.begin_again(e, self._run.quantity(e, t, v, y, numbers), np.ones(self.at.shape[1], dtype=bool))
 
-    def end(self, e: int, member: Whole) -> Any:
-        """Which of these occurrences end a stretch."""
-        return np.ones(len(member), dtype=bool) if e in self._new_states else self._run.ends(e, member)
+    def begin_again(self, e: int, g: Array, which: Any) -> None:
+        """The same of some members, of whom one quantity is known."""
+        if e in self._new_states:
+            there = np.where(g == 0.0, -float(self._run.events[e].direction), 0.0)
+            self.at[e] = np.where(which, there, self.at[e])
+
+    def changes(self, e: int) -> bool:
+        """Whether an event changes the state."""
+        return e in self._new_states
+
+    def new_state(self, e: int, t: Array, v: Array, y: Array, member: Whole, size: Array, side: Array) -> tuple[Array, Array, Array]:
+        """From where these members go on, and the side from which they came if they are at the event still, else 0.
+
+        ``size`` is how large g was at the ends of the step, and ``side`` the sign of g before the event.
+        """
+        numbers, quantity = self._run.members.numbers(member), self._run.quantity
+        there = np.abs(quantity(e, t, v, y, numbers))
+        v, y = self._new_states[e](self._run.sign * t, v, y, numbers)
+        now = np.abs(quantity(e, t, v, y, numbers))
+        return v, y, np.where(now <= np.maximum(AT * there, LEAST_LEFT * size), side, 0.0)
 
     def through(self, stretch: Stretch) -> Arrived:
         """Go through one step of some members, from whole steps of theirs."""
@@ -201,12 +217,12 @@ class Resets:
                 returns[changes.place[again]] = e
             found.append((occurs, changes.place, np.sign(changes.g)))
             sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
-            ends = self.end(e, occurs.member)
+            ends = run.ends(e, occurs.member)
             np.minimum.at(share, changes.place[ends], occurs.share[ends])
         share[returns >= 0] = -np.inf  # nothing happens before
         stops, t, v, y = np.zeros(n, dtype=bool), stretch.t.copy(), stretch.v.copy(), stretch.y.copy()
         for e, (occurs, place, _) in enumerate(found):
-            here = self.end(e, occurs.member) & (occurs.share == share[place])
+            here = run.ends(e, occurs.member) & (occurs.share == share[place])
             t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
             stops[place[here]] |= e not in self._new_states
         at, event = np.zeros_like(stretch.at), np.full(n, -1)
@@ -216,11 +232,9 @@ class Resets:
                 here = (occurs.share == share[place]) & ~stops[place]
                 who = place[here]
                 if len(who):
-                    of_these, quantity = run.members.numbers(stretch.member[who]), run.quantities[e]
-                    there = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
-                    v[..., who], y[..., who] = self._new_states[e](t[who], v[..., who], y[..., who], of_these)
-                    now = np.abs(quantity(t[who], v[..., who], y[..., who], of_these))
-                    at[e, who] = np.where(now <= np.maximum(AT * there, LEAST_LEFT * sizes[e][who]), side[here], 0.0)
+                    v[..., who], y[..., who], at[e, who] = self.new_state(
+                        e, t[who], v[..., who], y[..., who], stretch.member[who], sizes[e][who], side[here]
+                    )
                     event[who] = e
         share[returns >= 0] = np.inf
         return Ahead(share, stops, t, v, y, at, event), returns

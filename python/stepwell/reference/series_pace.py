@@ -92,11 +92,13 @@ def attempt(
     defect = sizes(slope_v - unit * rate_v, slope_y - unit * rate_y, block_axes, groups)
     # Rates that change in a step by their own size change by this in some roundings of the time.
     rounded = sizes(slope_v, slope_y, block_axes, groups) * (TIME_ROUNDING * longer(end, -end) * (1.0 / unit))
-    stays = functools.reduce(operator.and_, at_most(share * defect, allowed + rounded))
+    agrees = functools.reduce(operator.and_, at_most(share * defect, allowed + rounded))
+    stays: Any = None
     v1, y1, work = system.project(v1, y1)
     if branches:
-        stays = stays & on_branches(branches, share, moved)
-    following, goes_on = decided(pace, step, ends, new, stays, 0.5 / moved * unit, outlook.is_extra, outlook.runs)
+        stays = on_branches(branches, share, moved)
+    holds = agrees, stays, 0.5 / moved * unit
+    following, goes_on = decided(pace, (step, ends), new, holds, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
@@ -218,17 +220,22 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
     return (c0 + c1 * x) + x2 * ((c2 + c3 * x) + c4 * x2)
 
 
-def decided(pace: Pace, step: Any, ends: Any, new: Any, stays: Any, tolerable: Any, is_extra: Any, runs: Any) -> tuple[Pace, Any]:
+def decided(
+    pace: Pace, step_ends: tuple[Any, Any], new: Any, holds: tuple[Any, Any, Any], is_extra: Any, runs: Any
+) -> tuple[Pace, Any]:
     """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
 
-    ``stays`` is whether the end agrees with the rates and functions stay on their branch; ``tolerable`` a step that may leave it.
+    The series holds over the step if its end agrees with the rates and if functions stay on their branch, None if it has none,
+    but for a tolerable step, which may leave it since all its motion is tolerated: no shorter one is tried for their sake.
     """
+    (step, ends), (agrees, stays, tolerable) = step_ends, holds
     finite = less(total(new), np.inf)  # NaN is not
     # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
     fits = finite & (ends | less(pace.t, pace.t + 0.25 * step))
-    good = fits & stays
+    good = fits & agrees if stays is None else fits & agrees & stays
     shorter = SHRINK * where(less(step, pace.before), step, pace.before)
-    shorter = where(stays, shorter, longer(shorter, tolerable))
+    if stays is not None:
+        shorter = where(finite & agrees & ~stays, longer(shorter, tolerable), shorter)
     reached = where(ends, pace.wall, pace.t + step)
     passes = less(pace.target, reached)
     takes, holds, fails = runs & good & ~passes, runs & good & passes, runs & ~good

@@ -92,13 +92,9 @@ pub fn attempt<N: Number>(
         defect.into_iter().zip(allowed).map(|(size, allowed)| (share * size).at_most(allowed)).reduce(|all, each| all & each)
     });
     let (new_v, new_y) = projected.project(new_v, new_y);
-    let stays = match (agrees, on_branches(branches, share, moved)) {
-        (Some(agrees), Some(stays)) => Some(agrees & stays),
-        (agrees, stays) => agrees.or(stays),
-    };
-    let tolerable = N::of(0.5) / moved * unit;
+    let (stays, tolerable) = (on_branches(branches, share, moved), N::of(0.5) / moved * unit);
     let (next, longest, took) =
-        decided(&pace, (step, ends), (&scales.longest, &new), (stays, tolerable), outlook.is_extra, outlook.runs);
+        decided(&pace, (step, ends), (&scales.longest, &new), (agrees, stays, tolerable), outlook.is_extra, outlook.runs);
     let next = match projected.tally() {
         Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
         None => next,
@@ -231,13 +227,14 @@ fn furthest<N: Number>(terms: &[Option<N>], share: N, part: impl Fn(N) -> N) -> 
 }
 
 /// What comes after a step, which may end at the wall, the largest sizes so far, and whether the state goes on. `longest` and `new` are the
-/// largest sizes before, and those that the groups would have. `stays`: whether the end agrees with the rates and functions stay on their branch, none if neither is asked;
-/// `tolerable`: a step that may leave it.
+/// largest sizes before, and those that the groups would have. The series holds over the step if its end agrees with the rates and if
+/// functions stay on their branch, none if that is not asked; but for a `tolerable` step, which may leave it since all its motion is
+/// tolerated: no shorter one is tried for their sake.
 fn decided<N: Number>(
     pace: &Pace<N>,
     (step, ends): (N, N::Truth),
     (longest, new): (&[N], &[N]),
-    (stays, tolerable): (Option<N::Truth>, N),
+    (agrees, stays, tolerable): (Option<N::Truth>, Option<N::Truth>, N),
     is_extra: N::Truth,
     runs: N::Truth,
 ) -> (Pace<N>, Vec<N>, N::Truth) {
@@ -245,9 +242,12 @@ fn decided<N: Number>(
     let finite = total(new).below(number(f64::INFINITY)); // NaN is not
     // A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
     let fits = finite & (ends | pace.t.below(pace.t + number(0.25) * step));
-    let good = stays.map_or(fits, |stays| fits & stays);
+    let good = [agrees, stays].into_iter().flatten().fold(fits, |good, each| good & each);
     let shorter = number(SHRINK) * N::choose(step.below(pace.before), step, pace.before);
-    let shorter = stays.map_or(shorter, |stays| N::choose(stays, shorter, longer(shorter, tolerable)));
+    let shorter = stays.map_or(shorter, |stays| {
+        let leaves = agrees.map_or(finite, |agrees| finite & agrees) & !stays;
+        N::choose(leaves, longer(shorter, tolerable), shorter)
+    });
     let reached = N::choose(ends, pace.wall, pace.t + step);
     let passes = pace.target.below(reached);
     let (takes, holds, fails) = (runs & good & !passes, runs & good & passes, runs & !good);

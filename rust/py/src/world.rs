@@ -249,6 +249,21 @@ impl World {
         })
     }
 
+    /// Goes on with this carry, by rows, which belongs to what is in the arrays now.
+    fn carry_on(&self, py: Python<'_>, carry: &Bound<'_, PyAny>) -> PyResult<()> {
+        fn of<T: Of>(py: Python<'_>, Loop { world, arrays, .. }: &mut Loop<T>, carry: &Bound<'_, PyAny>) -> PyResult<()> {
+            let carry: PyReadonlyArray1<'_, T> = carry.extract()?;
+            arrays.with(py, |v, y| {
+                world.carry_on(carry.as_slice()?, v, y);
+                Ok(())
+            })
+        }
+        self.alone(|loops| match loops {
+            Loops::Double(own) => of(py, own, carry),
+            Loops::Single(own) => of(py, own, carry),
+        })
+    }
+
     /// The time at which the world stands.
     #[getter]
     fn t(&self) -> f64 {
