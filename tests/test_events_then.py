@@ -76,7 +76,10 @@ def test_none_of_a_thousand_balls_ends_below_the_ground() -> None:
     assert (np.abs(run.y[-1]) < 1e-12).all()
 
 
+@pytest.mark.filterwarnings("ignore:1 of 12 members came to rest:stepwell.errors.EventWarning")
+@pytest.mark.filterwarnings("ignore:the run came to rest:stepwell.errors.EventWarning")
 def test_members_of_a_batch_have_the_bits_that_they_have_alone_and_by_numpy() -> None:
+    """By False Euler a ball that bounces twice within a step has no speed at the second: y is then h times the speed there."""
     event = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, *, restitution: (-restitution * v, y), name="ground")
     restitution, y = np.linspace(0.7, 1.1, 12), np.linspace(0.3, 2.0, 12)
     steps = {"dt": 0.013, "steps": 90, "every": 9, "events": event}
@@ -156,10 +159,6 @@ def test_what_does_not_go_is_refused_in_words() -> None:
     event = sw.Event(lambda t, v, y: y, then=lambda t, y: y, name="g")
     with pytest.raises(sw.errors.ArgumentError, match=r"events: g: then: expected a function \(t, v, y, \*, …\)"):
         sw.integrate(ball(), "rk4", v=0.0, y=1.0, dt=0.1, steps=3, events=event)
-    with pytest.raises(sw.errors.UnsupportedError, match="with steps chosen by a tolerance no event changes the state"):
-        sw.integrate(ball(), "merson", v=0.0, y=1.0, tolerance=1e-6, at=[1.0], events=ground(0.8))
-    with pytest.raises(sw.errors.UnsupportedError, match="no event changes the state of a world"):
-        sw.World(ball(), "rk4", v=np.zeros(1), y=np.ones(1), dt=0.1, events=ground(0.8))
 
 
 def test_mistake_an_event_that_leaves_the_state_as_it_is_is_noticed() -> None:

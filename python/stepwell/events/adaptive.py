@@ -18,10 +18,10 @@ from ..reference.adaptive import sizes
 from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
-from .collected import Collected, Stops
+from .collected import AT_START, Collected, Stops
 from .event import Event
 from .parts import Changes
-from .resets import LARGEST_RATIO, SETTLED, Resets, warn_of_rest
+from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets, warn_of_rest
 from .trials import AdaptiveTrials
 
 #: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
@@ -222,7 +222,7 @@ class _Resetting(_Driver):
     def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
         super().__init__(plan, events, pacing)
         self._resets, total = Resets(self), plan.members
-        #: When the part of each member began, in which state, how long the part before it lasted, over how long the one before that.
+        #: When the part of each member began and in which state, how long the one before lasted, over how long that before it.
         self._start, self._flight, self._ratio = (np.full(total, np.nan) for _ in range(3))
         self._state = tuple(np.full_like(each, np.nan) for each in self.stop_state)
         self._longest = np.zeros((engine.groups_of(plan), total))
@@ -280,7 +280,8 @@ class _Resetting(_Driver):
         """Which of these members go on from another state: those that no terminal event stopped."""
         ends = self._sides[:, index] != 0.0
         changes = np.array([self._resets.changes(e) for e in range(len(self.events))])
-        return index[ends.any(axis=0) & ~ends[~changes].any(axis=0)]
+        on: Whole = index[ends.any(axis=0) & ~ends[~changes].any(axis=0)]
+        return on
 
     def _go_on_anew(self, index: Whole) -> None:
         """Change the states of these members, from which they go on or in which they are at rest."""
@@ -335,13 +336,28 @@ class _Resetting(_Driver):
                 each |= first & (at[e] != 0.0)
 
     def parts(self, e: int, steps: Changes) -> Changes:
-        return self.within(e, steps, np.where(steps.t == self._start[steps.member], self._resets.at[e, steps.member], 0.0))[0]
+        parts, stuck = self.within(e, steps, self._side(e, steps))
+        soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
+        if not len(stuck) and not soon.any():
+            return parts
+        # A member that returns in no time is at the event where its step begins, and nothing else happens to it before.
+        back = (steps.some(stuck), parts.some(soon))
+        there = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(*back, strict=True)))
+        none = np.zeros(len(there.t))
+        there = there._replace(low=none, high=none + AT_START, g=self._side(e, there), v_end=there.v, y_end=there.y)
+        parts = parts.some(~soon)
+        together = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(there, parts, strict=True)))
+        return together.some(np.lexsort((together.high, together.row, together.place)))
+
+    def _side(self, e: int, steps: Changes) -> Array:
+        """From which side members came that are at an event where their steps begin, since it changed the state; else 0."""
+        return np.where(steps.t == self._start[steps.member], self._resets.at[e, steps.member], 0.0)
 
     def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
         self._sides[:, member], self._sizes[:, member] = stops.side[:, place], stops.size[:, place]
         plan = self.plan
-        states = (np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), plan.block_axes, strict=True))
-        so_far = np.maximum.accumulate(sizes(*states, plan.block_axes, plan.acceptance.groups), axis=1)
+        v, y = (np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), plan.block_axes, strict=True))
+        so_far = np.maximum.accumulate(sizes(v, y, plan.block_axes, plan.acceptance.groups), axis=1)
         self._longest[:, member] = np.maximum(longest[:, place], so_far[:, row, place])
 
     def tell_of_rest(self, run: Any) -> None:

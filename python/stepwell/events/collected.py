@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import engine
 from .._checks import Array
-from ..reference.events import Parts, located, may_change, parted
+from ..reference.events import LEAST_SHARE, Parts, located, may_change, parted
 from ..reference.types import Whole
 from .event import Event
 from .members import Members
@@ -26,6 +26,9 @@ LEAST_SLOPE = float(np.finfo(float).tiny)
 #: A slope towards the other side is none, if it is less than this share of that at the end of the step: what a bounce without
 #: speed leaves of it.
 NO_SLOPE = 2.0**-24
+
+#: The share of a step that stands for its start: there is nothing to locate.
+AT_START = LEAST_SHARE
 
 #: Makes what is known of one event in these whole steps of these members, which are counted among those that are looked at.
 Known = Callable[[int, Whole, Whole], Changes]
@@ -167,7 +170,8 @@ class Collected:
             side[e, who], size[e, who] = np.sign(changes.g[first]), np.maximum(np.abs(changes.g), np.abs(changes.g_end))[first]
             end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
         for e, (each, changes) in enumerate(in_last):
-            self.note(e, each.some(each.share <= end[changes.place]))  # what comes after the end of a member is not there
+            # What comes after the end of a member is not there; and one that lies at its start did not come to it.
+            self.note(e, each.some((each.share <= end[changes.place]) & (each.share > AT_START)))
         self.stopped_at[index[stops]] = times[stops]
         return Stops(stops, last, times, v, y, side, size)
 
@@ -202,7 +206,7 @@ class Collected:
 
         ends = changes.low, changes.high, changes.g, changes.g_end
         share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
-        return Found(member, changes.step, share, t + share * length, v, y)
+        return Found(member, changes.step, share, t + np.where(share > AT_START, share, 0.0) * length, v, y)
 
     def stops(self) -> Array | None:
         """When a terminal event stopped each member; None without such events."""

@@ -59,9 +59,7 @@ class Frames(Collected):
         self.clear()
         self._told = None
         g = self._quantities(self._loop.step_number)
-        self.before[:] = np.nan
-        if self._resets is not None:
-            self._taken_up(self._resets, g)
+        self._taken_up(g)
         for _ in range(n):
             step, before = self._loop.step_number, [each.copy() for each in self._blocks]
             self._loop.step(1)
@@ -73,20 +71,24 @@ class Frames(Collected):
                 g = after
         for e in range(len(self.events)):
             self.locate_waiting(e)
-        if self._resets is not None:
-            self._left = [each.copy() for each in self._blocks], g
+        self._left = [each.copy() for each in self._blocks], g
 
-    def _taken_up(self, resets: Resets, g: list[Array]) -> None:
-        """At which events members are: as the last call left them, but for those that the user has moved since."""
+    def _taken_up(self, g: list[Array]) -> None:
+        """What is known of members from the last call, but for those that the user has moved since."""
         if self._left is None:
-            t: Any = np.array(self.plan.t0 + self._loop.step_number * self.plan.dt)
-            resets.begin(t, *self._flat(self._blocks))
+            if self._resets is not None:
+                t: Any = np.array(self.plan.t0 + self._loop.step_number * self.plan.dt)
+                self._resets.begin(t, *self._flat(self._blocks))
             return
         blocks, last = self._left
+        moved = np.zeros(len(self._all), dtype=bool)
         for now, then in zip(self._flat(self._blocks), self._flat(blocks), strict=True):
-            self._rests &= (now == then).all(axis=tuple(range(now.ndim - 1)))
-        for e, (now, then) in enumerate(zip(g, last, strict=True)):
-            resets.begin_again(e, now, now != then)
+            moved |= (now != then).any(axis=tuple(range(now.ndim - 1)))
+        self.before[:, moved] = np.nan
+        self._rests &= ~moved
+        if self._resets is not None:
+            for e, (here, there) in enumerate(zip(g, last, strict=True)):
+                self._resets.begin_again(e, here, here != there)
 
     @property
     def told(self) -> dict[str, Occurrences]:
@@ -139,8 +141,9 @@ class Frames(Collected):
         if not lying.all():
             moves = index[~lying]
             begin, end = np.full(len(moves), t), self.plan.t0 + (step + 1) * self.plan.dt
-            both = (each[..., moves] for each in states)
-            arrived = self._resets.through(Stretch(moves, np.full(len(moves), step), begin, end - begin, *both, self._resets.at[:, moves]))
+            v_now, y_now, v_end, y_end = (each[..., moves] for each in states)
+            steps, at = np.full(len(moves), step), self._resets.at[:, moves]
+            arrived = self._resets.through(Stretch(moves, steps, begin, end - begin, v_now, y_now, v_end, y_end, at))
             v[..., ~lying], y[..., ~lying] = arrived.v, arrived.y
             self._resets.at[:, moves], self._rests[moves] = arrived.at, arrived.rests >= 0
         self._write(step + 1, index, v, y)

@@ -126,7 +126,9 @@ class Resets:
         """Whether an event changes the state."""
         return e in self._new_states
 
-    def new_state(self, e: int, t: Array, v: Array, y: Array, member: Whole, size: Array, side: Array) -> tuple[Array, Array, Array]:
+    def new_state(
+        self, e: int, t: Array, v: Array, y: Array, member: Whole, size: Array, side: Array
+    ) -> tuple[Array, Array, Array]:
         """From where these members go on, and the side from which they came if they are at the event still, else 0.
 
         ``size`` is how large g was at the ends of the step, and ``side`` the sign of g before the event.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..events import Event
 from ..method_records import method as find_method
 from ..systems import System
 from .axes import Grid
@@ -33,7 +34,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     renamed = {"t": "saved"} if grid.of_dt else {}
     if task.kinds(History):
         coords["t"] = _times(task, grid, renamed, units)
-    told = {
+    told: dict[str, Any] = {
         "stepwell": str(_core.__version__),
         "system": system.kind_name,
         "method": task.method,
@@ -46,6 +47,8 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
         "given": {name: _digest(value) for name, value in task.given.items() if name != "threads"},
         "first steps": bits,
     }
+    if "events" in task.given:
+        told["given"]["events"] = [_told(each) for each in task.given["events"]]
     if task.at is not None:
         told["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
@@ -104,6 +107,8 @@ def _digest(value: Any) -> str:
 
 def _told(value: Any) -> Any:
     """An outcome in words that are the same in every process; a function by its name and its instructions."""
+    if isinstance(value, Event):
+        return {name: _told(part) for name, part in vars(value).items()}
     if isinstance(value, Outcome):
         return {"kind": type(value).__name__, **{name: _told(each) for name, each in vars(value).items()}}
     if isinstance(value, partial):
@@ -115,4 +120,4 @@ def _told(value: Any) -> Any:
         return f"{value.__qualname__} {digest.hexdigest()}"
     if callable(value):
         return getattr(value, "__qualname__", type(value).__qualname__)
-    return list(value) if isinstance(value, tuple) else value
+    return [_told(each) for each in value] if isinstance(value, tuple) else value

@@ -16,7 +16,7 @@ from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeErr
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..systems import System
-from . import adaptive
+from . import adaptive, happenings
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
 from .axes import grid as a_grid
@@ -77,6 +77,7 @@ def sweep(
     positive: Any = None,
     control: AnyControl | None = None,
     force: Any = None,
+    events: Any = None,
     fused: bool = False,
     dtype: Any = "float64",
     t0: float = 0.0,
@@ -126,6 +127,10 @@ def sweep(
         positive: with a tolerance, the components that must not become negative, as for ``integrate``.
         control: as for ``integrate``, the same for all members.
         force: likewise.
+        events: what is located of each member, as for ``integrate``; an event may stop a member, or change its state. Of an event
+            ``ground`` there are ``ground_count``, how many there were, and ``ground_t``, the time of the first, NaN without one;
+            ``stopped_at`` is when an event stopped a member. All states that reductions see are then in memory at once. Not with
+            ``transient`` or "lyapunov".
         fused: likewise.
         dtype: ``"float64"`` or ``"float32"``, in which steps are made, as for ``integrate``. In float32 states are float32 and
             what is found of them is computed in float64; a dt is rounded to float32. With fixed steps only.
@@ -176,6 +181,9 @@ def sweep(
         given["dtype"] = "float32"
     every = None if every is None else _checks.count("every", every, 1)
     kept_of_each = _outcomes(outcomes, every)
+    if events is not None:
+        located = happenings.events_of(events, kept_of_each, transient)
+        given["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
     times = None
     if paced:
         others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start, "force": force}
@@ -333,7 +341,7 @@ class _Tally:
         self.doubts: dict[int, str] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
-        status = done.found["status"].values
+        status = np.where(np.isin(done.found["status"].values, happenings.EVENTS), 0, done.found["status"].values)
         self.members += chunk.members
         if status.any():
             self.bad += int(np.count_nonzero(status))

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import _checks, _core
 from .._checks import Array
-from ..errors import AccuracyWarning, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
+from ..errors import AccuracyWarning, DivergenceWarning, EventWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integration import integrate
 from ..result import Run
 from ..systems import System
@@ -97,6 +97,10 @@ class Task(NamedTuple):
         if self.at is not None:
             saved = self.at.size
             numbers += NUMBERS_OF_A_CONTROLLER
+        if "events" in self.given:  # whose run is one piece
+            observed = 1 if self.between is None else self.steps // self.between + 2
+            numbers += COPIES_OF_A_STATE * state * (observed if self.at is None else saved)
+            numbers += sum((3 + state) * each.most for each in self.given["events"])
         if self.kinds(History) or self.kinds(Function):
             numbers += 2 * saved * state
         for each in self.kinds(Exponents):
@@ -233,15 +237,18 @@ def _pieces(
 ) -> Iterator[Run]:
     """So many steps in pieces; a piece ends where a state is saved."""
     length = max(1, MAX_STEPS_OF_MEMBERS // members)
-    if between is not None:
+    if "events" in start:  # a member that an event stopped does not go on
+        length = steps
+    elif between is not None:
         length = between * max(1, min(length // between, task.states_at_once(system, members) - 1))
     done, going_on = 0, start
     while done < steps:
         _stop(stopped)
         made = integrate(system, task.method, steps=min(length, steps - done), every=between, **going_on)
         _as_many(made, members)
-        going_on = _going_on(start, made)
         done += made.steps
+        if done < steps:
+            going_on = _going_on(start, made)
         yield made
 
 
@@ -250,13 +257,14 @@ def _pieces_between_times(
 ) -> Iterator[Run]:
     """A run with a tolerance in pieces, each of some of its times; its steps do not depend on them."""
     assert task.at is not None
-    length = task.states_at_once(system, members)
+    length = task.at.size if "events" in start else task.states_at_once(system, members)
     going_on = start
     for first in range(0, task.at.size, length):
         _stop(stopped)
         made = integrate(system, task.method, at=task.at[first : first + length], **going_on)
         _as_many(made, members)
-        going_on = _going_on(start, made)
+        if first + length < task.at.size:
+            going_on = _going_on(start, made)
         yield made
 
 
@@ -351,6 +359,7 @@ def _quiet() -> Iterator[None]:
             warnings.simplefilter("ignore", DivergenceWarning)
             warnings.simplefilter("ignore", AccuracyWarning)
             warnings.simplefilter("ignore", ToleranceWarning)
+            warnings.simplefilter("ignore", EventWarning)
     try:
         yield
     finally:
