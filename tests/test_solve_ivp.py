@@ -416,9 +416,21 @@ def test_steps_can_be_limited() -> None:
     first = sw.solve_ivp(decay, (0, 10), [1.0], first_step=0.3)
     assert first.t[1] == 0.3
     assert sw.solve_ivp(decay, (0, 10), [1.0], first_step=5.0, max_step=0.5).t[1] == 0.5
-    narrow = event(lambda t, y: (y[0] - np.exp(-1.0)) * (y[0] - np.exp(-1.01)))  # two zeros, at t = 2 and 2.02
-    assert len(sw.solve_ivp(decay, (0, 10), [1.0], events=narrow, rtol=1e-8).t_events[0]) == 0
-    assert len(sw.solve_ivp(decay, (0, 10), [1.0], events=narrow, rtol=1e-8, max_step=0.01).t_events[0]) == 2
+
+
+def test_two_zeros_within_a_step_are_found() -> None:
+    """At t = 2 and 2.02, in steps of 1; three of a polynomial, of which SciPy sees one; in the direction that is asked for."""
+    narrow = event(lambda t, y: (y[0] - np.exp(-1.0)) * (y[0] - np.exp(-1.01)))
+    for method in ("merson", "dop853", "fehlberg_5"):
+        run = sw.solve_ivp(decay, (0, 10), [1.0], events=narrow, rtol=1e-8, method=method)
+        np.testing.assert_allclose(run.t_events[0], [2.0, 2.02], rtol=0, atol=1e-5)
+        cubic = sw.solve_ivp(lambda t, y: [3 * t * t + 12 * t - 4], (-8, 4), [-120.0], method=method, events=lambda t, y: y[0])
+        np.testing.assert_allclose(cubic.t_events[0], [-6.0, -2.0, 2.0], rtol=0, atol=1e-9)
+        back = sw.solve_ivp(lambda t, y: [3 * t * t + 12 * t - 4], (4, -8), [120.0], method=method, events=lambda t, y: y[0])
+        np.testing.assert_allclose(back.t_events[0], [2.0, -2.0, -6.0], rtol=0, atol=1e-9)
+    falling = event(lambda t, y: y[0], direction=-1.0)
+    run = sw.solve_ivp(lambda t, y: [3 * t * t + 12 * t - 4], (-8, 4), [-120.0], events=falling)
+    np.testing.assert_allclose(run.t_events[0], [-2.0], rtol=0, atol=1e-9)
 
 
 def test_a_state_that_ends_is_told() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from .. import _checks
 from .._checks import Array
 from ..errors import DTypeError
+from ..reference.events import REACH, Parts, parted
 from .ivp_function import takes
 
 #: A zero is located to four roundings of its time, or of the time since the start of its step, whichever are more.
@@ -17,6 +18,9 @@ ROOT_TOLERANCE = 4.0 * np.finfo(float).eps
 
 #: Shorter brackets have no roundings of their own.
 LEAST = float(np.finfo(float).tiny)
+
+#: The share of a step over which an event function's slope is taken: its roundings, over this, are half of the digits.
+SHORT = 2.0**-26
 
 #: The most values of an event function for one zero; bisection alone needs fewer than this many for any interval of floats.
 MAX_VALUES = 2200
@@ -104,20 +108,54 @@ def root(g: Callable[[float], float], a: float, b: float, g_a: float, g_b: float
     return b
 
 
+def _parts(
+    g: Callable[[float], float], span: tuple[float, float], before: float, g_a: float, g_b: float
+) -> list[tuple[float, float, float, float]]:
+    """The parts of a step in which an event function has one zero: their times, and its values there.
+
+    That is the step itself, unless the function bends so much against the step before that it may have others.
+    """
+    begin, end = span
+    h = end - begin
+    whole = [(begin, end, g_a, g_b)]
+    if g_a == 0.0 or g_b == 0.0 or min(abs(g_a), abs(g_b)) > REACH * abs((g_b - g_a) - (g_a - before)):
+        return whole
+
+    def slope(share: float, value: float) -> float:
+        way = SHORT if share < 0.5 else -SHORT
+        return (g(begin + (share + way) * h) - value) / way
+
+    def look(_: Any, shares: Array) -> tuple[Array, Array, Array, Array]:
+        values = [g(begin + share * h) for share in shares.tolist()]
+        slopes = [slope(share, value) for share, value in zip(shares.tolist(), values, strict=True)]
+        return np.array(values), np.array(slopes), shares, shares
+
+    ends = [np.array([each]) for each in (0.0, 1.0, g_a, g_b, slope(0.0, g_a), slope(1.0, g_b), 0.0, 0.0)]
+    parts, _ = parted(look, Parts(np.zeros(1, dtype=np.int64), *ends))
+    if len(parts.of) < 2:
+        return whole
+    times = (begin + parts.low * h).tolist(), (begin + parts.high * h).tolist()
+    return list(zip(*times, parts.g_low.tolist(), parts.g_high.tolist(), strict=True))
+
+
 def found(
-    events: list[Event], values: list[float], after: list[float], state: Callable[[float], Array], span: Any
+    events: list[Event], values: list[list[float]], state: Callable[[float], Array], span: tuple[float, float]
 ) -> float | None:
     """Note the events of a step that goes over ``span``; the time at which the run ends by one of them, or None.
 
-    ``values`` are those of the event functions at its start, ``after`` those at its end, and ``state`` gives the state at a time
-    within it.
+    ``values`` are those of the event functions where the step before began, NaN at first, where this one begins, and where it
+    ends; ``state`` gives the state at a time within it.
     """
     begin, end = span
     zeros = []
-    for event, g_a, g_b in zip(events, values, after, strict=True):
-        if event.occurs(g_a, g_b):
-            t = root(lambda at, event=event: event.value(at, state(at)), begin, end, g_a, g_b)  # type: ignore[misc]
-            zeros.append((t, event))
+    for event, before, g_a, g_b in zip(events, *values, strict=True):
+
+        def g(at: float, event: Event = event) -> float:
+            return event.value(at, state(at))
+
+        for low, high, g_low, g_high in _parts(g, span, before, g_a, g_b):
+            if event.occurs(g_low, g_high):
+                zeros.append((root(g, low, high, g_low, g_high), event))
     zeros.sort(key=lambda each: each[0] if end > begin else -each[0])
     for t, event in zeros:
         event.count += 1

@@ -108,8 +108,8 @@ def solve_ivp(
         events: a function ``event(t, y, *args)`` or a list of them. It is called with numbers, at the end of each step; if its
             sign differs from that at the start, the zero between is found, to 4 roundings of the time. Attributes as in SciPy:
             ``event.terminal = True`` ends the run at the first zero, and a number at so many; ``event.direction`` above zero
-            counts zeros where the function grows, below zero where it falls. Two zeros within one step are not seen; ``max_step``
-            helps.
+            counts zeros where the function grows, below zero where it falls. Two zeros within one step are found where values and
+            slopes at its ends tell of them; for a function that does more than a cubic within a step, ``max_step`` helps.
         vectorized: whether ``fun`` expects the state as a column, shape (n, 1).
         args: a tuple of further arguments of ``fun`` and of the events.
         first_step: the step to try first; None for a hundredth of the time in which the state changes at the start.
@@ -188,14 +188,15 @@ def solve_ivp(
 def _advanced(trajectory: Trajectory, events: list[Event] | None, sign: float) -> float | None:
     """Make all steps, and note events; the time at which one of them ended the run, or None."""
     events = events or []
+    before = [float("nan") for _ in events]
     values = [event.value(sign * trajectory.times[0], trajectory.states[0]) for event in events]
     while trajectory.advance():
         if not events:
             continue
         span = sign * trajectory.times[-2], sign * trajectory.times[-1]
         after = [event.value(span[1], trajectory.states[-1]) for event in events]
-        ended = found(events, values, after, lambda t: trajectory.state(sign * t), span)
-        values = after
+        ended = found(events, [before, values, after], lambda t: trajectory.state(sign * t), span)
+        before, values = values, after
         if ended is not None:
             last = trajectory.state(sign * ended)
             trajectory.times[-1], trajectory.states[-1] = sign * ended, last
