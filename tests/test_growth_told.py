@@ -97,3 +97,20 @@ def test_what_grows_by_itself_or_not_at_all_is_not_told(system: sw.System, given
 def shapes(system: sw.System, given: dict[str, Any]) -> list[tuple[str, Any]]:
     sized = system.sized(given.get("v"), given["y"])
     return [(name, shape) for name, shape in (("v", sized.v_shape), ("y", sized.y_shape)) if name in given]
+
+
+SQUARES = [
+    (1.0, 700, "float64"),
+    (1e-200, 20, "float64"),
+    (1e-200, 700, "float64"),
+    (1.0, 60, "float32"),
+    (1e-30, 150, "float32"),
+]
+
+
+@pytest.mark.parametrize(("start", "steps", "dtype"), SQUARES)
+def test_lengths_whose_squares_are_no_floats_are_told_too(start: float, steps: int, dtype: str) -> None:
+    """By Runge-Kutta 4 with hω = 3.2 a state grows 2.27-fold in a step: 10²⁴⁹ is a float64, and its square is none."""
+    with pytest.warns(sw.AccuracyWarning, match=r"the run grew \de\+\d+-fold in \d+ steps"):
+        run = sw.integrate(sw.Oscillator(1.0), "rk4", v=0.0, y=start, dt=3.2, steps=steps, dtype=dtype)
+    assert run.status == sw.Status.OK

@@ -18,6 +18,9 @@ from .systems import NBody, System
 #: A state that is so many times as long as at the start is looked at; from rest, so many units long.
 GROWN = 1e6
 
+#: Lengths between this and its reciprocal have squares with all of their digits.
+SQUARABLE = 1e-140
+
 #: The step explains growth if its eigenvalues make at least this share of its logarithm, and those of the rates at most that.
 BY_STEPS, BY_MOTION = 0.5, 0.25
 
@@ -34,11 +37,20 @@ FIRST_LOOK, LAST_LOOK = 8, 16_384
 
 def lengths(system: System, v: Array, y: Array) -> Array:
     """The length of each member's state, both blocks together, shape (*batch)."""
+    axes = tuple(range(len(system.v_shape))), tuple(range(len(system.y_shape)))
+    v, y = (np.asarray(block, dtype=np.float64) for block in (v, y))
     with np.errstate(all="ignore"):
         if v.ndim == len(system.v_shape) and y.ndim == len(system.y_shape):
-            return np.asarray(np.sqrt(np.vdot(v, v) + np.vdot(y, y)))  # of one member, ten times as fast
-        axes = tuple(range(len(system.v_shape))), tuple(range(len(system.y_shape)))
-        return np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
+            length = np.asarray(np.sqrt(np.vdot(v, v) + np.vdot(y, y)))  # of one member, ten times as fast
+        else:
+            length = np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
+        if (SQUARABLE < length).all() and (length < 1.0 / SQUARABLE).all():
+            return length
+        # Squares beyond what a float has.
+        unit = np.maximum(*(np.abs(block).max(axis=own, initial=0.0) for block, own in zip((v, y), axes, strict=True)))
+        unit = np.where((unit > 0.0) & (unit < np.inf), unit, 1.0)
+        squares = (((block / unit) ** 2).sum(axis=own) for block, own in zip((v, y), axes, strict=True))
+        return np.asarray(unit * np.sqrt(sum(squares)))
 
 
 def text_of(
@@ -57,8 +69,8 @@ def text_of(
         after: and at the end.
     """
     with np.errstate(all="ignore"):
-        growth = after / np.where(before > 0.0, before, 1.0)
-        many = np.isfinite(after) & (growth > GROWN)
+        grown = np.log(after) - np.log(np.where(before > 0.0, before, 1.0))  # the quotient may be no float
+        many = np.isfinite(after) & (grown > math.log(GROWN))
     if not many.any() or system.contacts or system.rubbing is not None or isinstance(system, NBody):
         return None
     index = tuple(np.argwhere(many)[0].tolist())
@@ -66,15 +78,22 @@ def text_of(
         radius, rate = _eigenvalues(system, method, dt, t, start, many.shape, index) or (0.0, 0.0)
     except UnsupportedError:
         return None
-    told, made = math.log(float(growth[index])), steps * math.log(max(radius, 1.0))
+    told, made = float(grown[index]), steps * math.log(max(radius, 1.0))
     if not (made >= BY_STEPS * told and rate * dt * steps <= BY_MOTION * told):
         return None
     some = int(np.count_nonzero(many))
     return (
-        f"{share(some, many.shape, many.size)} grew {math.exp(min(told, 700.0)):.0e}-fold in {steps} steps"
+        f"{share(some, many.shape, many.size)} grew {_power_of_ten(told)}-fold in {steps} steps"
         f"{first_of(some, index, many.size)}: each step of {dt:g} by {method.name} multiplies a disturbance of the start by "
         f"{radius:.4g}, and the motion itself does not grow; {_limit(system, method, dt, t, start, index)}"
     )
+
+
+def _power_of_ten(logarithm: float) -> str:
+    """A number, as 3e+52, of its natural logarithm; it may be beyond the floats."""
+    exponent, rest = divmod(logarithm / math.log(10.0), 1.0)
+    digit = round(10.0**rest)
+    return f"{digit}e+{int(exponent):02d}" if digit < 10 else f"1e+{int(exponent) + 1:02d}"
 
 
 def _eigenvalues(
@@ -129,7 +148,8 @@ def warn_of(run: Any, start: tuple[Array, Array] | None) -> None:
         return
     ends = run.v[-1], run.y[-1]
     begun, ended = _square(start[0]) + _square(start[1]), _square(ends[0]) + _square(ends[1])
-    if ended * ends[1].size <= GROWN * GROWN * begun * start[1].size:
+    tame = ended * ends[1].size <= GROWN * GROWN * begun * start[1].size
+    if tame and (begun > SQUARABLE**2 or not any(block.any() for block in ends)):
         return
     v, y = (np.broadcast_to(block, end.shape) for block, end in zip(start, ends, strict=True))
     before, after = (lengths(run.system, *blocks) for blocks in ((v, y), ends))
