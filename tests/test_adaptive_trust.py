@@ -436,3 +436,32 @@ def test_equal_bits_of_a_batch_with_two_blocks(method: str) -> None:
     assert np.array_equal(runs[0].y, runs[1].y)
     assert runs[0].paces is not None
     assert runs[0].paces.accepted[0] < 100
+
+
+@sw.system(order=1)
+def adds(t: Any, y: Any, *, u: float = 0.0) -> Any:
+    """ẏ = u."""
+    return u + 0.0 * y
+
+
+@pytest.mark.parametrize("start", [0.0, -2.5, 1e4])
+@pytest.mark.parametrize("interval", [1.0, 0.1, 1e-7, 3e5])
+@pytest.mark.parametrize("method", PAIRS)
+def test_steps_end_where_held_samples_change(method: str, interval: float, start: float) -> None:
+    """The integral of held samples, forward and back: no step sees two of them, and none is rejected.
+
+    Bound: a sample begins some 2⁻⁴⁴ of the time since the first early (HOLD_SLACK), and within four roundings of a time of that.
+    """
+    if interval < 1e-9 * start:
+        pytest.skip("samples are shorter than the roundings of their times are allowed to be")
+    values = np.array([0.0, 1.0, -2.0, 3.0, 4.0, -1.0])
+    u, times = sw.Sampled(values, interval=interval, start=start), start + interval * np.arange(6)
+    sums = interval * np.concatenate([[0.0], np.cumsum(values[:-1])])
+    bound = 4.0 * 8.0 * (2.0**-44 * 5.0 * interval + 16.0 * np.spacing(abs(start) + 5.0 * interval))
+    forward = sw.integrate(adds(u=u), method, y=0.0, t0=start, tolerance=1e-9, at=times)
+    np.testing.assert_allclose(forward.y, sums, rtol=0, atol=bound)
+    back = sw.integrate(adds(u=u), method, y=sums[-1], t0=times[-1], tolerance=1e-9, at=times[::-1])
+    np.testing.assert_allclose(back.y, sums[::-1], rtol=0, atol=bound)
+    for run in (forward, back):
+        assert run.paces is not None
+        assert run.paces.rejected == 0

@@ -350,3 +350,12 @@ def test_no_warning_is_hidden_by_these_tests() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sweep()
+
+
+@pytest.mark.parametrize("omega", [1.0, 1e13, 1e40, 1e-20])
+@pytest.mark.parametrize("method", [method.name for method in sw.methods() if method.error_order is not None])
+def test_events_are_located_in_any_unit_of_time(method: str, omega: float) -> None:
+    """cos ωt passes zero at odd quarters of its period."""
+    zero = sw.Event(lambda t, v, y: y, name="zero")
+    run = sw.integrate(sw.Oscillator(omega), method, v=0.0, y=1.0, tolerance=1e-10, at=[10.0 / omega], events=zero)
+    np.testing.assert_allclose(run.events["zero"].t * omega / np.pi, [0.5, 1.5, 2.5], rtol=1e-8)

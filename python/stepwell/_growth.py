@@ -44,7 +44,7 @@ def lengths(system: System, v: Array, y: Array) -> Array:
             length = np.asarray(np.sqrt(np.vdot(v, v) + np.vdot(y, y)))  # of one member, ten times as fast
         else:
             length = np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
-        if (SQUARABLE < length).all() and (length < 1.0 / SQUARABLE).all():
+        if (length > SQUARABLE).all() and (length < 1.0 / SQUARABLE).all():
             return length
         # Squares beyond what a float has.
         unit = np.maximum(*(np.abs(block).max(axis=own, initial=0.0) for block, own in zip((v, y), axes, strict=True)))

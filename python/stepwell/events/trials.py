@@ -9,9 +9,9 @@ import numpy as np
 from .. import _core, engine
 from .._checks import Array
 from ..reference import contact, series_pace, tableau
-from ..reference.adaptive import Attempted
+from ..reference.adaptive import Attempted, longer
 from ..reference.replayed import Operations
-from ..reference.series import coefficients
+from ..reference.series import expanded
 from ..reference.signal import of_slot, over
 from ..reference.traced import Tracer
 from ..systems.own import OwnSystem
@@ -22,6 +22,8 @@ MOST_OPERATIONS = 4000
 #: Steps of up to so many members are made by the core, one after the other: NumPy's calls take as long for one member as for some
 #: hundred.
 MEMBERS_BY_CORE = 6
+#: Shorter units of time have a reciprocal that is no float.
+LEAST_UNIT = 2.0**-1000
 #: So many members of a plan are kept, each as a plan of its own.
 KEPT_PLANS = 256
 
@@ -197,8 +199,9 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
     """A step of a method with adaptive steps, of a length that is given."""
     steps: Any = plan.method.steps
     if plan.method.has_series:
-        terms = coefficients(system.s, plan.order or steps.ORDER, t, 1.0, v, y)
-        v, y = (series_pace.value(start, [term[i] for term in terms], h) for i, start in enumerate((v, y)))
+        unit = longer(series_pace.unit_of(h), LEAST_UNIT)
+        terms, share = expanded(system.s, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
+        v, y = (series_pace.value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     else:
         v, y = tableau.plus(v, y, steps.WEIGHTS, steps.stages(system.rates(h), t, h, v, y))
     v, y, _ = system.project(v, y)

@@ -321,7 +321,7 @@ class System(Fixed, Value, ABC):
         return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
 
     def jumps(self, begin: float, end: float) -> Array:
-        """When its inputs or their derivatives jump, after ``begin`` and before ``end``: ascending, each time once."""
+        """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
         return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
 
     def over_steps(self, method: Method, t0: float, dt: float) -> Self:

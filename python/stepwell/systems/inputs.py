@@ -11,7 +11,7 @@ from .._brief import brief
 from .._checks import Array, Shape
 from .._value import Fixed, Value
 from ..errors import ArgumentError, ShapeError
-from ..reference.signal import Constant, Curve, Held, Sine, Stepped
+from ..reference.signal import HOLD_SLACK, Constant, Curve, Held, Sine, Stepped
 
 if TYPE_CHECKING:
     from .._words import Interpolation
@@ -128,18 +128,18 @@ class Sampled(Fixed, Value):
         return np.asarray(self.start + self.interval * np.arange(len(self.values)), np.float64)
 
     def jumps(self, begin: float, end: float) -> Array:
-        """When the input or its first derivatives jump, after ``begin`` and before ``end``, ascending.
+        """When the input or its first derivatives jump, from ``begin`` to ``end``, ascending.
 
-        Held samples jump where a sample differs from the one before it. Curves have a kink where the slope changes (linear) or a
-        jump of the second derivative (cubic), at each sample.
+        Held samples jump where a sample differs from the one before it, some roundings early. Curves have a kink where the slope
+        changes (linear) or a jump of the second derivative (cubic), at each sample.
         """
         times: Array = self.times
         if self.constant:
             return np.empty(0)
         if self.interpolation == "hold":
             changes = (self.values[1:] != self.values[:-1]).reshape(len(times) - 1, -1).any(axis=1)
-            times = times[1:][changes]
-        return times[(begin < times) & (times < end)]
+            times = self.start + (self.interval * np.arange(1, len(times))[changes]) / HOLD_SLACK
+        return times[(begin <= times) & (times <= end)]
 
     def over_steps(self, first: float, dt: float) -> Sampled:
         """The means over steps from ``first`` on in place of held samples of which a step has several; else itself."""
