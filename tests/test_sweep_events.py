@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ def test_chunks_processes_and_stores_have_the_same_bits(steps: dict[str, Any], t
     expected = bits()
     assert bits(chunk=4, threads=2) == expected
     assert bits(chunk=9, store=tmp_path / "sweep.zarr") == expected
-    with ProcessPoolExecutor(1) as pool:
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert bits(chunk=9, engine=pool) == expected
 
 

@@ -37,7 +37,7 @@ def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple
     if transient is not None:
         raise UnsupportedError(
             "transient: goes without events=, since a member that an event stops in it has nothing that could be observed; make "
-            "them steps, and let outcomes look at what is later"
+            "them steps, and choose what is later in a function of the run"
         )
     if any(isinstance(each, Exponents) for each in outcomes):
         raise UnsupportedError(
