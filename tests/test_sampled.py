@@ -222,16 +222,19 @@ def test_smooth_inputs_keep_the_order_of_a_method() -> None:
 
 
 def test_jumps() -> None:
+    """Held samples begin early by 2⁻⁴⁴ of the time since the first, as where they are looked up (HOLD_SLACK)."""
     held = sw.Sampled([0.0, 0.0, 1.0, 1.0, -1.0], 0.5, 1.0)
-    np.testing.assert_array_equal(held.jumps(0.0, 9.0), [2.0, 3.0])
-    np.testing.assert_array_equal(held.jumps(2.0, 3.0), [])
+    begin = [1.0 + 1.0 / signal.HOLD_SLACK, 1.0 + 2.0 / signal.HOLD_SLACK]
+    np.testing.assert_array_equal(held.jumps(0.0, 9.0), begin)
+    np.testing.assert_array_equal(held.jumps(2.0, 2.9), [])
+    np.testing.assert_array_equal(held.jumps(*begin), begin)
     np.testing.assert_array_equal(sw.Sampled([0.0, 1.0, 4.0], 0.5, 1.0, "linear").jumps(0.0, 9.0), [1.0, 1.5, 2.0])
     assert not len(sw.Sampled([1.0, 1.0], 0.5, 0.0, "linear").jumps(-1.0, 9.0))
     assert not len(sw.Sinusoid(1.0, 2.0).jumps(0.0, 9.0))
     system = pushed(push=held)
-    np.testing.assert_array_equal(system.jumps(0.0, 9.0), [2.0, 3.0])
+    np.testing.assert_array_equal(system.jumps(0.0, 9.0), begin)
     two = sw.Oscillator(a=held, x=sw.Sampled([[0.0, 0.0], [0.0, 1.0]], 2.0, 0.0))
-    np.testing.assert_array_equal(two.jumps(0.0, 9.0), [2.0, 3.0])
+    np.testing.assert_array_equal(two.jumps(0.0, 9.0), [2.0 / signal.HOLD_SLACK, *begin])
     assert not len(sw.Pendulum().jumps(0.0, 9.0))
 
 
