@@ -23,6 +23,17 @@ def bumper(t: Any, v: Any, y: Any, *, restitution: Any = 1.0) -> Any:
     return -GRAVITY
 
 
+@sw.system
+def free(t: Any, v: Any, y: Any) -> Any:
+    return 0.0 * y
+
+
+WALLS = [
+    sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-v, 0.0 * y), name="left"),
+    sw.Event(lambda t, v, y: y - 1.0, direction=1, then=lambda t, v, y: (-v, 0.0 * y + 1.0), name="right"),
+]
+
+
 def ground(restitution: float) -> sw.Event:
     return sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-restitution * v, y), name="ground")
 
@@ -104,17 +115,8 @@ def test_two_walls_and_several_bounces_within_a_step(dt: float) -> None:
 
     Bound: positions are off by the roundings of as many numbers up to 7·0.3 as there are steps and bounces.
     """
-
-    @sw.system
-    def free(t: Any, v: Any, y: Any) -> Any:
-        return 0.0 * y
-
-    walls = [
-        sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-v, 0.0 * y), name="left"),
-        sw.Event(lambda t, v, y: y - 1.0, direction=1, then=lambda t, v, y: (-v, 0.0 * y + 1.0), name="right"),
-    ]
     steps = int(3.0 / abs(dt))
-    run = sw.integrate(free(), "rk4", v=7.0, y=0.5, dt=dt, steps=steps, every=1, events=walls)
+    run = sw.integrate(free(), "rk4", v=7.0, y=0.5, dt=dt, steps=steps, every=1, events=WALLS)
     way = np.abs((0.5 + 7.0 * run.t) % 2.0)
     np.testing.assert_allclose(run.y, np.minimum(way, 2.0 - way), rtol=0, atol=10 * (steps + 21) * U * 21.0)
     turns = np.floor(0.5 + 7.0 * abs(dt) * steps)

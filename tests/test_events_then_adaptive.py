@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.events import adaptive
-from test_events_then import GRAVITY, U, ball, bumper, ground, times_of_bounces
+from test_events_then import GRAVITY, WALLS, U, ball, bumper, free, ground, times_of_bounces
 
 METHODS = [method.name for method in sw.methods() if method.error_order is not None]
 
@@ -113,17 +113,8 @@ def test_a_neuron_fires_when_a_closed_form_says(method: str) -> None:
 
 def test_backward_between_two_walls_over_jumps() -> None:
     """A point without forces between walls at 0 and 1 at speed 7, backward in time, with times that no step crosses."""
-
-    @sw.system
-    def free(t: Any, v: Any, y: Any) -> Any:
-        return 0.0 * y
-
-    walls = [
-        sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-v, 0.0 * y), name="left"),
-        sw.Event(lambda t, v, y: y - 1.0, direction=1, then=lambda t, v, y: (-v, 0.0 * y + 1.0), name="right"),
-    ]
     t = -np.linspace(0.0, 3.0, 31)
-    run = sw.integrate(free(), "dop853", v=7.0, y=0.5, tolerance=1e-9, at=t, jumps=[-0.3, -1.0, -2.5], max_step=0.9, events=walls)
+    run = sw.integrate(free(), "dop853", v=7.0, y=0.5, tolerance=1e-9, at=t, jumps=[-0.3, -1.0, -2.5], max_step=0.9, events=WALLS)
     way = np.abs((0.5 + 7.0 * t) % 2.0)
     np.testing.assert_allclose(run.y, np.minimum(way, 2.0 - way), rtol=0, atol=200 * U * 21.0)
     assert run.events["left"].count + run.events["right"].count == 21

@@ -97,8 +97,8 @@ def attempt(
     v1, y1, work = system.project(v1, y1)
     if branches:
         stays = on_branches(branches, share, moved)
-    holds = agrees, stays, 0.5 / moved * unit
-    following, goes_on = decided(pace, (step, ends), new, holds, outlook.is_extra, outlook.runs)
+    validity = agrees, stays, 0.5 / moved * unit
+    following, goes_on = decided(pace, (step, ends), new, validity, outlook.is_extra, outlook.runs)
     if work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
@@ -221,14 +221,20 @@ def rough(x: Any, coefficients: Sequence[float]) -> Any:
 
 
 def decided(
-    pace: Pace, step_ends: tuple[Any, Any], new: Any, holds: tuple[Any, Any, Any], is_extra: Any, runs: Any
+    pace: Pace, reach: tuple[Any, Any], new: Any, validity: tuple[Any, Any, Any], is_extra: Any, runs: Any
 ) -> tuple[Pace, Any]:
-    """The pace after a step, which may end at the wall, and whether the state advances; ``new`` are the sizes it would have.
+    """The pace after a step, and whether the state advances.
 
-    The series holds over the step if its end agrees with the rates and if functions stay on their branch, None if it has none,
-    but for a tolerable step, which may leave it since all its motion is tolerated: no shorter one is tried for their sake.
+    Args:
+        pace: where members stand.
+        reach: the step, and whether it ends at the wall.
+        new: the sizes that the state would have.
+        validity: whether the end agrees with the rates; whether functions stay on their branch, None if there are none; and a
+            step that may leave it, since all its motion is tolerated: for the sake of a branch no shorter one is tried.
+        is_extra: whether it is an extra step.
+        runs: whether there is a step to try.
     """
-    (step, ends), (agrees, stays, tolerable) = step_ends, holds
+    (step, ends), (agrees, stays, tolerable) = reach, validity
     finite = less(total(new), np.inf)  # NaN is not
     # A time that is rounded to its next value might be beyond a pole that the step itself does not reach.
     fits = finite & (ends | less(pace.t, pace.t + 0.25 * step))

@@ -76,8 +76,6 @@ class _Happenings(Reduction):
             first[each.member[::-1]] = each.t[::-1]
             found[f"{name}_count"] = Variable((), np.array(each.count), f"how often {name} happened")
             found[f"{name}_t"] = Variable((), first, f"time at which {name} first happened", "t")
-        if run.stopped_at is not None and np.isin(run.status, EVENTS).any():
-            stopped = np.where(np.isin(run.status, EVENTS), run.stopped_at, np.nan)
-        else:
-            stopped = np.full(run.status.size, np.nan)
+        times = np.nan if run.stopped_at is None else run.stopped_at
+        stopped = np.where(np.isin(run.status, EVENTS), times, np.nan)
         return found | {"stopped_at": Variable((), stopped, "time at which an event stopped the member", "t")}
