@@ -192,3 +192,34 @@ def test_ctrl_c_in_a_sweep(what: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.5
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_a_function_that_goes_on_after_ctrl_c_is_awaited() -> None:
+    """By the next computation and by the end of the process: a thread that is joined is taken for dead (CPython gh-90882)."""
+    code = """
+        import atexit, os, signal, threading, time
+        from stepwell._interrupts import heard
+        ends = []
+        def function():
+            time.sleep(1.0)
+            ends.append(time.perf_counter())
+        def interrupt():
+            time.sleep(0.3)
+            os.kill(os.getpid(), signal.SIGINT)
+        threading.Thread(target=interrupt).start()
+        try:
+            heard(1e9, function)
+        except KeyboardInterrupt:
+            assert not ends
+        heard(1e9, lambda: print("next", len(ends)))
+        threading.Thread(target=interrupt).start()
+        try:
+            heard(1e9, function)
+        except KeyboardInterrupt:
+            pass
+        atexit.register(lambda: print("end", len(ends)))
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["next", "1", "end", "2"]

@@ -18,16 +18,20 @@ FEW_OPERATIONS = 1e7
 POLL = 0.02
 
 
-#: Computations that were interrupted, and the one that is being waited for.
-_unfinished: list[threading.Thread] = []
+#: The ends of computations that were interrupted, and of the one that is being waited for.
+_unfinished: list[threading.Event] = []
 
 
-def _wait_for(worker: threading.Thread) -> None:
-    """Until it has ended; Ctrl-C is heard."""
-    while worker.is_alive():
-        worker.join(POLL)
+def _wait_for(end: threading.Event) -> None:
+    """Until it is set; Ctrl-C is heard.
+
+    No thread is joined here: before Python 3.13 a join that Ctrl-C interrupts takes the thread for dead (CPython gh-90882), and the
+    process then ends under a function of LAPACK that still runs, with a segmentation fault.
+    """
+    while not end.wait(POLL):
+        pass
     with suppress(ValueError):  # another thread may have waited too
-        _unfinished.remove(worker)
+        _unfinished.remove(end)
 
 
 def available() -> int:
@@ -56,12 +60,14 @@ def heard(operations: float, function: Callable[..., Result], *arguments: Any) -
             results.append(copied.run(function, *arguments))
         except BaseException as error:
             errors.append(error)
+        finally:
+            end.set()
 
     copied = copy_context()  # with NumPy's treatment of errors
-    worker = threading.Thread(target=compute)
-    worker.start()
-    _unfinished.append(worker)
-    _wait_for(worker)
+    end = threading.Event()
+    threading.Thread(target=compute).start()
+    _unfinished.append(end)
+    _wait_for(end)
     if errors:
         raise errors[0]
     return results[0]
