@@ -144,6 +144,14 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
     return float(array)
 
 
+def begins(value: Any) -> tuple[float, Array | None]:
+    """Return ``t0`` as one float; or 0 and the times of a batch, each member's own."""
+    if type(value) is float and isfinite(value):
+        return value, None
+    times = numbers("t0", value, unit="units of time")
+    return (float(times), None) if times.ndim == 0 else (0.0, times)
+
+
 def step(value: Any) -> float:
     """Return ``dt`` as one float other than zero; below zero time runs back."""
     if type(value) is float and isfinite(value) and value != 0.0:

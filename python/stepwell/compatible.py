@@ -12,7 +12,10 @@ from .control import Control, EnergyControl, NormControl
 from .errors import ArgumentError, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
-from .systems import Sampled, System
+from .systems import LinearSystem, Sampled, System
+
+#: The step of a larger linear system is not one tape, whose members may have times of their own.
+MOST_STATES_OF_OWN_TIMES = 64
 
 
 def fits_together(system: System, method: Method) -> None:
@@ -75,6 +78,22 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
         raise ArgumentError(
             f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
             f"{anew}"
+        )
+
+
+def fits_own_times(system: System, single: bool) -> None:
+    """Raise if members of a system cannot have times of their own."""
+    if not system.has_time:
+        return
+    if single:
+        raise UnsupportedError(
+            "t0: one for each member goes with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
+            "each"
+        )
+    if isinstance(system, LinearSystem) and len(system.A) > MOST_STATES_OF_OWN_TIMES:
+        raise UnsupportedError(
+            f"t0: one for each member goes with up to {MOST_STATES_OF_OWN_TIMES} states of a LinearSystem with inputs, whose "
+            f"larger products have one clock, got {len(system.A)}; make a run for each"
         )
 
 

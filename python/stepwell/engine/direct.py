@@ -101,7 +101,7 @@ def looped(
             plan.progress(done / plan.steps)
         return step(t, v, y)
 
-    counts: Any = {"h": plan.dt, "t0": plan.t0, "first": plan.first, "steps": plan.steps, "saves": plan.saves}
+    counts: Any = {"h": plan.dt, "t0": plan.begin, "first": plan.first, "steps": plan.steps, "saves": plan.saves}
     return reference.run(told, v, y, before, block_axes, velocity=velocity, **counts)
 
 
@@ -109,7 +109,7 @@ def to_slot(plan: Plan, v: Array, y: Array) -> Array:
     """What the method carries at the first step."""
     if plan.method.carry is None:
         return v
-    t = plan.t0 + plan.first * plan.dt
+    t = plan.begin + plan.first * plan.dt
     with np.errstate(all="ignore"):
         if plan.by_tape:
             return evaluated_slot(plan, "start")(t, v, y)
@@ -124,7 +124,7 @@ def finished(plan: Plan, slot: Array, kept: Blocks, first_bad: Any) -> Outcome:
             slot = slot.copy()
         with np.errstate(all="ignore"):
             for i, step in enumerate(plan.saves):
-                v[i] = velocity(plan.t0 + (plan.first + int(step)) * plan.dt, v[i], y[i])
+                v[i] = velocity(plan.begin + (plan.first + int(step)) * plan.dt, v[i], y[i])
     return Outcome(v, y, slot, np.asarray(first_bad, dtype=np.int64))
 
 

@@ -16,7 +16,7 @@ from ..reference.types import Blocks, Whole
 from ..systems import Sampled
 from ..systems.base import flat
 from .direct import Looped, advance, finished, looped, run_by_core, to_slot, to_velocity
-from .plan import Outcome, Plan
+from .plan import BEGINS, Outcome, Plan
 
 
 def transition(plan: Plan) -> Array:
@@ -69,7 +69,7 @@ def one_step(plan: Plan, v: Array | None = None, y: Array | None = None) -> Arra
     """The slots after one step at t = 0, from rest if not from ``v`` and ``y``, as rows: those of v, then those of y."""
     if v is None or y is None:
         v, y = (np.zeros((*shape, *plan.batch)) for shape in (plan.system.v_shape, plan.system.y_shape))
-    one = plan._replace(t0=0.0, first=0, steps=1, every=None, form="direct", progress=None)
+    one = plan._replace(t0=0.0, begins=None, first=0, steps=1, every=None, form="direct", progress=None)
     out = advance(one, v, y, carried=True)
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     return np.concatenate([out.slot.reshape(n_v, *plan.batch), out.y[-1].reshape(n_y, *plan.batch)])
@@ -80,7 +80,9 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
     q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
     inputs = [each.signal() for each in plan.system.given_inputs().values()]
-    linear_map = {"n": n_v + n_y, "n_v": n_v, "p": P, "q": q, "inputs": inputs}
+    linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "p": P, "q": q, "inputs": inputs}
+    if plan.begins is not None and inputs:
+        linear_map[BEGINS] = plan.begins
     return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
 
 
@@ -185,7 +187,9 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=map(int, saves))
+        states = power.run(
+            step, drive, s, before.reshape(-1), t0=wide(np.asarray(plan.begin)), first=plan.first, saves=map(int, saves)
+        )
         for i, s in enumerate(states):
             kept[0][i], kept[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
             if plan.progress is not None:

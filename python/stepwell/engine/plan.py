@@ -16,6 +16,9 @@ from ..reference.types import Whole
 from ..systems import System
 from ..systems.base import rows
 
+#: Under this name the core takes the times of step 0 of all members.
+BEGINS = "time.begins"
+
 
 class Watched(NamedTuple):
     """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
@@ -27,7 +30,8 @@ class Watched(NamedTuple):
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
 
-    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32.
+    ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. ``begins`` has the
+    time of step 0 of each member, shape (*batch), in place of ``t0``, which is then 0.
     """
 
     system: System
@@ -49,6 +53,12 @@ class Plan(NamedTuple):
     watched: Watched | None = None
     order: int = 0
     single: bool = False
+    begins: Array | None = None
+
+    @property
+    def begin(self) -> Any:
+        """The time of step 0, of all members or of each."""
+        return self.t0 if self.begins is None else self.begins
 
     @property
     def dtype(self) -> type[Any]:
@@ -138,6 +148,8 @@ def model(plan: Plan) -> _core.ModelSpec:
     if plan.single:
         return _single_model(plan)
     given = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    if plan.begins is not None and plan.system.has_time:
+        given.append((BEGINS, rows(plan.begins, plan.batch, 0)))
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if plan.watched is not None:

@@ -150,7 +150,7 @@ class _Driver(Collected):
         assert out.noticed is not None
         if done + now.steps == self._next_save(done):
             self._save(done + now.steps, 0, index, out.v, out.y)
-        end, given = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
+        end, given = now.begin + (now.first + now.steps) * now.dt, self.members.numbers(index)
         noticed = out.noticed[-1] > 0.0
         for quantity, event, before in zip(self.quantities, self.events, out.noticed, strict=False):
             noticed |= crosses(before, quantity(np.array(end), out.v[-1], out.y[-1], given), event.direction)
@@ -159,7 +159,9 @@ class _Driver(Collected):
         for first in range(0, len(where), size):
             these = where[first : first + size]
             again = self.members.plan(index[these])
-            again = now._replace(system=again.system, batch=again.batch, force=again.force, every=1, watched=None)
+            again = now._replace(
+                system=again.system, batch=again.batch, force=again.force, begins=again.begins, every=1, watched=None
+            )
             then = at.some(these)
             states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
             stopped[these] = self._look(again, index[these], states, done)
@@ -184,7 +186,7 @@ class _Driver(Collected):
     def _look(self, now: engine.Plan, index: Whole, out: engine.Outcome, done: int) -> Any:
         """Find the events within these steps; which of the members stop."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
-        t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
+        t: Any = now.begin + ((now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
         g = [quantity(t, v, y, given) for quantity in self.quantities]
         changes = [crosses(each[:-1], each[1:], event.direction) for each, event in zip(g, self.events, strict=True)]
@@ -208,7 +210,7 @@ class _Driver(Collected):
         """What is known of the changes of sign of these members in these steps."""
         begins, ends = ([each[..., step + later, member] for each in states] for later in (0, 1))
         numbers = now.first + step
-        t: Any = now.t0 + numbers * now.dt
+        t: Any = (now.t0 if now.begins is None else now.begins[member]) + numbers * now.dt
         h = np.full(len(step), now.dt)
         return Changes(index[member], numbers, t, h, g[step, member], g[step + 1, member], *begins, *ends)
 

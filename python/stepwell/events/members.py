@@ -65,6 +65,7 @@ class Members:
             name.removeprefix("control."): row(value, None) for name, value in numbers.items() if isinstance(value, np.ndarray)
         }
         self._rubbing = None if system.rubbing is None else row(system.rubbing, None)
+        self._begins = None if plan.begins is None else row(plan.begins, 0)
         self._force = None if plan.force is None else row(plan.force, len(system.v_shape))
 
     def plan(self, index: Any) -> engine.Plan:
@@ -94,7 +95,8 @@ class Members:
         force = None
         if self._force is not None:
             force = np.broadcast_to(some(self._force), (*system.v_shape, *batch))
-        return self._plan._replace(system=taken, batch=batch, force=force)
+        begins = None if self._begins is None else np.broadcast_to(some(self._begins), batch)
+        return self._plan._replace(system=taken, batch=batch, force=force, begins=begins)
 
     def numbers(self, index: Any) -> dict[str, Any]:
         """The parameters of these members that are numbers, by name."""

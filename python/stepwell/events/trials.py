@@ -72,7 +72,7 @@ class Trials:
                 self._plans[member] = self._members.plan(np.array([member]))._replace(
                     first=0, steps=1, every=None, threads=1, progress=None, record=(), fused=False
                 )
-            plan, one = self._plans[member]._replace(t0=begin, dt=length), slice(i, i + 1)
+            plan, one = self._plans[member]._replace(t0=begin, begins=None, dt=length), slice(i, i + 1)
             out = engine.advance(plan, np.ascontiguousarray(v[..., one]), np.ascontiguousarray(y[..., one]))
             made_v[..., one], made_y[..., one] = out.v[-1], out.y[-1]
         return made_v, made_y

@@ -22,6 +22,7 @@ from ..method_records import method as find_method
 from ..result import Run
 from ..systems import LinearSystem, Oscillator, System
 from . import eigen, maps
+from .analysis import goes_forward
 from .eigen import Complex
 from .limit import Mode, stability_limit
 from .limit_digits import LADDER
@@ -116,6 +117,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     """
     if not isinstance(run, Run):
         raise DTypeError(f"run: expected what integrate returns, got {type(run).__name__}")
+    goes_forward(run)
     how = run.method if method is None else find_method(method)
     system = run.system.uncontrolled
     fits_together(system, how)
@@ -149,9 +151,9 @@ def _linearised(system: System, run: Run) -> Array:
         A = A.reshape(*A.shape[:2], *(1,) * (len(members) + 3 - A.ndim), *A.shape[2:])
         return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
     v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((run.v, system.v_shape), (run.y, system.y_shape)))
-    t: Any = run.t.reshape(-1, *(1,) * len(members))
+    t: Any = run.t if run.t.ndim > 1 else run.t.reshape(-1, *(1,) * len(members))
     # Built-in systems only add inputs, which do not change the derivative: one time suffices.
-    A = maps.rates(system, float(run.t[0]) if system.complex_step else t, v, y)
+    A = maps.rates(system, float(run.t.flat[0]) if system.complex_step else t, v, y)
     return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
 
 

@@ -315,6 +315,11 @@ class System(Fixed, Value, ABC):
             return inf, -inf
         return min(each.interval for each in held), max(each.start + each.interval * (len(each.values) - 1) for each in held)
 
+    @property
+    def has_time(self) -> bool:
+        """Whether its rates may depend on the time."""
+        return bool(self.given_inputs())
+
     def without_inputs(self) -> System:
         """The same system without inputs."""
         return self

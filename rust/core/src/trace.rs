@@ -135,6 +135,18 @@ pub(crate) fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
     Parameters { given, h, numbers, sample: |table, t| Symbol::new(Op::Sample(table, t.0)) }
 }
 
+/// The parameter that is each member's own time of step 0, where they have some: the clock's is then 0.
+pub const BEGINS: &str = "time.begins";
+
+/// The time of a step.
+pub(crate) fn time(given: &Given) -> Symbol {
+    let clock = Symbol::new(Op::Time);
+    match given.place(BEGINS) {
+        Some(row) => Symbol::new(Op::Param(row as u32)) + clock,
+        None => clock,
+    }
+}
+
 /// Numbers of the state.
 pub(crate) fn block(first: usize, count: usize) -> Block<Symbol> {
     Block::from_fn(count, |i, _| Symbol::new(Op::State((first + i) as u32)))
@@ -228,7 +240,7 @@ pub(crate) fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Ve
 }
 
 fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize) -> (Vec<Id>, bool) {
-    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let (h, t) = (Symbol::new(Op::Step), time(given));
     let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
     let p = parameters(given, h);
     let s = system(kind, &p, Symbol::new(Op::State((shape.v + shape.y) as u32)));
@@ -323,7 +335,7 @@ fn trace_by_terms(tape: Tape, given: &Given, shape: Shape, numbers: usize) -> Re
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
 fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
-    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let (h, t) = (Symbol::new(Op::Step), time(given));
     let p = parameters(given, h);
     let n = shape.v + shape.y;
     let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
@@ -349,7 +361,7 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
     let kind = kind(given)?;
     let shape = (kind.shape)(given)?;
     Ok(record(tape, || {
-        let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+        let (h, t) = (Symbol::new(Op::Step), time(given));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
         let mut made = program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter();

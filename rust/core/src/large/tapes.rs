@@ -15,7 +15,7 @@ use crate::{
     spec::{Given, Spec},
     system::{Block, Kind, Shape, System},
     tape::{Id, Op, Tape},
-    trace::{block, cut, ids, kind, parameters},
+    trace::{self, block, cut, ids, kind, parameters},
 };
 
 /// The rates of a system, traced. Their state is v, y, a block for the result, and a number for the tally.
@@ -80,7 +80,7 @@ impl Rated {
     pub fn new(given: &Given, names: &[String]) -> Result<Rated, Error> {
         let kind = kind(given)?;
         let shape = (kind.shape)(given)?;
-        let time = || Symbol::new(Op::Time);
+        let time = || trace::time(given);
         let stage = |traced: &(Tape, Vec<Id>)| Some(cut(given, traced));
         let dv = rate(kind, given, shape, |s, v, y| (Some(s.dv(time(), &v, &y)), v, y));
         let dy = rate(kind, given, shape, |s, v, y| (Some(s.dy(time(), &v, &y)), v, y));

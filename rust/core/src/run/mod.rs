@@ -35,7 +35,7 @@ use crate::{
     real::Precision,
     spec::Spec,
     system,
-    trace::{How, Scene, Traceable, Traced},
+    trace::{BEGINS, How, Scene, Traceable, Traced},
 };
 
 /// The system to step and the way to step it.
@@ -90,9 +90,11 @@ impl Model<'_> {
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let single = members == 1;
+        // Kernels that are written by hand have one clock.
+        let own_times = self.scene.given.count(BEGINS) > 0;
         // Operations are fused on the tape of the whole step, and friction needs the state at its start.
         let is_single = self.scene.precision == Precision::Single;
-        if is_single || self.scene.fused || traced.series || controls::friction::is_given(&self.scene.given) {
+        if is_single || self.scene.fused || traced.series || own_times && matches!(self.scene.how, How::Matrix { .. }) || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {
@@ -103,7 +105,7 @@ impl Model<'_> {
                 Way::Tape
             };
         }
-        let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long);
+        let long = system::kind(&self.scene.given.system).and_then(|kind| kind.long).filter(|_| !own_times);
         let large = step > MAX_TAPE_OPERATIONS;
         // Tapes of rates must first be traced and compiled, which takes time, unless that was done before.
         let pays = || steps * (step / rates.max(1)) as f64 > (MIN_EVALUATIONS_PER_OPERATION * rates) as f64 || traced.is_rated();
