@@ -341,6 +341,11 @@ class System(Fixed, Value, ABC):
 
         return changed(self, **{name: means(value) for name, value in vars(self).items() if not name.startswith("_")})
 
+    @property
+    def has_time(self) -> bool:
+        """Whether its rates may depend on the time."""
+        return bool(self.given_inputs())
+
     def without_inputs(self) -> System:
         """The same system without inputs."""
         return self

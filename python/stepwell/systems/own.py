@@ -419,6 +419,11 @@ class OwnSystem(System):
         complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
         return kept
 
+    @property
+    def has_time(self) -> bool:
+        """Its function takes the time, whether or not it uses it."""
+        return True
+
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""
         return {name: value for name, value in self.parameters_given.items() if isinstance(value, (Sinusoid, Sampled))}
