@@ -78,21 +78,13 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
         )
 
 
-def fits_own_times(system: System, dt: float, single: bool) -> None:
+def fits_own_times(system: System, single: bool) -> None:
     """Raise if members of a system cannot have times of their own."""
-    if not system.has_time:
-        return
-    if single:
+    if single and system.has_time:
         raise UnsupportedError(
             "t0: one for each member goes with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
             "each t0"
         )
-    for name, given in system.given_inputs().items():
-        if isinstance(given, Sampled) and given.over_steps(0.0, dt) is not given:
-            raise UnsupportedError(
-                f"t0: one for each member goes with samples of at least a step, and {name} has one every {given.interval:g}, "
-                f"with steps of {dt:g}: their means over the steps are others for each t0; make a run for each"
-            )
 
 
 def goes_back(system: System, control: Any) -> None:

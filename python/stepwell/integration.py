@@ -259,7 +259,7 @@ def integrate(
         batches["control"] = control.batch
     if has_own_times := np.ndim(t0) > 0:
         batches["t0"] = np.shape(t0)
-        fits_own_times(system, dt, single)
+        fits_own_times(system, single)
     if force is not None:
         forced(system)
         force = _checks.block("force", force, system.v_shape, system.axes)

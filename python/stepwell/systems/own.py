@@ -232,7 +232,7 @@ class OwnSystem(System):
             return value.shape[: self.own_axes(name)]
         if isinstance(value, (Sinusoid, Sampled)):
             signal = value.signal()
-            return type(signal).__name__, len(getattr(signal, "coefficients", ()))
+            return type(signal).__name__, *getattr(signal, "parts", dict)()
         return told(value)
 
     def _trace(self) -> None:
