@@ -295,7 +295,7 @@ def integrate(
         if single:
             _single.check_control(system)
     system = system.stepped_by(how)
-    stepped = system.over_steps(how, t0, dt)
+    stepped = system.over_steps(how, _checks.once_of(t0) if has_own_times else t0, dt)
     carried = slot is not None and _going_on.holds(carried_for, system, batch, v, y)
     if slot is not None and carried:
         v = spread(slot, system.v_shape, batch)
