@@ -257,7 +257,7 @@ def integrate(
         batches["carry"] = slot.shape[len(system.v_shape) :]
     if control is not None:
         batches["control"] = control.batch
-    if has_own_times := np.ndim(t0) > 0:
+    if has_own_times := isinstance(t0, np.ndarray):
         batches["t0"] = np.shape(t0)
         fits_own_times(system, single)
     if force is not None:
@@ -382,14 +382,14 @@ def _times(plan: engine.Plan) -> Array:
         return np.array([plan.t0 + (plan.first + plan.steps) * plan.dt])
     t: Array = _memory.empty((plan.kept,))
     _core.times(plan.of_core(), t)
-    return plan.t0 + t.reshape(-1, *(1,) * len(plan.batch)) if np.ndim(plan.t0) else t
+    return plan.t0 + t.reshape(-1, *(1,) * len(plan.batch)) if isinstance(plan.t0, np.ndarray) else t
 
 
 def _last_time(t0: Any, dt: float, start_step: int, steps: int) -> float:
     """The largest time in size; raise if one does not move on, or is not finite."""
     begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
     index: tuple[int, ...] = ()
-    if np.ndim(t0):
+    if isinstance(t0, np.ndarray):
         wrong = (begin == end) | ~np.isfinite(end)
         if not wrong.any():
             return float(max(np.abs(each).max(initial=0.0) for each in (begin, end)))

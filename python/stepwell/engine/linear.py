@@ -92,7 +92,7 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     inputs = [each.signal() for each in plan.system.given_inputs().values()]
     carries = int(plan.method.carry is not None)
     linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
-    if np.ndim(plan.t0) and inputs:
+    if isinstance(plan.t0, np.ndarray) and inputs:
         linear_map[BEGINS] = plan.t0
     return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
 

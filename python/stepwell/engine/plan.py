@@ -60,11 +60,11 @@ class Plan(NamedTuple):
 
     def t0_of(self, members: Any) -> Any:
         """The time of step 0 of these members of one batch axis, which may be that of all."""
-        return self.t0[members] if np.ndim(self.t0) else self.t0
+        return self.t0[members] if isinstance(self.t0, np.ndarray) else self.t0
 
     def of_core(self) -> Plan:
         """The same with one clock for all members, at 0 where each has a time of its own."""
-        return self._replace(t0=0.0) if np.ndim(self.t0) else self
+        return self._replace(t0=0.0) if isinstance(self.t0, np.ndarray) else self
 
     @property
     def dtype(self) -> type[Any]:
@@ -154,7 +154,7 @@ def model(plan: Plan) -> _core.ModelSpec:
     if plan.single:
         return _single_model(plan)
     given = plan.system.parameters(plan.batch, series=plan.method.has_series)
-    if np.ndim(plan.t0) and plan.system.has_time:
+    if isinstance(plan.t0, np.ndarray) and plan.system.has_time:
         given.append((BEGINS, rows(plan.t0, plan.batch, 0)))
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
