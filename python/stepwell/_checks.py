@@ -201,6 +201,14 @@ def number(argument: str, value: Any, *, positive: bool = False, unit: str = "")
     return float(array)
 
 
+def beginning(value: Any) -> Any:
+    """Return ``t0`` as one float, or as an array of its own of the times of a batch; zeros of them are +0, as 0 + k·dt is."""
+    if type(value) is float and isfinite(value):
+        return value + 0.0
+    times: Any = numbers("t0", value, unit="units of time") + 0.0
+    return times if np.ndim(times) else float(times)
+
+
 def step(value: Any) -> float:
     """Return ``dt`` as one float other than zero; below zero time runs back."""
     if type(value) is float and isfinite(value) and value != 0.0:

@@ -12,6 +12,7 @@ import numpy as np
 from . import _encounters, _known_energy, engine
 from ._brief import in_words, of_member, share
 from ._checks import Array, Shape
+from ._runs import time_of
 from .control import EnergyControl
 from .errors import AccuracyWarning, ControlWarning
 from .method_records import method
@@ -98,7 +99,7 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
         return None
     step, strength = found
     return (
-        f"gain: h·C·K = {strength:.3g} at step {step} (t = {run.t0 + step * run.dt:g}){of_member(index)}, expected below 1: "
+        f"gain: h·C·K = {strength:.3g} at step {step} (t = {time_of(run, step, index):g}){of_member(index)}, expected below 1: "
         f'from there on the printed form overshoots and may overflow; use a smaller gain or step, or form="limited"'
     )
 
@@ -126,7 +127,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
             i, j = met.bodies
             return (
                 f"bodies {i} and {j}{of_member(index)} met within step {met.step} "
-                f"(t = {run.t0 + met.step * run.dt:g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
+                f"(t = {time_of(run, met.step, index):g}), {met.distance:.3g} apart, which steps of {run.dt:g} do not follow"
             )
         left -= run.steps * float(np.prod(bodies.y_shape))
     return None

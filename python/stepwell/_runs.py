@@ -13,6 +13,7 @@ from .systems import System
 
 if TYPE_CHECKING:
     from ._words import Backend
+    from .result import Run
 
 BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
 
@@ -43,6 +44,11 @@ def spread(array: Array, block: tuple[int, ...], batch: tuple[int, ...]) -> Arra
     if not array.ndim:
         return _checks.over(array, batch)
     return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
+
+
+def time_of(run: Run, step: int, index: tuple[int, ...]) -> float:
+    """The time of a step of fixed length of a member: t0 + k·dt."""
+    return float(np.broadcast_to(run.t0, run.status.shape)[index]) + step * run.dt
 
 
 def goes_with_times(has_tolerance: bool, at: Any) -> None:

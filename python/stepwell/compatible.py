@@ -78,6 +78,15 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
         )
 
 
+def fits_own_times(system: System, single: bool) -> None:
+    """Raise if members of a system cannot have times of their own."""
+    if single and system.has_time:
+        raise UnsupportedError(
+            "t0: one for each member goes with float64, for in float32 t0 + k·dt of each would be rounded twice; make a run for "
+            "each t0"
+        )
+
+
 def goes_back(system: System, control: Any) -> None:
     """Raise if a system has no past that steps back in time could find."""
     if system.rubbing is not None:

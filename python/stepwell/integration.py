@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _checks, _core, _encounters, _going_on, _growth, _memory, engine
-from ._brief import first_of, share
+from ._brief import first_of, of_member, share
 from ._checks import Array
 from ._doubt import warn_of_nonsense
-from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, goes_with_times, quantities, spread
+from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, goes_with_times, quantities, spread, time_of
 from .adaptive_runs import AdaptiveOptions, adaptive_run
-from .compatible import fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
+from .compatible import fits_own_times, fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
 from .method_records import Method
@@ -53,7 +53,7 @@ def integrate(
     form: RunForm = "direct",
     fused: bool = False,
     dtype: Any = "float64",
-    t0: float = 0.0,
+    t0: Any = 0.0,
     start: str | None = None,
     max_steps: int | None = None,
     max_step: Any = None,
@@ -116,8 +116,9 @@ def integrate(
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. For fixed steps of up to some 4000 operations in the direct form.
-        t0: time of step 0. Step k is at t0 + k·dt, computed by this formula and never accumulated. With a tolerance, the time of
-            the start, a number or an array over the batch.
+        t0: time of step 0, a number, or an array over the batch for a time of each member; ``run.t`` then has shape
+            (saved, *batch). Step k is at t0 + k·dt, computed by this formula and never accumulated. With a tolerance, the time of
+            the start, likewise.
         start: how to start a method that has several ways; see ``method(…).starts``.
         max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
         max_step: with a tolerance, the longest step, in units of time, a number or an array over the batch. What lasts for less
@@ -229,16 +230,10 @@ def integrate(
 
         dt = _single.step(system, how, form, dt, events=asked is not None)
     goes_on_alike(how, dt, carried_by, dt_before)
-    t0 = _checks.number("t0", t0, unit="units of time")
+    t0 = _checks.beginning(t0)
     steps = _checks.count("steps", steps, 1)
     start_step = _checks.count("start_step", start_step, 0, _checks.LAST_STEP - steps)
-    begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
-    if begin == end or not np.isfinite(end):
-        raise ArgumentError(
-            f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
-            f"after {steps} steps of {dt:g}"
-        )
-    last = max(abs(begin), abs(end))
+    last = _last_time(t0, dt, start_step, steps)
     system.check_time(last)
     if single:
         _single.check_inputs(system, last)
@@ -262,12 +257,18 @@ def integrate(
         batches["carry"] = slot.shape[len(system.v_shape) :]
     if control is not None:
         batches["control"] = control.batch
+    if has_own_times := isinstance(t0, np.ndarray):
+        batches["t0"] = np.shape(t0)
+        fits_own_times(system, single)
     if force is not None:
         forced(system)
         force = _checks.block("force", force, system.v_shape, system.axes)
         batches["force"] = force.shape[len(system.v_shape) :]
     batch = _checks.batch_shape(batches)
     rows = prod(system.v_shape) + prod(system.y_shape)
+    if has_own_times:
+        t0 = spread(t0, (), batch)
+        rows += 1  # the times, which are each member's own
     plan = engine.Plan(
         system, how, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, None, (), fused, single=single
     )
@@ -294,7 +295,7 @@ def integrate(
         if single:
             _single.check_control(system)
     system = system.stepped_by(how)
-    stepped = system.over_steps(how, t0, dt)
+    stepped = system.over_steps(how, _checks.once_of(t0) if has_own_times else t0, dt)
     carried = slot is not None and _going_on.holds(carried_for, system, batch, v, y)
     if slot is not None and carried:
         v = spread(slot, system.v_shape, batch)
@@ -318,11 +319,11 @@ def integrate(
             out = make(plan._replace(progress=told))
     else:
         out = make(plan)
-    collides = isinstance(system, NBody)
+    collides, alone = isinstance(system, NBody), plan.of_core()  # bodies know no time
     if collides:
         v, y = _kept(v), _kept(y)  # for ``collisions`` and ``encounters``; the arrays that were given are the user's to change
     run = Run(
-        t=np.array([end]) if every is None else _times(plan),
+        t=_times(plan),
         v=out.v,
         y=out.y,
         # Status.OK is 0 and Status.DIVERGED 1
@@ -337,9 +338,9 @@ def integrate(
         steps=steps,
         start=how.starts[choice] if how.starts else None,
         fused=fused,
-        collision=partial(_encounters.collision, plan, v, y, carried) if collides else None,
-        encounter=partial(_encounters.of_member, plan, v, y, carried, steps) if collides else None,
-        overshoots=partial(_encounters.overshoots, plan, v, y, carried, steps) if collides else None,
+        collision=partial(_encounters.collision, alone, v, y, carried) if collides else None,
+        encounter=partial(_encounters.of_member, alone, v, y, carried, steps) if collides else None,
+        overshoots=partial(_encounters.overshoots, alone, v, y, carried, steps) if collides else None,
         recorded=out.recorded,
         work=out.work,
         force=plan.force,
@@ -377,9 +378,29 @@ def _asked(events: Any, form: str) -> list[Event]:
 
 def _times(plan: engine.Plan) -> Array:
     """t0 + k·dt of every saved state; there may be millions of them."""
+    if plan.every is None:
+        return np.array([plan.t0 + (plan.first + plan.steps) * plan.dt])
     t: Array = _memory.empty((plan.kept,))
-    _core.times(plan, t)
-    return t
+    _core.times(plan.of_core(), t)
+    return plan.t0 + t.reshape(-1, *(1,) * len(plan.batch)) if isinstance(plan.t0, np.ndarray) else t
+
+
+def _last_time(t0: Any, dt: float, start_step: int, steps: int) -> float:
+    """The largest time in size; raise if one does not move on, or is not finite."""
+    begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt
+    index: tuple[int, ...] = ()
+    if isinstance(t0, np.ndarray):
+        wrong = (begin == end) | ~np.isfinite(end)
+        if not wrong.any():
+            return float(max(np.abs(each).max(initial=0.0) for each in (begin, end)))
+        index = tuple(np.argwhere(wrong)[0].tolist())
+        begin, end = begin[index], end[index]
+    elif begin != end and np.isfinite(end):
+        return float(max(abs(begin), abs(end)))
+    raise ArgumentError(
+        f"dt, t0: expected a time that moves on and stays finite, got t = {begin:g} at step {start_step} and t = {end:g} "
+        f"after {steps} steps of {dt:g}{of_member(index)}"
+    )
 
 
 def _only_fixed(given: dict[str, Any]) -> None:
@@ -411,13 +432,13 @@ def _warn(run: Run, before: Whole | None, start: tuple[Array, Array] | None) -> 
     if start is not None and step == run.start_step + 1 and not met:
         from ._stops import of_the_start  # only such runs need it
 
-        t = run.t0 + run.start_step * run.dt
-        if wrong := of_the_start(run.system, run.status.shape, t, start, first):
+        t = time_of(run, run.start_step, first)
+        if wrong := of_the_start(run.system, run.status.shape, run.t0 + run.start_step * run.dt, start, first):
             met = f"; {wrong} at the start, t = {t:g}"
     some = int(np.count_nonzero(bad))
     warnings.warn(
         f"{share(some, bad.shape, bad.size)} diverged{first_of(some, first, bad.size)} at step {step} "
-        f"(t = {run.t0 + step * run.dt:g}), by {run.method.name} with dt = {run.dt:g}{met}",
+        f"(t = {time_of(run, step, first):g}), by {run.method.name} with dt = {run.dt:g}{met}",
         DivergenceWarning,
         stacklevel=3,
     )

@@ -98,7 +98,7 @@ class Run(Value):
     """A run, with its saved states along the first axis.
 
     Attributes:
-        t: times of the saved states, shape (saved,).
+        t: times of the saved states, shape (saved,); (saved, *batch) where each member has a time of step 0 of its own.
         v: velocities, shape (saved, *block, *batch).
         y: coordinates, likewise.
         status: per member, ``Status.OK`` or why it ended, shape (*batch).
@@ -109,7 +109,7 @@ class Run(Value):
         system: the system that was stepped, with its control.
         method: the method.
         dt: the step.
-        t0: time of step 0.
+        t0: time of step 0, or that of each member, shape (*batch).
         start_step: number of the first step.
         steps: number of steps.
         start: how the method was started, or None.
@@ -147,7 +147,7 @@ class Run(Value):
         system: System,
         method: Method,
         dt: float,
-        t0: float,
+        t0: Any,
         start_step: int,
         steps: int,
         start: str | None,
@@ -228,7 +228,7 @@ class Run(Value):
         Raises:
             UnsupportedError: if the system has none.
         """
-        states = zip(self.t.tolist(), self.v, self.y, strict=True)
+        states: Any = zip(self.t.tolist() if self.t.ndim == 1 else self.t, self.v, self.y, strict=True)
         with np.errstate(all="ignore"):
             return np.stack([self.system.auxiliary(t, v, y) for t, v, y in states])
 
@@ -426,13 +426,16 @@ class Run(Value):
         )
         if self.paces is None:
             steps = f"{counted(self.steps, 'step')} of {self.dt:g}"
-            first, last = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
+            begins, ends = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
             how, number = "diverged", int(self.first_bad_step[diverged].min()) if bad else None
         else:
             rejected = int(self.paces.rejected.sum())
             steps = f"{counted(int(self.paces.accepted.sum()), 'step')}, {rejected} rejected"
-            first, last, how, number = self.t0, float(self.t[-1]), "stopped early", None
-        at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number} (t = {self.t0 + number * self.dt:g})"
+            begins, ends, how, number = self.t0, self.t[-1], "stopped early", None
+        backward = np.any(ends < begins)
+        first, last = (np.max(begins), np.min(ends)) if backward else (np.min(begins), np.max(ends))
+        when = "" if number is None or np.ndim(self.t0) else f" (t = {self.t0 + number * self.dt:g})"
+        at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number}{when}"
         verdict = "finite" if not bad else f"{how}{at}" if members == 1 else f"{bad} of {members} {how}{at}"
         if stopped:
             verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"

@@ -221,7 +221,7 @@ def evaluations(method: Method, system: System, *, order: int = 0, paced: bool =
     if method.has_series:
         batch = system.batch if system.control is None else np.broadcast_shapes(system.batch, system.control.batch)
         plan = Plan(system, method, batch, 1.0, order=order)
-        return _core.series_evaluations(model(plan), attempts=paced)
+        return _core.series_evaluations(model(plan.of_core()), attempts=paced)
     return method.attempt_evaluations if paced else method.evaluations
 
 
@@ -268,7 +268,8 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     before = paces.reshape(numbers, paces.size // numbers)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, status.reshape(-1))
-    spec, core_pacing, core_plan = model(plan), pacing_of_core(plan, pacing), plan._replace(t0=0.0)
+    core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
+    spec = model(core_plan)
     if not _core.adapt(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
         _core.adapt(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))

@@ -23,7 +23,7 @@ def evaluated(plan: Plan, what: str, budget: int = 0) -> Callable[[list[Array], 
     from ..reference.fused import Evaluated
     from ..reference.traced import Tracer
 
-    _core.check(model(plan))
+    _core.check(model(plan.of_core()))
     tape = _core.Tape(single=plan.single)
     tracer = Tracer(plan.system, tape, plan.force)
     match what:

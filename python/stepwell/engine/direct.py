@@ -156,7 +156,7 @@ def run_by_core(
         tally, noticed, work = sums.reshape(-1), sums[before_it:], None
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     diverged = _core.run(
-        model, plan, Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
+        model, plan.of_core(), Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
     )
     by_name: dict[str, Array] = {}
     if recorded is not None:

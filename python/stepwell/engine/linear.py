@@ -16,7 +16,7 @@ from ..reference.types import Blocks, Whole
 from ..systems import Sampled
 from ..systems.base import flat
 from .direct import Looped, advance, finished, looped, run_by_core, to_slot, to_velocity
-from .plan import Outcome, Plan
+from .plan import BEGINS, Outcome, Plan
 
 #: Numbers that are kept at a time for each element of the matrix: unit vectors, their states after a step, what the core makes of
 #: them; and of powers one that is squared, one that is made, and their product.
@@ -91,7 +91,9 @@ def matrix_model(plan: Plan, P: Array, Q: Array) -> Any:
     q = Q.reshape(prod(Q.shape[: Q.ndim - 1 - len(plan.batch)]), n_v + n_y, *plan.batch)
     inputs = [each.signal() for each in plan.system.given_inputs().values()]
     carries = int(plan.method.carry is not None)
-    linear_map = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
+    linear_map: dict[str, Any] = {"n": n_v + n_y, "n_v": n_v, "carries": carries, "p": P, "q": q, "inputs": inputs}
+    if isinstance(plan.t0, np.ndarray) and inputs:
+        linear_map[BEGINS] = plan.t0
     return _core.ModelSpec("matrix", plan.method.name, flat(linear_map, plan.batch), matrix=(list(plan.method.nodes), n_v))
 
 
@@ -180,7 +182,7 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     from ..reference import power  # only this form needs it
     from ..reference.signal import Constant, Sine
 
-    def wide(array: Array) -> Array:
+    def wide(array: Any) -> Array:
         return np.broadcast_to(array, plan.batch).reshape(-1)
 
     _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
@@ -200,7 +202,7 @@ def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Ou
     kept, saves = (np.empty((plan.kept, *v.shape)), np.empty((plan.kept, *y.shape))), plan.saves
     with np.errstate(all="ignore"):
         step = power.one_step(p, q, inputs, plan.method.nodes, drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=plan.t0, first=plan.first, saves=map(int, saves))
+        states = power.run(step, drive, s, before.reshape(-1), t0=wide(plan.t0), first=plan.first, saves=map(int, saves))
         for i, s in enumerate(states):
             kept[0][i], kept[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
             if plan.progress is not None:

@@ -17,6 +17,9 @@ from ..reference.types import Whole
 from ..systems import System
 from ..systems.base import rows
 
+#: Under this name the core takes the times of step 0 of members that have their own.
+BEGINS = "time.begins"
+
 
 class Watched(NamedTuple):
     """Quantities whose changes of sign the core notices while it makes steps: what it computes them by, and how many they are."""
@@ -28,6 +31,7 @@ class Watched(NamedTuple):
 class Plan(NamedTuple):
     """What to run. ``choice`` is the number of the method's start, ``threads`` 0 for as many as pay; ``force`` is added to v̇.
 
+    ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
     ``order`` is that of a series with adaptive steps; ``single`` is whether steps are computed in float32. Of adaptive steps,
     ``acceptance`` is what they must satisfy, and ``backward`` whether the time of the system is that of the run, negated.
     """
@@ -36,7 +40,7 @@ class Plan(NamedTuple):
     method: Method
     batch: Shape
     dt: float
-    t0: float = 0.0
+    t0: Any = 0.0
     first: int = 0
     steps: int = 1
     every: int | None = None
@@ -53,6 +57,14 @@ class Plan(NamedTuple):
     single: bool = False
     acceptance: Acceptance = Acceptance()  # it is immutable
     backward: bool = False
+
+    def t0_of(self, members: Any) -> Any:
+        """The time of step 0 of these members of one batch axis, which may be that of all."""
+        return self.t0[members] if isinstance(self.t0, np.ndarray) else self.t0
+
+    def of_core(self) -> Plan:
+        """The same with one clock for all members, at 0 where each has a time of its own."""
+        return self._replace(t0=0.0) if isinstance(self.t0, np.ndarray) else self
 
     @property
     def dtype(self) -> type[Any]:
@@ -142,6 +154,8 @@ def model(plan: Plan) -> _core.ModelSpec:
     if plan.single:
         return _single_model(plan)
     given = plan.system.parameters(plan.batch, series=plan.method.has_series)
+    if isinstance(plan.t0, np.ndarray) and plan.system.has_time:
+        given.append((BEGINS, rows(plan.t0, plan.batch, 0)))
     if plan.force is not None:
         given.append(("added.force", rows(plan.force, plan.batch, len(plan.system.v_shape))))
     if plan.watched is not None:

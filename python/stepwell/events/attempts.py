@@ -80,7 +80,8 @@ def attempted(
         status=np.empty(members, dtype=np.int64),
         trail=trail,
     )
-    model, plan_of_core = engine.model(plan), plan._replace(t0=0.0)
+    plan_of_core = plan._replace(t0=0.0)
+    model = engine.model(plan_of_core)
     pacing = engine.pacing_of_core(plan, engine.Pacing(np.broadcast_to(until, (rows, *np.shape(until))), budget, begins, jumps))
     if not _core.adapt(model, plan_of_core, pacing, arrays):  # an attempt is not one tape: the reference finds the start
         begun = engine.numbers_of(engine.begun(plan, paces, v, y)).reshape(numbers, members)

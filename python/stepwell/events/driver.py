@@ -167,7 +167,7 @@ class _Driver(Collected):
         for first in range(0, len(where), size):
             these = where[first : first + size]
             again = self.members.plan(index[these])
-            again = now._replace(system=again.system, batch=again.batch, force=again.force, every=1, watched=None)
+            again = now._replace(system=again.system, batch=again.batch, t0=again.t0, force=again.force, every=1, watched=None)
             then = at.some(these)
             states = engine.advance(again, then.slot, then.y, then.bad, carried=then.carried)
             last = self.before[:, index[these]]
@@ -195,7 +195,7 @@ class _Driver(Collected):
     def _may(self, now: engine.Plan, index: Whole, out: engine.Outcome) -> tuple[Known, list[Any]]:
         """What is known of these steps, and in which of them an event may change its sign."""
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
-        t: Any = (now.t0 + (now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
+        t: Any = now.t0 + ((now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         given = self.members.numbers(index)
         g = [quantity(t, v, y, given) for quantity in self.quantities]
         may = [self.may_change(e, index, each) for e, each in enumerate(g)]
@@ -207,7 +207,7 @@ class _Driver(Collected):
             begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
             number = now.first + row
             low, high, h = np.zeros(len(row)), np.ones(len(row)), np.full(len(row), now.dt)
-            begin: Any = now.t0 + number * now.dt
+            begin: Any = now.t0_of(place) + number * now.dt
             values = g[e][row, place], g[e][row + 1, place]
             return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
 
@@ -250,7 +250,7 @@ class _Resetting(_Driver):
         plan = self.plan
         if not carried:
             states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
-            self.resets.begin(np.array(plan.t0 + plan.first * plan.dt), *states)
+            self.resets.begin(np.ravel(plan.t0) + plan.first * plan.dt, *states)
         return super().run(v, y, before, carried)
 
     def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
@@ -307,7 +307,7 @@ class _Resetting(_Driver):
         """Take some members through the last of these steps; what all carry then, and which of them stop."""
         step = known(0, np.full(len(which), row), which)
         member = index[which]
-        end = now.t0 + (step.step + 1) * now.dt
+        end = now.t0_of(which) + (step.step + 1) * now.dt
         states = step.v, step.y, step.v_end, step.y_end
         arrived = self.resets.through(Stretch(member, step.step, step.t, end - step.t, *states, self.resets.at[:, member]))
         out.v[-1][..., which], out.y[-1][..., which] = arrived.v, arrived.y

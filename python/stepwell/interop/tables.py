@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 #: The axis of saved states.
 TIME = "t"
 
+#: The times of saved states, where each member has its own.
+OWN_TIME = "time"
+
 
 def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, Any] | None = None) -> Any:
     """A run as a ``Dataset``; see ``Run.to_xarray``."""
@@ -45,7 +48,8 @@ def to_xarray(run: Run, dims: Sequence[str] | None = None, coords: Mapping[str, 
     if clash := [name for name in given if name in variables or name == TIME]:
         raise ArgumentError(f"coords: expected names of their own, got {', '.join(clash)}, which the run has")
     try:
-        return xarray.Dataset(variables, coords={TIME: run.t, **given}, attrs=_attributes(run))
+        times: dict[str, Any] = {TIME: run.t} if run.t.ndim == 1 else {OWN_TIME: ((TIME, *members), run.t)}
+        return xarray.Dataset(variables, coords={**times, **given}, attrs=_attributes(run))
     except (ValueError, TypeError, RuntimeError) as error:  # of the run itself it has no doubt
         raise ArgumentError(f"coords: expected coordinates that fit the axes {', '.join((TIME, *members))}: {error}") from None
 
@@ -62,7 +66,10 @@ def to_dataframe(run: Run, dims: Sequence[str] | None = None) -> Any:
     for name, array in run.recorded.items():
         columns |= _columns(name, array, array.shape[1 : array.ndim - len(batch)])
     if batch:
-        index = pandas.MultiIndex.from_product([run.t, *map(range, batch)], names=[TIME, *members])
+        at: Any = run.t
+        if run.t.ndim > 1:
+            at, columns = np.arange(len(run.t)), {OWN_TIME: run.t} | columns
+        index = pandas.MultiIndex.from_product([at, *map(range, batch)], names=[TIME, *members])
     else:
         index = pandas.Index(run.t, name=TIME)
     table = pandas.DataFrame({name: np.ascontiguousarray(each).reshape(-1) for name, each in columns.items()}, index=index)
@@ -103,7 +110,9 @@ def _axes(run: Run) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _attributes(run: Run) -> dict[str, Any]:
     """What is told of a run beside its numbers: text and numbers, which files of tables can hold."""
-    told: dict[str, Any] = {"system": repr(run.system), "method": run.method.name, "t0": run.t0}
+    told: dict[str, Any] = {"system": repr(run.system), "method": run.method.name}
+    if np.ndim(run.t0) == 0:
+        told["t0"] = run.t0
     if run.paces is None:
         told |= {"dt": run.dt, "start_step": run.start_step, "steps": run.steps}
     return told | {"fused": int(run.fused), "stepwell": _core.__version__}

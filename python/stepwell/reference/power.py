@@ -89,23 +89,23 @@ def one_step(p: Array, q: Array, inputs: Sequence[Constant | Sine], nodes: Seque
     return Leap(1, p, total)
 
 
-def run(step: Leap, drive: Drive, s: Array, first_bad: Whole, *, t0: float, first: int, saves: Iterable[int]) -> Iterator[Array]:
+def run(step: Leap, drive: Drive, s: Array, first_bad: Whole, *, t0: Array, first: int, saves: Iterable[int]) -> Iterator[Array]:
     """The states at ``saves``, steps counted from number ``first``; ``first_bad`` gets the steps at which members diverged."""
     leaps: dict[int, Leap] = {}
     done = 0
     for save in saves:
         if n := save - done:
             leaps[n] = leaps[n] if n in leaps else drive.power(step, n)
-            t = np.full(s.shape[1:], t0 + (first + done) * drive.h)
+            t = np.asarray(t0 + (first + done) * drive.h, dtype=np.float64)
             following = drive.after(leaps[n], s, t)
             bad = (first_bad < 0) & ~np.isfinite(following).all(axis=0)
             if bad.any():
-                first_bad[bad] = _first_bad(step.of(bad), drive.of(bad), s[:, bad], t0, first + done, n)
+                first_bad[bad] = _first_bad(step.of(bad), drive.of(bad), s[:, bad], t0[bad], first + done, n)
             s, done = following, save
         yield s
 
 
-def _first_bad(step: Leap, drive: Drive, s: Array, t0: float, k: int, n: int) -> Whole:
+def _first_bad(step: Leap, drive: Drive, s: Array, t0: Array, k: int, n: int) -> Whole:
     """The first steps whose states are not finite, of members that are finite at step k and not n steps later.
 
     The leaps of 1, 2, 4, … steps, the longest first: each is made by the members that are still finite after it.

@@ -121,26 +121,36 @@ class Stepped:
     Args:
         samples: the samples.
         times: when each of them begins, likewise.
+        origin: for each member the time from which both count, always the same; None for times as they are.
     """
 
     factor: Array | None = None
 
-    def __init__(self, samples: Held, times: Held) -> None:
-        self.samples, self.times = samples, times
+    def __init__(self, samples: Held, times: Held, origin: Held | None = None) -> None:
+        self.samples, self.times, self.origin = samples, times, origin
 
     def parts(self) -> dict[str, Held]:
         """Its tables, by what is put behind its name."""
-        return {"": self.samples, ".times": self.times}
+        tables = {"": self.samples, ".times": self.times}
+        return tables if self.origin is None else tables | {".origin": self.origin}
 
     def at(self, t: Any) -> Array:
         """The value at time t, or that of a step."""
         window = _WINDOW.get()
-        value = self.samples.at(t) if window is None else self._mean(*window)
+        value = self._held(t) if window is None else self._mean(*window)
         return value if self.factor is None else np.asarray(self.factor * value)
 
+    def _held(self, t: Any) -> Any:
+        return self.samples.at(t if self.origin is None else t - self.origin.at(t))
+
     def _mean(self, start: Any, end: Any, length: Any) -> Any:
-        before, after = self.samples.sample(start), self.samples.sample(end)
-        share = (end - self.times.sample(end)) / length
+        if self.origin is None:
+            before, after, began = self.samples.sample(start), self.samples.sample(end), self.times.sample(end)
+        else:
+            origin = self.origin.sample(end)
+            before, after = self.samples.sample(start - origin), self.samples.sample(end - origin)
+            began = origin + self.times.sample(end - origin)
+        share = (end - began) / length
         share = bits.where(bits.less(0.0, share), share, 0.0)
         share = bits.where(bits.less(share, 1.0), share, 1.0)
         return np.asarray(before + share * (after - before))

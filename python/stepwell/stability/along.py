@@ -22,6 +22,7 @@ from ..method_records import method as find_method
 from ..result import Run
 from ..systems import LinearSystem, Oscillator, System
 from . import eigen, maps
+from .analysis import goes_forward
 from .eigen import Complex
 from .limit import Mode, stability_limit
 from .limit_digits import LADDER
@@ -44,7 +45,7 @@ class StabilityAlong(Value):
     Attributes:
         method: the method.
         run_dt: the step of the run, or None for a run with a tolerance.
-        t: times of the saved states, shape (saved,).
+        t: times of the saved states, shape (saved,), or (saved, *batch) where members have times of their own.
         limits: for each saved state the largest step below which no mode grows that does not grow in the exact solution, shape
             (saved, *batch): 0 if there is no such step, infinite if there is no such mode, NaN if the state is not finite.
         rates: for each saved state λ of the mode that sets the limit, complex, likewise; NaN where none does.
@@ -67,7 +68,7 @@ class StabilityAlong(Value):
         self.growth = growth
         self.index: Any = np.asarray(index)[()]
         self.dt: Any = np.take_along_axis(limits, np.asarray(index)[np.newaxis], axis=0)[0][()]
-        self.when: Any = t[index]
+        self.when: Any = t[index] if t.ndim == 1 else np.take_along_axis(t, np.asarray(index)[np.newaxis], axis=0)[0]
         self.mode: Any = modes if np.ndim(index) else modes[()]
 
     @property
@@ -116,6 +117,7 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
     """
     if not isinstance(run, Run):
         raise DTypeError(f"run: expected what integrate returns, got {type(run).__name__}")
+    goes_forward(run)
     how = run.method if method is None else find_method(method)
     system = run.system.uncontrolled
     fits_together(system, how)
@@ -149,9 +151,9 @@ def _linearised(system: System, run: Run) -> Array:
         A = A.reshape(*A.shape[:2], *(1,) * (len(members) + 3 - A.ndim), *A.shape[2:])
         return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
     v, y = (np.moveaxis(a, 0, len(s)) for a, s in ((run.v, system.v_shape), (run.y, system.y_shape)))
-    t: Any = run.t.reshape(-1, *(1,) * len(members))
+    t: Any = run.t if run.t.ndim > 1 else run.t.reshape(-1, *(1,) * len(members))
     # Built-in systems only add inputs, which do not change the derivative: one time suffices.
-    A = maps.rates(system, float(run.t[0]) if system.complex_step else t, v, y)
+    A = maps.rates(system, float(run.t.flat[0]) if system.complex_step else t, v, y)
     return np.broadcast_to(A, (*A.shape[:2], len(run.t), *members))
 
 

@@ -11,7 +11,7 @@ from .._brief import facts
 from .._checks import Array, Shape
 from .._value import Value
 from ..compatible import fits_together
-from ..errors import ArgumentError, DTypeError, ShapeError
+from ..errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..result import Run
@@ -345,8 +345,19 @@ def _given(at: Any) -> str:
     return f"{len(at)} of them" if isinstance(at, (tuple, list)) else type(at).__name__
 
 
+def goes_forward(run: Run) -> None:
+    """Raise if a run went back in time."""
+    if run.dt < 0.0:
+        raise UnsupportedError(
+            f"run: expected steps forward in time, got dt = {run.dt:g}: what decays forward grows on the way back"
+        )
+
+
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
     """The saved states of a run, one after the other."""
+    goes_forward(run)
+    if run.t.ndim > 1:
+        raise UnsupportedError("at: expected a run whose members have their times in common; analyse a run for each t0")
     expected = (*system.v_shape, *run.status.shape)
     if run.v.shape[1:] != expected:
         raise ShapeError(f"at: expected a run of {system!r}, states of v of shape {expected}, got {run.v.shape[1:]}")

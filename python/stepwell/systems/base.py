@@ -324,8 +324,8 @@ class System(Fixed, Value, ABC):
         """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
         return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
 
-    def over_steps(self, method: Method, t0: float, dt: float) -> Self:
-        """The same system, whose held samples of less than a step are given by their means over the steps."""
+    def over_steps(self, method: Method, t0: Any, dt: float) -> Self:
+        """The same system, whose held samples of less than a step are given by their means over the steps, of each ``t0``."""
         held = [each for each in self.given_inputs().values() if isinstance(each, Sampled)]
         # Rates of methods that carry something in place of v belong to the middle of what is stepped over.
         first = t0 if method.carry is None else t0 - 0.5 * dt
@@ -340,6 +340,11 @@ class System(Fixed, Value, ABC):
             return value.over_steps(first, dt) if isinstance(value, Sampled) else value
 
         return changed(self, **{name: means(value) for name, value in vars(self).items() if not name.startswith("_")})
+
+    @property
+    def has_time(self) -> bool:
+        """Whether its rates may depend on the time."""
+        return bool(self.given_inputs())
 
     def without_inputs(self) -> System:
         """The same system without inputs."""

@@ -9,7 +9,7 @@ import numpy as np
 from .. import _checks
 from .._brief import brief
 from .._checks import Array, Shape
-from .._value import Fixed, Value
+from .._value import Fixed, Value, changed
 from ..errors import ArgumentError, ShapeError
 from ..reference.signal import HOLD_SLACK, Constant, Curve, Held, Sine, Stepped
 
@@ -101,6 +101,7 @@ class Sampled(Fixed, Value):
     """
 
     interpolation: Interpolation = "hold"
+    _origin: Array | None = None  # for each member the time of its first sample, from which ``start`` counts
 
     def __init__(self, values: Any, interval: Any, start: Any = 0.0, interpolation: Interpolation = "hold") -> None:
         self.values = _checks.numbers("values", values)
@@ -141,19 +142,27 @@ class Sampled(Fixed, Value):
             times = self.start + (self.interval * np.arange(1, len(times))[changes]) / HOLD_SLACK
         return times[(begin <= times) & (times <= end)]
 
-    def over_steps(self, first: float, dt: float) -> Sampled:
-        """The means over steps from ``first`` on in place of held samples of which a step has several; else itself."""
+    def over_steps(self, first: Any, dt: float) -> Sampled:
+        """The means over steps from ``first`` on in place of held samples of which a step has several; else itself.
+
+        ``first`` is one time or one for each member.
+        """
         if self.interpolation != "hold" or len(self.values) == 1 or self.interval >= dt * (1.0 - 1e-9):
             return self
-        times = self.times
+        times, own, batch = self.times, np.shape(first), np.broadcast_shapes(np.shape(first), self.batch)
+        numbers = np.arange(np.ceil((times[-1] - times[0]) / dt) + 2.0)
+        _checks.fits("the means of samples over steps", 8.0 * len(numbers), batch, "take steps no longer than their interval")
         before = np.floor((times[0] - first) / dt)
-        ends = first + dt * (before + np.arange(np.ceil((times[-1] - times[0]) / dt) + 2.0))
+        ends = first + dt * (before + numbers.reshape(-1, *(1,) * len(own)))
         off = self.values - self.values[0]  # so that less cancels
         until = np.concatenate([np.zeros((1, *off.shape[1:])), np.cumsum(off, axis=0)]) * self.interval
         at = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, None)
-        since = np.maximum(ends - times[at], 0.0).reshape(-1, *(1,) * (off.ndim - 1))
-        means = np.diff(until[at] + off[at] * since, axis=0) / dt + self.values[0]
-        return Sampled(np.concatenate([means, self.values[-1:]]), dt, float(ends[0]))
+        since = np.maximum(ends - times[at], 0.0).reshape(len(numbers), *(1,) * (len(batch) - len(own)), *own)
+        means = np.diff(_at(until, at, batch) + _at(off, at, batch) * since, axis=0) / dt + self.values[0]
+        values = np.concatenate([means, np.broadcast_to(self.values[-1:], (1, *batch))])
+        if own:
+            return changed(self, values=values, interval=dt, start=0.0, batch=batch, _origin=ends[0])
+        return Sampled(values, dt, float(ends[0]))
 
     def check(self, last: float) -> None:
         """Do nothing: samples are defined at any time."""
@@ -163,7 +172,9 @@ class Sampled(Fixed, Value):
         if len(self.values) == 1:
             return Constant(np.asarray(self.values[0]))
         if self.interpolation == "hold":
-            return Stepped(*(Held(each, self.interval, self.start) for each in (self.values, self.times)))
+            origin = None if self._origin is None else Held(self._origin[np.newaxis], 1.0, 0.0)
+            held, since = (Held(each, self.interval, self.start) for each in (self.values, self.times))
+            return Stepped(held, since, origin)
         slopes = np.diff(self.values, axis=0) / self.interval
         pieces = [self.values[:-1], slopes]
         if self.interpolation == "cubic":
@@ -181,6 +192,17 @@ class Sampled(Fixed, Value):
         first = self.start - self.interval
         times = first + self.interval * np.arange(len(tables[0]))
         return Curve(*(Held(each, self.interval, first) for each in (*tables, times)))
+
+
+def _at(values: Array, numbers: Any, batch: Shape) -> Array:
+    """Those of the values that have these numbers, of which each member may have its own, over the batch."""
+    if numbers.ndim == 1:
+        return np.asarray(values[numbers])
+    wide, each = (
+        np.broadcast_to(rows.reshape(len(rows), *(1,) * (len(batch) + 1 - rows.ndim), *rows.shape[1:]), (len(rows), *batch))
+        for rows in (values, numbers)
+    )
+    return np.take_along_axis(wide, each, axis=0)
 
 
 #: Samples from which a derivative is found: it is exact for polynomials up to one degree less.

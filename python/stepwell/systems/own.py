@@ -232,7 +232,7 @@ class OwnSystem(System):
             return value.shape[: self.own_axes(name)]
         if isinstance(value, (Sinusoid, Sampled)):
             signal = value.signal()
-            return type(signal).__name__, len(getattr(signal, "coefficients", ()))
+            return type(signal).__name__, *getattr(signal, "parts", dict)()
         return told(value)
 
     def _trace(self) -> None:
@@ -418,6 +418,11 @@ class OwnSystem(System):
         kept._trace()
         complete(kept, velocity_term=kept.velocity_term or "a control of an invariant")
         return kept
+
+    @property
+    def has_time(self) -> bool:
+        """Its function takes the time, whether or not it uses it."""
+        return True
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs among the parameters, by name."""

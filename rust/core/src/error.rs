@@ -58,6 +58,17 @@ pub enum Error {
         /// What it may have.
         most: usize,
     },
+    /// A step that is too long for one tape, on which alone members have times of their own.
+    #[error(
+        "t0: a step of about {operations} operations is too long for times of its members' own, which go with steps of up to {most}; make \
+         a run for each t0"
+    )]
+    TooLongForTimes {
+        /// What a step has.
+        operations: usize,
+        /// What it may have.
+        most: usize,
+    },
     /// A step that is too long for one tape, which numbers of 32 bits need.
     #[error("dtype: a step of about {operations} operations is too long; float32 goes with steps of up to {most}")]
     TooLongForSingle {

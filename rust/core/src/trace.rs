@@ -144,6 +144,18 @@ pub(crate) fn parameters(given: &Given, h: Symbol) -> Parameters<'_, Symbol> {
     Parameters { given, h, numbers, sample: window::sample }
 }
 
+/// The parameter that is each member's own time of step 0, where they have some: the clock's is then 0.
+pub const BEGINS: &str = "time.begins";
+
+/// The time of a step.
+pub(crate) fn time(given: &Given) -> Symbol {
+    let clock = Symbol::new(Op::Time);
+    match given.place(BEGINS) {
+        Some(row) => Symbol::new(Op::Param(row as u32)) + clock,
+        None => clock,
+    }
+}
+
 /// Numbers of the state.
 pub(crate) fn block(first: usize, count: usize) -> Block<Symbol> {
     Block::from_fn(count, |i, _| Symbol::new(Op::State((first + i) as u32)))
@@ -207,14 +219,14 @@ pub fn trace_step(tape: Tape, given: &Given, how: &How) -> Result<Steps, Error> 
             let (tape, next) = record(tape, || {
                 let p = parameters(given, Symbol::new(Op::Step));
                 let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-                ids([&next_state(step, &p, Symbol::new(Op::Time), &v, &y)])
+                ids([&next_state(step, &p, time(given), &v, &y)])
             });
             Ok(Steps { tape, next, shape, tally: false, terms: Vec::new() })
         }
         How::Method { name, choice } => {
             let (kind, method) = (kind(given)?, method(name)?);
             let carries = method.carry.is_some();
-            let seen = || window::of_step(Symbol::new(Op::Time), Symbol::new(Op::Step), carries);
+            let seen = || window::of_step(time(given), Symbol::new(Op::Step), carries);
             let (tape, (next, tally)) = record(tape, || window::over(given, seen, || step(kind, given, shape, method, *choice)));
             Ok(Steps { tape, next, shape, tally, terms: Vec::new() })
         }
@@ -249,7 +261,7 @@ pub(crate) fn ids<'a>(blocks: impl IntoIterator<Item = &'a Block<Symbol>>) -> Ve
 }
 
 fn step(kind: &Kind, given: &Given, shape: Shape, method: &Record, choice: usize) -> (Vec<Id>, bool) {
-    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let (h, t) = (Symbol::new(Op::Step), time(given));
     let (v0, y0) = (block(0, shape.v), block(shape.v, shape.y));
     let p = parameters(given, h);
     let s = system(kind, &p, Symbol::new(Op::State((shape.v + shape.y) as u32)));
@@ -379,7 +391,7 @@ fn trace_by_terms(tape: Tape, given: &Given, how: &How, shape: Shape, numbers: u
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
 fn matrix(given: &Given, shape: Shape, nodes: &[u64]) -> Vec<Id> {
-    let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+    let (h, t) = (Symbol::new(Op::Step), time(given));
     let p = parameters(given, h);
     let n = shape.v + shape.y;
     let mut columns: Vec<Symbol> = block(0, n).iter().copied().collect();
@@ -411,7 +423,7 @@ fn trace_slot(tape: Tape, given: &Given, program: &Program) -> Result<(Tape, Vec
     let kind = kind(given)?;
     let shape = (kind.shape)(given)?;
     Ok(record(tape, || {
-        let (h, t) = (Symbol::new(Op::Step), Symbol::new(Op::Time));
+        let (h, t) = (Symbol::new(Op::Step), time(given));
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
         let p = parameters(given, h);
         let made = || program.run(around(kind, &p).as_ref(), t, h, &v, &y).into_iter().next();
@@ -507,8 +519,9 @@ fn has_series(how: &How) -> Result<bool, Error> {
     })
 }
 
-/// The most operations, approximately, of a step by a series: it is one tape in any case, and takes some ten nanoseconds a byte to compile.
-const MAX_SERIES_OPERATIONS: usize = 100_000;
+/// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, or one of members that have
+/// times of their own. It takes some ten nanoseconds a byte to compile.
+const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;
 
 impl Scene {
     /// What is known of it, or was found before.
@@ -518,11 +531,15 @@ impl Scene {
             let shape = shape(&self.given, &self.how)?;
             let operations = operations(&self.given, &self.how, shape)?;
             let series = has_series(&self.how)?;
-            if series && operations.1 > MAX_SERIES_OPERATIONS {
-                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_SERIES_OPERATIONS });
+            if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
             if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
                 return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
+            }
+            let own_times = self.given.count(BEGINS) > 0;
+            if own_times && operations.1 > MAX_LONG_TAPE_OPERATIONS {
+                return Err(Error::TooLongForTimes { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
             }
             if self.precision == Precision::Single {
                 self.fits_single(operations.1)?;
@@ -549,7 +566,8 @@ impl Scene {
                 courses: Mutex::default(),
                 scene: self.clone(),
             };
-            let most = if series || matches!(self.how, How::Step(_)) { MAX_SERIES_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
+            let is_one = series || own_times || matches!(self.how, How::Step(_));
+            let most = if is_one { MAX_LONG_TAPE_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
             Ok((traced, operations.1.min(most)))
         })
     }

@@ -50,19 +50,40 @@ pub fn mean<N: Number>([_, to, length]: Window<N>, began: N, before: N, after: N
 
 /// Whether a table holds samples of which a step sees the mean: the one after it says when they begin.
 pub fn is_held(given: &Given, table: usize) -> bool {
+    belongs(given, table, table + 1, ".times")
+}
+
+/// Whether a table is that part of an input whose first table is another.
+fn belongs(given: &Given, first: usize, table: usize, part: &str) -> bool {
     let name = |table: usize| given.tables.get(table).map(|(name, _)| name.as_str());
-    name(table).zip(name(table + 1)).is_some_and(|(name, next)| next.strip_suffix(".times") == Some(name))
+    name(first).zip(name(table)).is_some_and(|(name, other)| other.strip_suffix(part) == Some(name))
+}
+
+/// How a table is looked up.
+#[derive(Clone, Copy, PartialEq)]
+enum Lookup {
+    /// At a time.
+    AtTime,
+    /// By its mean, at times as they are.
+    Mean,
+    /// By its mean, at times that count from one of each member, which is in the table behind that of times.
+    MeanSince,
 }
 
 thread_local! {
-    /// The window in which symbols of this thread look samples up, and which tables are held.
-    static NOW: RefCell<Option<(Window<Symbol>, Vec<bool>)>> = const { RefCell::new(None) };
+    /// The window in which symbols of this thread look samples up, and how each table is.
+    static NOW: RefCell<Option<(Window<Symbol>, Vec<Lookup>)>> = const { RefCell::new(None) };
 }
 
 /// Runs a function in which steps see the mean of samples over a window, if there are samples that are held.
 pub fn over<T>(given: &Given, window: impl FnOnce() -> Window<Symbol>, f: impl FnOnce() -> T) -> T {
-    let held: Vec<bool> = (0..given.tables.len()).map(|table| is_held(given, table)).collect();
-    let now = held.contains(&true).then(|| (window(), held));
+    let lookup = |table: usize| match is_held(given, table) {
+        true if belongs(given, table, table + 2, ".origin") => Lookup::MeanSince,
+        true => Lookup::Mean,
+        false => Lookup::AtTime,
+    };
+    let lookups: Vec<Lookup> = (0..given.tables.len()).map(lookup).collect();
+    let now = lookups.iter().any(|&lookup| lookup != Lookup::AtTime).then(|| (window(), lookups));
     let outer = NOW.replace(now);
     let made = f();
     NOW.replace(outer);
@@ -72,10 +93,16 @@ pub fn over<T>(given: &Given, window: impl FnOnce() -> Window<Symbol>, f: impl F
 /// A sampled input: its mean over the window if there is one, or else its value at a time.
 pub fn sample(table: u32, t: Symbol) -> Symbol {
     let at = |table: u32, t: Symbol| Symbol::new(Op::Sample(table, t.0));
-    let window = NOW.with_borrow(|now| now.as_ref().and_then(|(window, held)| held[table as usize].then_some(*window)));
-    let Some(window @ [from, to, _]) = window else { return at(table, t) };
-    let (before, after) = (at(table, from), at(table, to));
-    let seen = mean(window, at(table + 1, to), before, after);
+    let now = NOW.with_borrow(|now| now.as_ref().map(|(window, lookups)| (*window, lookups[table as usize])));
+    let Some((window @ [from, to, _], lookup)) = now.filter(|(_, lookup)| *lookup != Lookup::AtTime) else { return at(table, t) };
+    let seen = if lookup == Lookup::MeanSince {
+        let origin = at(table + 2, to);
+        let (before, after) = (at(table, from - origin), at(table, to - origin));
+        mean(window, origin + at(table + 1, to - origin), before, after)
+    } else {
+        let (before, after) = (at(table, from), at(table, to));
+        mean(window, at(table + 1, to), before, after)
+    };
     if series::is_marking() {
         series::mark(seen, series::Mark::Factors(Vec::new(), None)); // it is the same all over the step, though made of the time
     }

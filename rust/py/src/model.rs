@@ -55,7 +55,7 @@ pub fn readable<'py>(array: &Bound<'py, PyArray2<f64>>) -> PyResult<PyReadonlyAr
 pub fn core_error(error: Error) -> PyErr {
     let name = match error {
         Error::Memory { .. } => "TooLargeError",
-        Error::TooLongForSeries { .. } => "UnsupportedError",
+        Error::TooLongForSeries { .. } | Error::TooLongForTimes { .. } => "UnsupportedError",
         _ => "ArgumentError",
     };
     error_of(name, error.to_string())

@@ -35,7 +35,7 @@ use crate::{
     real::Precision,
     spec::Spec,
     system,
-    trace::{How, Scene, Traceable, Traced},
+    trace::{BEGINS, How, Scene, Traceable, Traced},
 };
 
 /// The system to step and the way to step it.
@@ -90,10 +90,13 @@ impl Model<'_> {
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Way {
         let (rates, step) = traced.operations;
         let single = members == 1;
-        // Operations are fused on the tape of the whole step, and friction needs the state at its start.
+        // Operations are fused on the tape of the whole step, friction needs the state at its start, and only there have members times of
+        // their own.
+        let own_times = self.scene.given.count(BEGINS) > 0;
         let is_single = self.scene.precision == Precision::Single;
         let is_given = matches!(self.scene.how, How::Step(_));
-        if is_single || self.scene.fused || traced.series || is_given || controls::friction::is_given(&self.scene.given) {
+        let as_one = is_single || own_times || self.scene.fused || traced.series || is_given;
+        if as_one || controls::friction::is_given(&self.scene.given) {
             return Way::Tape;
         }
         if let How::Matrix { .. } = &self.scene.how {

@@ -1,0 +1,293 @@
+"""A time of step 0 for each member: its bits are those of a run alone that begins then."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from cases import SYSTEMS, Case, assert_same, cases, thinned
+from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
+
+METHODS = [m.name for m in sw.methods()]
+
+
+@sw.system
+def swept(t: Any, v: Any, y: Any, *, k: Any = 1.0, drive: Any = 0.0) -> Any:
+    return np.cos(0.7 * t) / (1.0 + 0.1 * t * t) + drive - k * np.sin(y)
+
+
+def quietly(system: Any, method: str, **options: Any) -> sw.Run:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", sw.DivergenceWarning)
+        warnings.simplefilter("ignore", sw.AccuracyWarning)
+        return sw.integrate(system, method, **options)
+
+
+ALL = list(cases())
+
+
+@pytest.mark.parametrize("case", thinned(ALL, {"direct": 2, "matrix": 2, "power": 2}, "own times"))
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_each_member_is_a_run_of_its_own_time(case: Case, backend: Any) -> None:
+    """Its bits and times are those of the batch that all begins when it does, of which it is the same member."""
+    begins = np.array([0.0, -1.3, 2.75, 100.0, 7e5 / 3.0])
+    system, given = case.make(5)
+    given |= {"steps": 23, "every": 5, "backend": backend}
+    together = quietly(system, t0=begins, **given)
+    assert together.t.shape == (6, 5)
+    for i, begin in enumerate(begins):
+        common = quietly(system, t0=float(begin), **given)
+        np.testing.assert_array_equal(together.t[:, i], common.t)
+        np.testing.assert_array_equal(together.v[..., i], common.v[..., i])
+        np.testing.assert_array_equal(together.y[..., i], common.y[..., i])
+        assert together.first_bad_step[i] == common.first_bad_step[i]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("options", [{}, {"fused": True}, {"backend": "numpy"}, {"fused": True, "backend": "numpy"}], ids=str)
+def test_a_member_alone(method: str, options: dict[str, Any]) -> None:
+    """Of many members, of which machine code steps whole vectors; forward and back; two batch axes."""
+    begins = np.linspace(-3.0, 4.0, 70).reshape(7, 10)
+    steps = 12 if options.get("backend") else 60  # each takes NumPy milliseconds
+    for dt in (0.1, -0.1):
+        start = {"v": 0.3, "y": np.linspace(0.5, 1.5, 10), "dt": dt, "steps": steps, **options}
+        run = sw.integrate(swept(), method, t0=begins, **start)
+        assert run.y.shape == run.t.shape == (1, 7, 10)
+        np.testing.assert_array_equal(run.t[0], begins + steps * dt)
+        for index in ((0, 0), (3, 7), (6, 9)):
+            alone = sw.integrate(swept(), method, t0=begins[index], **start | {"y": start["y"][index[1]]})
+            np.testing.assert_array_equal((run.v[(0, *index)], run.y[(0, *index)]), (alone.v[0], alone.y[0]))
+
+
+@pytest.mark.parametrize("drive", [sw.Sinusoid(0.5, 1.3), sw.Sampled(np.sin(np.arange(40.0)), 0.25, start=-2.0)], ids=str)
+@pytest.mark.parametrize("method", ["rk4", "leapfrog", "dop853"])
+def test_inputs_of_own_equations_and_of_systems(method: str, drive: Any) -> None:
+    begins = np.array([-1.0, 0.3, 2.0])
+    for system in (swept(drive=drive), sw.Pendulum(1.5, a=drive), sw.Oscillator(1.5, x=drive)):
+        start = {"v": 0.3, "y": 1.0, "dt": 0.07, "steps": 60}
+        run = sw.integrate(system, method, t0=begins, **start)
+        np.testing.assert_array_equal(run.y, sw.integrate(system, method, t0=begins, backend="numpy", **start).y)
+        for i, begin in enumerate(begins):
+            assert run.y[0, i] == sw.integrate(system, method, t0=begin, **start).y[0]
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [(method, {}) for method in METHODS]
+    + [(method, options) for method in ("rk4", "leapfrog") for options in ({"fused": True}, {"backend": "numpy"})],
+    ids=str,
+)
+def test_means_of_several_samples_within_a_step(method: str, options: dict[str, Any]) -> None:
+    """Which are others for each t0; samples are the same for all members, or of each."""
+    rng = np.random.default_rng(5)
+    begins = np.array([[-1.0], [0.3], [2.013]])
+    common, own = sw.Sampled(rng.normal(size=90), 0.03, -1.3), sw.Sampled(rng.normal(size=(60, 2)), 0.04, -1.1)
+    start = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 40, "every": 9, **options}
+    for system in (swept(k=own, drive=common), sw.Pendulum(1.5, a=own)):
+        run = sw.integrate(system, method, t0=begins, **start)
+        for i, begin in enumerate(begins[:, 0]):
+            alone = sw.integrate(system, method, t0=float(begin), **start)
+            for j in range(run.y.shape[2]):
+                member = (slice(None), j) if alone.y.ndim == 2 else slice(None)
+                np.testing.assert_array_equal(run.y[:, i, j], alone.y[member])
+                np.testing.assert_array_equal(run.v[:, i, j], alone.v[member])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pieces_are_the_run(method: str) -> None:
+    begins = np.array([-1.0, 0.3, 2.0])
+    start = {"v": 0.3, "y": 1.0, "t0": begins, "dt": 0.1}
+    whole = sw.integrate(swept(), method, steps=30, every=10, **start)
+    half = sw.integrate(swept(), method, steps=20, **start)
+    rest = sw.integrate(swept(), method, steps=10, **half.resume)
+    np.testing.assert_array_equal((rest.v[-1], rest.y[-1], rest.t[-1]), (whole.v[-1], whole.y[-1], whole.t[-1]))
+
+
+@pytest.mark.parametrize("method", ["rk4", "verlet"])
+@pytest.mark.parametrize("members", [3, 200])
+@pytest.mark.parametrize("every", [None, 7])
+def test_events_are_at_the_times_of_their_members(method: str, members: int, every: int | None) -> None:
+    begins = np.linspace(-2.0, 3.0, members)
+    events = [sw.Event(lambda t, v, y: y - 0.01 * t, name="low"), sw.Event(lambda t, v, y: t - 4.0, name="four", terminal=True)]
+    start = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 120, "every": every}
+    run = sw.integrate(swept(), method, t0=begins, events=events, **start)
+    assert run.stopped_at is not None
+    for i in (0, 1, members - 1):
+        alone = sw.integrate(swept(), method, t0=float(begins[i]), events=events, **start)
+        for name in ("low", "four"):
+            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
+        assert run.stopped_at[i] == alone.stopped_at
+        np.testing.assert_array_equal(run.y[:, i], alone.y)
+
+
+def test_what_knows_no_time_is_only_told_other_times() -> None:
+    scene = sw.scenes.figure_eight()
+    begins = np.array([0.0, 5.0])
+    wide = {"v": np.stack([scene.v] * 2, axis=-1), "y": np.stack([scene.y] * 2, axis=-1)}
+    run = sw.integrate(scene.system, "leapfrog", t0=begins, dt=0.01, steps=100, every=50, **wide)
+    one = sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=0.01, steps=100, every=50)
+    np.testing.assert_array_equal(run.y[..., 1], one.y)
+    np.testing.assert_array_equal(run.t, one.t[:, np.newaxis] + begins)
+    assert run.encounters == ()
+    assert "t = 0 to 6" in repr(run)
+
+
+def test_messages_name_the_time_of_the_member() -> None:
+    late = sw.system(lambda t, v, y: -y + np.sqrt(10.0 - t))
+    with pytest.warns(sw.DivergenceWarning, match=r"1 of 2 members diverged: member 1 at step 51 \(t = 10.1\), by rk4"):
+        run = sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.array([0.0, 5.0]), dt=0.1, steps=70)
+    assert run.first_bad_step.tolist() == [-1, 51]
+    with pytest.raises(ArgumentError, match=r"dt, t0: expected a time that moves on .* of member 1"):
+        sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.array([0.0, 1e300]), dt=0.1, steps=3)
+    with pytest.raises(ShapeError, match="t0"):
+        sw.integrate(late(), "rk4", v=0.0, y=np.ones(3), t0=np.zeros(2), dt=0.1, steps=3)
+    with pytest.raises(ArgumentError, match="t0: expected finite numbers"):
+        sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.array([0.0, np.nan]), dt=0.1, steps=3)
+    with pytest.raises(UnsupportedError, match="t0: one for each member goes with float64"):
+        sw.integrate(late(), "rk4", v=0.0, y=1.0, t0=np.zeros(2), dt=0.1, steps=3, dtype="float32")
+    free = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, t0=np.arange(2.0), dt=0.1, steps=3, dtype="float32")
+    np.testing.assert_array_equal(free.t[0], np.arange(2.0) + 3 * float(np.float32(0.1)))
+
+
+def test_tables_have_both_axes() -> None:
+    pytest.importorskip("xarray")
+    pytest.importorskip("pandas")
+    run = sw.integrate(swept(), "rk4", v=0.3, y=1.0, t0=np.array([0.0, 5.0]), dt=0.1, steps=4, every=2)
+    table = run.to_xarray()
+    assert table.time.dims == ("t", "member")
+    np.testing.assert_array_equal(table.time, run.t)
+    frame = run.to_dataframe()
+    np.testing.assert_array_equal(frame["time"].to_numpy().reshape(3, 2), run.t)
+
+
+@sw.system
+def many(t: Any, v: Any, y: Any) -> Any:
+    return np.sin(t + np.arange(300.0)) - y * np.sqrt(1.0 + y * y) + np.roll(y, 1)
+
+
+def test_steps_that_are_not_one_tape_else() -> None:
+    """300 coordinates, each driven at its own phase."""
+    rng = np.random.default_rng(3)
+    v, y = rng.normal(size=(2, 300, 6))
+    begins = np.linspace(0.0, 3.0, 6)
+    run = sw.integrate(many(), "rk4", v=v, y=y, t0=begins, dt=0.05, steps=5)
+    for i in (0, 5):
+        alone = sw.integrate(many(), "rk4", v=v[:, i], y=y[:, i], t0=float(begins[i]), dt=0.05, steps=5)
+        np.testing.assert_array_equal(run.y[..., i], alone.y)
+
+
+def test_a_step_too_long_for_one_tape_is_refused() -> None:
+    """Its rates are computed at one time for all members, t + c·h, where each t0 + k·h must be rounded first."""
+    large = sw.LinearSystem(-np.eye(200), np.ones((200, 1)), x=sw.Sinusoid(1.0, 1.3))
+    with pytest.raises(UnsupportedError, match=r"t0: a step of about .* operations is too long for times of its members' own"):
+        sw.integrate(large, "dop853", v=0.0, y=np.ones((100, 2)), t0=np.arange(2.0), dt=0.05, steps=5)
+
+
+def test_the_same_cases_are_the_reference() -> None:
+    """Core and reference, of a few cases of every form, in one comparison of all that a run keeps."""
+    for form in ("direct", "matrix", "power"):
+        for case in [
+            case for case in ALL if case.form == form and SYSTEMS[case.system](np.random.default_rng(0), 1).given_inputs()
+        ][:6]:
+            system, given = case.make(3)
+            given |= {"steps": 23, "every": 5, "t0": np.array([0.0, 1.5, -2.0])}
+            assert_same(quietly(system, **given), quietly(system, backend="numpy", **given))
+
+
+@pytest.mark.parametrize("method", ["rk4", "leapfrog"])
+@pytest.mark.parametrize(("members", "backend"), [(3, "rust"), (90, "rust"), (3, "numpy")])
+def test_events_change_the_state_at_the_times_of_their_members(method: str, members: int, backend: Any) -> None:
+    events = [
+        sw.Event(lambda t, v, y: y - 0.01 * t, direction=-1, then=lambda t, v, y: (-0.9 * v, y), name="low"),
+        sw.Event(lambda t, v, y: t - 4.0, then=lambda t, v, y: (v + 0.1 * t, y), name="four"),
+    ]
+    begins, y = np.linspace(-2.0, 3.0, members), np.linspace(0.5, 1.5, members)
+    start: dict[str, Any] = {"v": 0.3, "dt": 0.1, "steps": 90, "every": 7, "events": events, "backend": backend}
+    run = sw.integrate(swept(), method, y=y, t0=begins, **start)
+    for i in (0, 1, members - 1):
+        alone = sw.integrate(swept(), method, y=y[i], t0=float(begins[i]), **start)
+        assert len(alone.events["four"].t) == 1
+        for name in ("low", "four"):
+            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
+        np.testing.assert_array_equal(run.v[:, i], alone.v)
+        np.testing.assert_array_equal(run.y[:, i], alone.y)
+
+
+def test_events_by_the_time_of_a_system_without_time() -> None:
+    """Of so many members the core notices changes of sign by itself, where it knows their times."""
+    events = [sw.Event(lambda t, v, y: t - 4.03, name="four"), sw.Event(lambda t, v, y: y, name="zero")]
+    begins = np.linspace(-2.0, 3.0, 200)
+    start: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 120, "events": events}
+    run = sw.integrate(sw.Pendulum(1.5), "rk4", t0=begins, **start)
+    assert len(run.events["four"].t) == 200
+    for i in (0, 77, 199):
+        alone = sw.integrate(sw.Pendulum(1.5), "rk4", t0=float(begins[i]), **start)
+        for name in ("four", "zero"):
+            np.testing.assert_array_equal(run.events[name].t[run.events[name].member == i], alone.events[name].t)
+
+
+@sw.system
+def driven(t: Any, v: Any, y: Any) -> Any:
+    return np.cos(0.7 * t) - np.sin(y)
+
+
+@driven.invariant
+def energy(v: Any, y: Any) -> Any:
+    return 0.5 * v * v - np.cos(y)
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("method", ["rk4", "leapfrog", "verlet", "dop853"])
+def test_forces_controls_records_and_threads(method: str, backend: Any) -> None:
+    begins, force = np.array([0.0, 1.0, 2.5, -4.0]), np.array([0.1, 0.2, 0.3, 0.4])
+    options: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 40, "every": 7, "record": "energy", "backend": backend}
+    if method in ("rk4", "dop853"):
+        options["control"] = sw.Control("energy", gain=0.5)
+    run = quietly(driven(), method, t0=begins, force=force, threads=3, **options)
+    for i in range(4):
+        alone = quietly(driven(), method, t0=begins[i], force=force[i], **options)
+        np.testing.assert_array_equal(run.y[:, i], alone.y)
+        np.testing.assert_array_equal(run.recorded["energy"][:, i], alone.recorded["energy"])
+        np.testing.assert_array_equal(run.t[:, i], alone.t)
+        if run.work is not None:
+            assert run.work[i] == alone.work
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_zeros_of_times_have_one_sign(backend: Any) -> None:
+    """At −0 and steps back t0 + 0·dt would be −0 alone, and 0 where the clock is 0: 1/t tells them apart."""
+    pole = sw.system(lambda t, v, y: np.where(1.0 / t > 0.0, 1.0, -1.0) + 0.0 * y)
+    start: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": -0.1, "steps": 1, "backend": backend}
+    run = sw.integrate(pole(), "standard_euler", t0=np.array([-0.0, 0.0]), **start)
+    for i, begin in enumerate((-0.0, 0.0)):
+        assert run.v[0, i] == sw.integrate(pole(), "standard_euler", t0=begin, **start).v[0] == -0.1
+
+
+def test_a_run_keeps_times_of_its_own() -> None:
+    begins = np.array([0.0, 1.0])
+    run = sw.integrate(swept(), "rk4", v=0.3, y=1.0, t0=begins, dt=-0.1, steps=4, every=2)
+    begins[:] = 7.0
+    assert run.t0.tolist() == [0.0, 1.0]
+    assert "t = 1 to -0.4" in repr(run)
+    adaptive = sw.integrate(swept(), "dop853", v=0.3, y=1.0, t0=run.t0, at=np.array([[1.0, 2.0], [3.0, 5.0]]), tolerance=1e-8)
+    assert "t = 0 to 5" in repr(adaptive)
+
+
+def test_outputs_and_limits_along_a_run_are_at_the_times_of_their_members() -> None:
+    begins = np.array([0.0, 1.0])
+    mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], C=[0.2, 4.0], D=1.0, x=sw.Sinusoid(1.0, 2.0), velocities=1)
+    start: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": 0.1, "steps": 20, "every": 1}
+    run, nonlinear = (sw.integrate(system, "rk4", t0=begins, **start) for system in (mass, swept()))
+    for i, begin in enumerate(begins):
+        np.testing.assert_array_equal(run.z[..., i], sw.integrate(mass, "rk4", t0=begin, **start).z)
+        alone = sw.stability_along(sw.integrate(swept(), "rk4", t0=begin, **start))
+        assert sw.stability_along(nonlinear).when[i] == alone.when
+    with pytest.raises(UnsupportedError, match="at: expected a run whose members have their times in common"):
+        sw.analyse(swept(), "rk4", dt=0.1, at=nonlinear)
+    back = sw.integrate(swept(), "rk4", **start | {"dt": -0.1})
+    for judged in (sw.stability_along, lambda run: sw.analyse(swept(), "rk4", dt=0.1, at=run)):
+        with pytest.raises(UnsupportedError, match=r"run: expected steps forward in time, got dt = -0.1"):
+            judged(back)
