@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sized
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from itertools import islice
 from math import isfinite, prod
 from numbers import Real
@@ -299,6 +299,14 @@ def over(array: Array, shape: Shape) -> Array:
     wide = np.ndarray(shape, np.float64, np.ascontiguousarray(array), strides=(0,) * len(shape))
     wide.flags.writeable = False
     return wide
+
+
+def concatenated(parts: Sequence[Array]) -> Array:
+    """Arrays of shape (rows, *batch), whose axes of a batch broadcast, one after the other."""
+    axes = max(part.ndim for part in parts)
+    aligned = [part.reshape(len(part), *(axes - part.ndim) * (1,), *part.shape[1:]) for part in parts]
+    batch = np.broadcast_shapes(*(part.shape[1:] for part in aligned))
+    return np.concatenate([np.broadcast_to(part, (len(part), *batch)) for part in aligned])
 
 
 def batch_shape(shapes: dict[str, Shape]) -> Shape:

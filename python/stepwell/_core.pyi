@@ -48,6 +48,10 @@ class Equations:
         """Whether a rate of v depends on v."""
 
     @property
+    def reads_time(self) -> bool:
+        """Whether anything depends on the time."""
+
+    @property
     def chooses(self) -> bool:
         """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
 

@@ -179,7 +179,8 @@ def _derivative(run: Run, index: Shape, n: int) -> Array:
 
     state = np.concatenate(flat)
     lengths = np.concatenate([np.full(block.shape, np.sqrt((block * block).sum(axis=0))) for block in flat])
-    scale = np.where(state != 0.0, np.abs(state), np.where(lengths > 0.0, lengths, 1.0))
+    least = np.finfo(np.float64).tiny / PART  # the part of a smaller number would be lost
+    scale = np.where(np.abs(state) >= least, np.abs(state), np.where(lengths >= least, lengths, 1.0))
     matrix, here = np.empty((n, n)), at(state)
     for i in range(n):
         moved = state.copy()

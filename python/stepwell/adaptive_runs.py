@@ -205,7 +205,7 @@ def adaptive_run(
     if stopped:
         run.stopped_at = np.where(out.status == 0, np.nan, sign * out.paces[engine.TIME])
         warn_of_stops(run)
-    if not acceptance.own and np.count_nonzero(out.paces[engine.ABSOLUTE]):
+    if not acceptance.own and (out.paces[engine.ABSOLUTE] > engine.LEAST).any():
         _warn_of_lost(out.paces, groups)
     if ended is not None:
         ended.tell(run)
@@ -257,15 +257,19 @@ def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
 
 
 def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
-    """The times that no step crosses, in ascending order along the first axis: those of the user and of inputs."""
+    """The times that no step crosses, ascending along the first axis: those of the user, of inputs and of the equations."""
     # Those after the last time count, too: the step that contains it goes on from there when the run is continued.
     ahead = bool(np.max(times[-1] - t0) >= 0.0)
     of_inputs = system.jumps(*((float(np.min(t0)), np.inf) if ahead else (-np.inf, float(np.max(t0)))))
-    if given is None:
-        return of_inputs if len(of_inputs) else None
-    jumps = np.atleast_1d(_checks.numbers("jumps", given, unit="units of time"))
-    own = np.broadcast_to(of_inputs.reshape(-1, *(jumps.ndim - 1) * (1,)), (len(of_inputs), *jumps.shape[1:]))
-    return np.sort(np.concatenate([jumps, own]), axis=0)
+    ends = [float(edge(np.append(times, t0))) for edge in (np.min, np.max)]
+    jumps = [of_inputs, system.switching_times(*ends)]
+    if given is not None:
+        jumps.append(np.atleast_1d(_checks.numbers("jumps", given, unit="units of time")))
+    together = _checks.concatenated(jumps)
+    together[np.isnan(together)] = np.inf if ahead else -np.inf
+    if not len(together):
+        return None
+    return np.unique(together) if together.ndim == 1 else np.sort(together, axis=0)
 
 
 def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:

@@ -124,7 +124,8 @@ def integrate(
         max_step: with a tolerance, the longest step, in units of time, a number or an array over the batch. What lasts for less
             than a step may be stepped over without a sign: give this, or ``jumps``, where rates change suddenly in time.
         jumps: with a tolerance, times at which rates jump, shape (jumps,), or (jumps, *batch) for jumps of each member. No step
-            crosses one; behind it the step is chosen anew.
+            crosses one; behind it the step is chosen anew. Those of sampled inputs, and comparisons of your own equations with
+            the time, are known without.
         positive: with a tolerance, the components that must not become negative: True for all of y, or one or a list of indices
             of y, or of tuples such as ("v", 0). A step that makes one negative is rejected; a member stops where no step is small
             enough.

@@ -29,6 +29,9 @@ MOST_STEP, COUNTS, WORK = 11, slice(15, 18), 19
 #: steps of other runs do not depend on when states are saved.
 BLIND = 1.0 / (1 << 20)
 SHORT = 32.0 * BLIND
+#: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows out of zero, before a smooth push,
+#: begins with numbers of few bits, of which an error cannot be small beside the whole.
+LEAST = 2.0**-1064
 
 
 class Tolerances(NamedTuple):
@@ -147,9 +150,9 @@ def paces(
     from ..reference import adaptive  # only such runs need it
 
     t0, groups, own = plan.t0, groups_of(plan), []
-    relative, absolute = tolerances.relative, np.zeros(()) if tolerances.absolute is None else tolerances.absolute
+    relative, absolute = tolerances.relative, np.maximum(LEAST, 0.0 if tolerances.absolute is None else tolerances.absolute)
     if tolerances.of_groups:
-        absolute = np.zeros_like(relative) if tolerances.absolute is None else absolute
+        absolute = np.broadcast_to(absolute, relative.shape) if tolerances.absolute is None else absolute
         own = [*relative, *absolute]
         relative, absolute = relative.min(axis=0), absolute.max(axis=0)
     step: Any = first

@@ -91,7 +91,7 @@ class Rates:
         place = dict(zip([*(each.id for each in roots), *functions, *(each.id for each in arguments)], places, strict=True))
         self.functions = {
             place[id]: mark._replace(
-                arguments=tuple(_Line(place[each.id]) if isinstance(each, _core.Symbol) else each for each in mark.arguments)
+                arguments=tuple(Line(place[each.id]) if isinstance(each, _core.Symbol) else each for each in mark.arguments)
             )
             for id, mark in functions.items()
         }
@@ -108,7 +108,7 @@ class Rates:
                 of = (
                     self.operations.lines[line][1]
                     if mark is None
-                    else [each for each in mark.arguments if isinstance(each, _Line)]
+                    else [each for each in mark.arguments if isinstance(each, Line)]
                 )
                 waiting += of
         return sorted(needed)
@@ -141,7 +141,7 @@ class Rates:
             name, of, given = self.operations.lines[line]
             mark = self.functions.get(line)
             if mark is not None and mark.function is not None:
-                arguments = [made[each] if isinstance(each, _Line) else each for each in mark.arguments]
+                arguments = [made[each] if isinstance(each, Line) else each for each in mark.arguments]
                 made[line] = series.function(mark.name, mark.function, mark.function, arguments)
             elif name in ("state", "parameter"):
                 made[line] = (state if name == "state" else numbers)[given]
@@ -152,5 +152,5 @@ class Rates:
         return [made[place] for place in self.operations.places]
 
 
-class _Line(int):
+class Line(int):
     """A line of a tape, in place of its value."""

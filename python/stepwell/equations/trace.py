@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .definition import Definition
     from .invariants import Invariant, Traced
     from .series import Rates
+    from .switching import Switches
 
 #: The most lines of a traceback that are searched for the user's own.
 MOST_FRAMES = 200
@@ -50,6 +51,7 @@ class Equations:
     limited = False
     pushed = False
     _series: Rates | None = None
+    _switches: Switches | None = None
 
     def __init__(self, definition: Definition, v_shape: Shape, y_shape: Shape, own_shapes: dict[str, Any]) -> None:
         self.definition = definition
@@ -87,7 +89,7 @@ class Equations:
         return kept
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_invariants": {}, "_series": None}
+        return {**vars(self), "_invariants": {}, "_series": None, "_switches": None}
 
     @property
     def name(self) -> str:
@@ -133,6 +135,15 @@ class Equations:
         if self._series is None:
             self._series = Rates(self, given)
         return self._series
+
+    def switching_times(self, given: dict[str, Any], begin: float, end: float) -> Numbers:
+        """When the rates change from one piece to another by the time alone, shape (times, *batch)."""
+        from .switching import Switches, numbers_of
+
+        numbers = numbers_of(given, self.own_axes)
+        if self._switches is None:
+            self._switches = Switches(self._of_series(given), numbers)
+        return self._switches.times(numbers, begin, end)
 
     def of_state(self, invariant: Invariant, t: Any, v: Numbers, y: Numbers, given: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""

@@ -188,11 +188,11 @@ class Jumps(NamedTuple):
 
     @classmethod
     def around(cls, times: Array, t0: Any) -> Self:
-        """Some roundings before and after each; t0 is the start, before which no jump counts.
+        """Some roundings before and after each; t0 is the start, before which no jump counts. An infinite one is none.
 
         Times of stages are rounded to the larger of the times at both ends of a step, so they stay on their side.
         """
-        margin = 4.0 * np.spacing(np.maximum(np.abs(times), np.abs(t0)))
+        margin = np.where(np.isfinite(times), 4.0 * np.spacing(np.maximum(np.abs(times), np.abs(t0))), 0.0)
         before, after = times - margin, times + margin
         gone = after < t0
         return cls(np.where(gone, -np.inf, before), np.where(gone, -np.inf, after))

@@ -324,6 +324,10 @@ class System(Fixed, Value, ABC):
         """When its inputs or their derivatives jump, from ``begin`` to ``end``: ascending, each time once."""
         return np.unique(np.concatenate([np.empty(0), *(each.jumps(begin, end) for each in self.given_inputs().values())]))
 
+    def switching_times(self, begin: float, end: float) -> Array:
+        """When its rates take another piece by the time alone, from ``begin`` to ``end`` and some around: (times, *batch)."""
+        return np.empty(0)
+
     def over_steps(self, method: Method, t0: Any, dt: float) -> Self:
         """The same system, whose held samples of less than a step are given by their means over the steps, of each ``t0``."""
         held = [each for each in self.given_inputs().values() if isinstance(each, Sampled)]

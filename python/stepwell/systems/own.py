@@ -325,6 +325,15 @@ class OwnSystem(System):
         """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
         return bool(self._retraced()._series_rates().chooses)
 
+    def switching_times(self, begin: float, end: float) -> Array:
+        """The comparisons of the function with the time, solved for it, with the parameters of each member."""
+        bound = self._retraced()
+        if not bound._core.reads_time:
+            return np.empty(0)
+        assert bound.equations is not None
+        parameters = {name: value for name, value in bound.given(bound.batch).items() if name in self.parameters_given}
+        return bound.equations.switching_times(parameters, begin, end)
+
     def _series_rates(self) -> Any:
         """The rates as operations, with the derivatives of the functions among them."""
         if self._with_functions is None or self._with_functions[0] is not self._core:

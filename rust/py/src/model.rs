@@ -78,6 +78,12 @@ impl Equations {
         self.0.reads_v()
     }
 
+    /// Whether anything depends on the time.
+    #[getter]
+    fn reads_time(&self) -> bool {
+        self.0.reads_time()
+    }
+
     /// Whether the rates are made of pieces, one of which is chosen by the state or the time.
     #[getter]
     fn chooses(&self) -> bool {

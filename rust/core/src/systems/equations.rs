@@ -166,6 +166,11 @@ impl Equations {
         self.ops.iter().zip(needed).any(|(op, needed)| needed && matches!(op, Op::State(i) if (*i as usize) < self.dv.len()))
     }
 
+    /// Whether anything depends on the time.
+    pub fn reads_time(&self) -> bool {
+        self.ops.iter().any(|op| matches!(op, Op::Time))
+    }
+
     /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not count.
     pub fn chooses(&self) -> bool {
         let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by, _)| (*value, by)).collect();

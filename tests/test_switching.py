@@ -1,0 +1,238 @@
+"""Switching times: comparisons of a function with the time are solved, and no adaptive step crosses them."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.equations import switching
+from stepwell.errors import ToleranceWarning
+
+PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
+
+
+def times_of(function: Callable[..., Any], end: float = 60.0, **parameters: Any) -> Any:
+    """The switching times from 0 to ``end`` of a system of first order with one number for a state."""
+    times = np.sort(sw.system(order=1)(function)(**parameters).sized((0,), ()).switching_times(0.0, end), axis=0)
+    return times[(times >= 0.0) & (times <= end)] if times.ndim == 1 else times
+
+
+#: Rates of the time, and when they switch from 0 to 60.
+SOLVED: dict[str, tuple[Callable[..., Any], list[float]]] = {
+    "a comparison": (lambda t, y: np.where((t > 5) & (t <= 7.25), 1.0, 0.0) - y, [5.0, 7.25]),
+    "of a line": (lambda t, y: np.where(3.0 - 0.5 * t < -2.0, 1.0, 0.0) - y, [10.0]),
+    "of a quotient": (lambda t, y: np.where(8.0 / (t + 1.0) < 2.0, 1.0, 0.0) - y, [3.0]),
+    "of a distance": (lambda t, y: np.where(abs(t - 50.0) < 0.25, 1.0, 0.0) - y, [49.75, 50.25]),
+    "of a square": (lambda t, y: np.where((t - 50.0) ** 2 < 0.0625, 1.0, 0.0) - y, [49.75, 50.25]),
+    "of a cube": (lambda t, y: np.where((t - 50.0) ** 3 < 8.0, 1.0, 0.0) - y, [52.0]),
+    "of a product with zero": (lambda t, y: np.where((t - 1.0) * (t - 4.0) * t < 0, 1.0, 0.0) - y, [0.0, 1.0, 4.0]),
+    "of a root": (lambda t, y: np.where(np.sqrt(t) > 3.0, 1.0, 0.0) - y, [9.0]),
+    "of a logarithm": (lambda t, y: np.where(np.log2(t + 1.0) > 3.0, 1.0, 0.0) - y, [7.0]),
+    "of an exponential": (lambda t, y: np.where(np.exp2(-t) < 0.125, 1.0, 0.0) - y, [3.0]),
+    "of a remainder": (lambda t, y: np.where(t % 20 < 0.5, 1.0, 0.0) - y, [0.0, 0.5, 20.0, 20.5, 40.0, 40.5, 60.0]),
+    "of a sine": (
+        lambda t, y: np.where(np.sin(0.25 * t) > 0.5, 1.0, 0.0) - y,
+        [4 * (x + 2 * np.pi * k) for k in range(3) for x in (np.pi / 6, 5 * np.pi / 6)][:5],
+    ),
+    "a tent": (lambda t, y: np.maximum(0, 1 - abs(t - 50.0) / 0.5) - y, [49.5, 50.0, 50.5]),
+    "whole numbers": (lambda t, y: np.floor(t / 16) + np.round(t / 16) - y, [0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0]),
+    "a square wave": (lambda t, y: t // 25 % 2 - y, [0.0, 25.0, 50.0]),
+    "a sign": (lambda t, y: np.sign(t - 3.0) - y, [3.0]),
+    "a clip": (lambda t, y: np.clip(t, 2.0, 9.0) - y, [2.0, 9.0]),
+    "a table": (lambda t, y: np.interp(t, [4.0, 5.0, 8.0], [0.0, 3.0, 0.0]) - y, [4.0, 5.0, 8.0]),
+    "with roundings of its own": (lambda t, y: np.where(t + 1e8 > 1e8 + 50, 1.0, 0.0) - y, [50.0 + 2**-27]),
+    "the middle of a bell": (lambda t, y: np.exp(-(((t - 7.0) / 0.25) ** 2)) - y, [7.0]),
+    "the middle of a ramp": (lambda t, y: np.tanh((t - 7.0) / 0.25) - y, [7.0]),
+    "bells without an end": (lambda t, y: np.exp(np.cos(t) ** 2) + np.cosh(np.sin(t)) - y, []),
+    "nothing": (lambda t, y: np.cos(t) - y, []),
+    "by the state": (lambda t, y: np.where(t + y > 3.0, 1.0, 0.0) * np.abs(y), []),
+    "within a function": (lambda t, y: np.sin(7.0 * t) * np.exp2(-1.0 - t) * np.arctan2(t, 2.0) - y, []),
+}
+
+
+@pytest.mark.parametrize("what", SOLVED)
+def test_times_are_solved(what: str) -> None:
+    """To the roundings of the time, and of what is computed of it on the way: the comparison itself switches there."""
+    function, expected = SOLVED[what]
+    assert np.unique(times_of(function)) == pytest.approx(expected, rel=1e-15, abs=1e-15)
+
+
+@pytest.mark.parametrize("what", [each for each, (_, times) in SOLVED.items() if times and "middle" not in each])
+def test_rates_switch_there(what: str) -> None:
+    """A time that is solved is one at which another piece is taken, or a kink: both one-sided slopes or values differ."""
+    function = SOLVED[what][0]
+    system = sw.system(order=1)(function)().sized((0,), ())
+    rates = system.alone(1.0, ())
+    for time in times_of(function):
+        h = 1e-6
+        values = [rates.dy(np.float64(time + k * h), np.empty(0), np.float64(0.0)) for k in (-2, -1, 1, 2)]
+        jump, bend = values[2] - values[1], (values[3] - values[2]) - (values[1] - values[0])
+        assert abs(jump) > 0.1 or abs(bend) > 0.1 * h, (time, values)
+
+
+def test_parameters_of_each_member() -> None:
+    """Times have the axes of the batch; a member without one has NaN."""
+    times = times_of(
+        lambda t, y, *, a=1.0, w=0.5: np.where((t - a) ** 2 < w, 1.0, 0.0) - y, a=[3.0, 5.0], w=[[4.0], [-1.0], [9.0]]
+    )
+    assert times.shape == (2, 3, 2)
+    assert times[:, 0] == pytest.approx(np.array([[1.0, 3.0], [5.0, 7.0]]), rel=1e-15)
+    assert np.isnan(times[:, 1]).all()
+    assert times[:, 2] == pytest.approx(np.array([[0.0, 2.0], [6.0, 8.0]]), rel=1e-15, abs=1e-15)
+
+
+def test_too_many_periods_are_no_pulses() -> None:
+    """Up to 4096 periods within a run are solved, with one more at each side."""
+    fast = lambda t, y, *, period=1.0: np.where(t % period < 0.5 * period, 1.0, 0.0) - y  # noqa: E731
+    most = switching.MOST_PERIODS
+    assert len(times_of(fast, end=(most - 3.0) * 0.125, period=0.125)) > most
+    assert len(times_of(fast, end=(most + 3.0) * 0.125, period=0.125)) == 0
+
+
+@sw.system(order=1)
+def pulsed(t: Any, y: Any, *, a: float = 50.0, w: float = 0.3) -> Any:
+    """Decay with a push of 20 from a on, for a time of w."""
+    return np.where((t > a) & (t < a + w), 20.0, 0.0) - y
+
+
+def solution(t: Any, a: Any, w: Any) -> Any:
+    """From y(0) = 1: e^−t, and 20·(1 − e^−(t − a)) of the push while it lasts, which decays then."""
+    lasted = np.clip(t - a, 0.0, w)
+    return np.exp(-t) + 20.0 * -np.expm1(-lasted) * np.exp(-np.maximum(t - a - w, 0.0))
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_no_pulse_is_missed(method: str) -> None:
+    """However short, and however far a state that is nearly at rest lets steps go.
+
+    Some tens of steps at the edges may each err by the tolerance of the largest that y has been, 20 at most.
+    """
+    random = np.random.default_rng(5)
+    a, w = random.uniform(5.0, 190.0, 100), 10.0 ** random.uniform(-4.0, 0.5, 100)
+    at = np.array([100.0, 200.0])
+    run = sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-8, at=at)
+    assert run.y == pytest.approx(solution(at[:, np.newaxis], a, w), rel=1e-5, abs=1e-5 * 1e-8 + 40 * 20e-8)
+    peak = sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-8, at=(a + w)[np.newaxis])
+    assert peak.y[0] == pytest.approx(solution(a + w, a, w), rel=1e-6, abs=4e-8)  # y was 1 at the start, which a step may err by
+
+
+#: Smooth pushes about a middle m that last for some times of w, and their integrals over the time in units of w.
+SMOOTH: dict[str, tuple[Callable[..., Any], float]] = {
+    "a bell": (lambda t, y, *, m=7.0, w=0.01: np.exp(-(((t - m) / w) ** 2)) - y, np.sqrt(np.pi)),
+    "a bell of factors": (lambda t, y, *, m=7.0, w=0.01: np.exp(-(t - m) * (t - m) / (2 * w * w)) - y, np.sqrt(2 * np.pi)),
+    "two flanks": (lambda t, y, *, m=7.0, w=0.01: np.exp(-abs(t - m) / w) - y, 2.0),
+    "a hyperbolic secant": (lambda t, y, *, m=7.0, w=0.01: 1 / np.cosh((t - m) / w) ** 2 - y, 2.0),
+    "a logistic switch, on and off": (
+        lambda t, y, *, m=7.0, w=0.01: 1 / (1 + np.exp((m - t) / w)) - 1 / (1 + np.exp((m + 5 * w - t) / w)) - y,
+        5.0,
+    ),
+    "a ramp up and down": (
+        lambda t, y, *, m=7.0, w=0.01: 0.5 * (np.tanh((t - m) / w) - np.tanh((t - m - 5 * w) / w)) - y,
+        5.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("method", PAIRS)
+@pytest.mark.parametrize("what", SMOOTH)
+def test_no_smooth_push_is_missed(what: str, method: str) -> None:
+    """Of a width w, y becomes ∫f dt·(1 + O(w)) at its end, and decays by less than 1 % in the 40 w that pass until then.
+
+    Without the middle as a wall nine of ten are passed over.
+    """
+    function, integral = SMOOTH[what]
+    m, w = np.linspace(5.0, 45.0, 100), 10.0 ** -np.linspace(2.0, 5.0, 4)[:, np.newaxis]
+    run = sw.integrate(sw.system(order=1)(function)(m=m, w=w), method, y=0.0, tolerance=1e-6, at=(m + 30 * w)[np.newaxis])
+    assert run.y[0] / (integral * w) == pytest.approx(np.exp(-30 * w) * np.ones(m.shape), rel=0.1)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_state_that_grows_out_of_zero(method: str) -> None:
+    """Through the smallest numbers there are, of few bits: it is not held up there by errors that are roundings.
+
+    Of some 700 e-foldings from there on, up to a push of 1, a method of fourth order takes ten steps each at most.
+    """
+    function = SMOOTH["a bell"][0]
+    run = sw.integrate(sw.system(order=1)(function)(m=20.0, w=0.1), method, y=0.0, tolerance=1e-6, at=[23.0])
+    assert run.y[-1] == pytest.approx(0.1 * np.sqrt(np.pi) * np.exp(-3.0 + 0.0025), rel=1e-3)
+    assert run.paces is not None
+    assert run.paces.accepted < 7000
+    assert run.paces.rejected < 50
+
+
+def test_a_stop_at_the_smallest_numbers_is_told() -> None:
+    """What holds the step down is looked for there, too, without a division by zero."""
+    with pytest.warns(ToleranceWarning, match="max_steps"):
+        sw.integrate(sw.system(order=1)(lambda t, y: -y)(), "merson", y=1e-318, tolerance=1e-6, at=[100.0], max_steps=3)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
+    """FitzHugh and Nagumo's equations from where nothing moves, with a push from 60 to 66: as with the jumps told."""
+
+    @sw.system(order=1, shape=(2,))
+    def cell(t: Any, y: Any, *, begin: float = 60.0, lasts: float = 6.0) -> Any:
+        push = 0.6 * ((t >= begin) & (t <= begin + lasts))
+        return np.array([y[0] - y[0] ** 3 / 3 - y[1] + push, 0.08 * (y[0] + 0.7 - 0.8 * y[1])])
+
+    rest = np.array([-1.1994080352440346, -0.6242600440550432])
+    run = sw.integrate(cell(), method, y=rest, tolerance=1e-6, at=[66.0, 80.0])
+    asked = sw.integrate(cell(), method, y=rest, tolerance=1e-6, at=[66.0, 80.0], jumps=[60.0, 66.0])
+    assert np.array_equal(run.y, asked.y)
+    assert run.y[0, 0] > -0.9
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_one_number_for_all_ways(method: str) -> None:
+    """Alone, in a batch, by NumPy, in pieces and out of a file that is pickled: the same bits."""
+    a, w, at = np.array([50.0, 51.9, 20.0]), np.array([[0.3], [0.01]]), [10.0, 49.0, 50.1, 52.0]
+    run = sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-7, at=at)
+    assert np.array_equal(sw.integrate(pulsed(a=a, w=w), method, y=1.0, tolerance=1e-7, at=at, backend="numpy").y, run.y)
+    for i, j in np.ndindex(2, 3):
+        alone = pulsed(a=a[j], w=w[i, 0])
+        assert np.array_equal(sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at).y, run.y[:, i, j])
+        for cut in (1, 2, 3):
+            first = sw.integrate(alone, method, y=1.0, tolerance=1e-7, at=at[:cut])
+            assert np.array_equal(sw.integrate(alone, method, at=at[cut:], **first.resume).y, run.y[cut:, i, j])
+    again = pickle.loads(pickle.dumps(pulsed(a=a, w=w)))
+    assert np.array_equal(sw.integrate(again, method, y=1.0, tolerance=1e-7, at=at).y, run.y)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_periodic_pulses_in_pieces(method: str) -> None:
+    """A run that ends goes on to switches that lay beyond its end: the next of them was its wall already."""
+
+    @sw.system(order=1)
+    def ticking(t: Any, y: Any, *, period: float = 7.0) -> Any:
+        return np.where(t % period < 0.01, 30.0, 0.0) - 0.1 * y
+
+    at = np.linspace(3.0, 60.0, 20)
+    whole = sw.integrate(ticking(), method, y=1.0, tolerance=1e-7, at=at)
+    pushes = 7.0 * np.arange(9)[:, np.newaxis]
+    right = np.exp(-0.1 * at) + (300 * np.expm1(0.001) * np.exp(-0.1 * (at - pushes)) * (at > pushes)).sum(axis=0)
+    assert whole.y == pytest.approx(right, rel=1e-5)
+    for cut in (1, 7, 19):
+        first = sw.integrate(ticking(), method, y=1.0, tolerance=1e-7, at=at[:cut])
+        assert np.array_equal(sw.integrate(ticking(), method, at=at[cut:], **first.resume).y, whole.y[cut:])
+
+
+def test_backward() -> None:
+    """From 3 s after the push back to before it: the same motion."""
+    end = solution(53.0, 50.0, 0.3)
+    run = sw.integrate(pulsed(), "dop853", y=end, t0=53.0, tolerance=1e-12, at=[50.3, 49.0])
+    # Errors grow by e⁴ on the way back, and a step at the edge errs by the tolerance of the 5.2 that y is there.
+    assert run.y == pytest.approx(solution(np.array([50.3, 49.0]), 50.0, 0.3), abs=54 * 50 * 5.2e-12)
+
+
+def test_sweeps_and_solve_ivp() -> None:
+    """They take the same steps."""
+    pytest.importorskip("xarray")
+    table = sw.sweep(pulsed, {"a": ("run", [20.0, 50.0])}, "merson", y=1.0, tolerance=1e-7, at=[51.0])
+    runs = sw.integrate(pulsed(a=[20.0, 50.0]), "merson", y=1.0, tolerance=1e-7, at=[51.0])
+    assert np.array_equal(table["y_last"].values.ravel(), runs.y[-1])
+    found = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
+    assert found.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)
