@@ -172,7 +172,7 @@ def test_a_stop_at_the_smallest_numbers_is_told() -> None:
 
 @pytest.mark.parametrize("method", PAIRS)
 def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
-    """FitzHugh and Nagumo's equations from where nothing moves, with a push from 60 to 66: as with the jumps told."""
+    """FitzHugh and Nagumo's equations from where nothing moves, with a push from 60 to 66: as with its jumps given."""
 
     @sw.system(order=1, shape=(2,))
     def cell(t: Any, y: Any, *, begin: float = 60.0, lasts: float = 6.0) -> Any:
@@ -234,5 +234,5 @@ def test_sweeps_and_solve_ivp() -> None:
     table = sw.sweep(pulsed, {"a": ("run", [20.0, 50.0])}, "merson", y=1.0, tolerance=1e-7, at=[51.0])
     runs = sw.integrate(pulsed(a=[20.0, 50.0]), "merson", y=1.0, tolerance=1e-7, at=[51.0])
     assert np.array_equal(table["y_last"].values.ravel(), runs.y[-1])
-    found = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
-    assert found.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)
+    by_scipys_name = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
+    assert by_scipys_name.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)

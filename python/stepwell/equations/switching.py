@@ -21,7 +21,7 @@ from .._checks import Array, concatenated
 from ..derivatives.rules import COMPARISONS, number
 from ..reference.fused import Evaluated
 from ..reference.marks import Mark
-from ..reference.tape import Operation
+from ..reference.tape import Operation, needed
 from .series import Line
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ KINKS: dict[str, Callable[..., list[Switch]]] = {
     "maximum": lambda x, y: [Switch(x, y)],
     "clip": lambda x, low, high: [Switch(x, low), Switch(x, high)],
 }
-#: Functions of which a bell or a ramp is made that has its middle where their first argument is zero.
+#: Functions that make a bell or a ramp with its middle where their first argument is zero.
 WITH_MIDDLE = {"exp", "exp2", "expm1", "tanh", "cosh", "arctan", "hypot", "power"}
 #: What these make of the time repeats itself, and is no single bell or ramp.
 REPEATING = {"sin", "cos", "tan", "mod", "remainder"}
@@ -144,8 +144,9 @@ class Switches:
             unknown = None in operands or name == "state" or (name == "parameter" and numbers[extra] is None)
             self.changes.append(None if unknown else name == "time" or any(operands))
         values = self._of_values(rates.operations.places)
-        found = [each for line in rates.needed for each in [*self._jumps(line), *(self._bends(line) if line in values else [])]]
-        solvable = [each for each in found if self._solvable(each)]
+        switches = [each for line in rates.needed for each in self._jumps(line)]
+        switches += [each for line in rates.needed if line in values for each in self._bends(line)]
+        solvable = [each for each in switches if self._solvable(each)]
         #: The times with which the time itself is compared, where they are constants of the function; and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
         self.switches = [each for each in solvable if self._constant_time(each) is None]
@@ -165,16 +166,9 @@ class Switches:
         return None
 
     def of_line(self, line: int) -> tuple[list[Operation], list[int]]:
-        """What a line is made of, and its place there."""
+        """The operations that a line needs, and its place among them."""
         if line not in self._tapes:
-            found, waiting = {line}, [line]
-            while waiting:
-                operands = set(self.tape[waiting.pop()].of) - found
-                found |= operands
-                waiting += operands
-            place = {each: i for i, each in enumerate(sorted(found))}
-            made = [self.tape[each]._replace(of=tuple(place[of] for of in self.tape[each].of)) for each in place]
-            self._tapes[line] = made, [place[line]]
+            self._tapes[line] = needed(self.tape, [line])
         return self._tapes[line]
 
     def _of_values(self, roots: Sequence[int]) -> set[int]:
@@ -253,7 +247,7 @@ class Solving:
                 waiting += self._inverted(line, values)
 
     def _inverted(self, line: Any, values: Array) -> Iterator[tuple[Any, Array]]:
-        """Where a line has one of these values: what it is made of, and the values of that."""
+        """Where a line has one of these values: its operands that change, and the values that they have there."""
         name, of, _ = self.tape[line]
         operands: Sequence[Any] = [Line(each) for each in of]
         if (mark := self.functions.get(line)) is not None:
@@ -300,8 +294,8 @@ class Solving:
         if not 0.0 <= last - first <= MOST_PERIODS:
             return values[:0]
         every = np.arange(first, last + 1.0).reshape(-1, *np.ndim(values) * (1,))
-        made = values + period * every
-        return made.reshape(-1, *made.shape[2:])
+        periodic = values + period * every
+        return periodic.reshape(-1, *periodic.shape[2:])
 
     def _exact(self, times: Array, switch: Switch) -> Array:
         """The same times to the last bits: where the piece changes, if there is one change around."""
