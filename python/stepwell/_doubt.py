@@ -48,18 +48,19 @@ class Ends(NamedTuple):
     moved: Array
 
 
-def warn_of_nonsense(run: Run, start: State | None) -> None:
+def warn_of_nonsense(run: Run, start: State | None, visited: _known_energy.Visited | None = None) -> None:
     """Warn of what is finite and yet means nothing, as far as it is seen at little cost.
 
     Args:
         run: which.
         start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+        visited: of adaptive steps, between which y some members have been, by their places.
     """
     system = run.system
     if (text := system.doubt(run.y)) is not None:
         warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
-        if text is None and is_heard(AccuracyWarning) and (text := _known_energy.told(run, start)) is not None:
+        if text is None and is_heard(AccuracyWarning) and (text := _known_energy.told(run, start, visited)) is not None:
             warnings.warn(text, AccuracyWarning, stacklevel=3)
         return
     if run.force is None:
