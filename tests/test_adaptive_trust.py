@@ -480,10 +480,10 @@ def with_pole(t: Any, y: Any, *, pole: float = 1.0) -> Any:
 def test_a_pole_of_which_a_method_happens_to_be_exact_is_not_passed(
     method: str, tolerance: float, pole: float, first: float | None, backend: Any
 ) -> None:
-    """Of ẏ = −y/(t − a) the solution y₀·a/(a − t) has a pole at t = a. Fehlberg's formulas continue it exactly to behind the pole.
+    """Of ẏ = −y/(t − a) the solution y₀·a/(a − t) has a pole at t = a. Fehlberg's formulas continue it exactly behind the pole.
 
-    Their estimate of the error is then rounding: such a step was accepted, and y(2a) was −y₀. It ends where the relative rounding of
-    t − a, 2⁻⁵³·a/|t − a|, is what is tolerated, or nearer: within 10⁻⁹ of the pole, at 10⁻⁶.
+    Their estimate of the error is then rounding: such a step was accepted, and y(2a) was −y₀. It ends where the relative rounding
+    of t − a, 2⁻⁵³·a/|t − a|, is what is tolerated, or nearer: within 10⁻⁹ of the pole, at 10⁻⁶.
     """
     system = with_pole(pole=pole)
     with pytest.warns(sw.ToleranceWarning, match=r"the run stopped before t = .*, at t = "):

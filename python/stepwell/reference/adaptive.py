@@ -45,8 +45,8 @@ QUIET = 1.0 / 32.0
 #: is a constant of the motion and not of the step: 5 to 20 in nine of ten steps of eight motions at tolerances of 1e-3 to 1e-12.
 SMOOTH = 32.0
 #: Rates that differ within a step by more than WILD of the size, by the coarse estimate, while the finer one is more than CHANCE
-#: times less: a pole within the step, of which the method happens to be exact, of Fehlberg's at least 0.96 and 10¹¹. Of 55 000 steps
-#: of tame and of stiff motions none had more than 330 times where rates differed by a tenth.
+#: times less: a pole within the step, of which the method happens to be exact. By Fehlberg's it is 0.96 and 10¹¹ at least; of
+#: 55 000 steps of tame and of stiff motions none had more than 330 times where rates differed by a tenth.
 WILD, CHANCE = 0.5, 1024.0
 #: The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 OUTSIDE = 16.0
