@@ -466,3 +466,33 @@ def test_steps_end_where_held_samples_change(method: str, interval: float, start
     for run in (forward, back):
         assert run.paces is not None
         assert run.paces.rejected == 0
+
+
+@sw.system(order=1)
+def with_pole(t: Any, y: Any, *, pole: float = 1.0) -> Any:
+    return -y / (t - pole)
+
+
+@pytest.mark.parametrize("method", ["fehlberg", "fehlberg_5"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+@pytest.mark.parametrize(
+    ("pole", "first", "backend"), [(1.0, None, "rust"), (0.3, 0.01, "numpy"), (7.3, 0.4, "rust"), (-2.0, None, "rust")]
+)
+def test_a_pole_of_which_a_method_happens_to_be_exact_is_not_passed(
+    method: str, tolerance: float, pole: float, first: float | None, backend: Any
+) -> None:
+    """Of ẏ = −y/(t − a) the solution y₀·a/(a − t) has a pole at t = a. Fehlberg's formulas continue it exactly behind the pole.
+
+    Their estimate of the error is then rounding: such a step was accepted, and y(2a) was −y₀. It ends where the relative rounding
+    of t − a, 2⁻⁵³·a/|t − a|, is what is tolerated, or nearer: within 10⁻⁹ of the pole, at 10⁻⁶.
+    """
+    system = with_pole(pole=pole)
+    with pytest.warns(sw.ToleranceWarning, match=r"the run stopped before t = .*, at t = "):
+        run = sw.integrate(system, method, y=1.5, tolerance=tolerance, at=[2.0 * pole], dt=first, backend=backend)
+    assert run.status in (Status.UNDERFLOW, Status.NOT_FINITE)
+    assert run.stopped_at is not None
+    assert abs(run.stopped_at - pole) < 1e-9 * abs(pole)
+    before = sw.integrate(system, method, y=1.5, tolerance=tolerance, at=[0.9 * pole])
+    # Its relative error is that of t − a, and each of its steps errs by no more than is tolerated of what it has become.
+    assert before.paces is not None
+    np.testing.assert_allclose(before.y[-1], 15.0, rtol=tolerance * float(before.paces.accepted + 1))

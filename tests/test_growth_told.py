@@ -56,8 +56,90 @@ def test_a_world_tells_it_once(n: int) -> None:
     with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* member 2: .* the motion itself does not grow") as told:
         frames(world, 280 // n, n)
     assert len(told) == 1
-    # A growth of 1.877 a step is a million in 22 steps, and looked for after 8, 24, 56 and 120 calls.
+    # A growth of 1.877 a step is a million in 22 steps, and looked for after 8, 24, 56 and 120 steps.
     assert np.abs(y[2]) > 1e6
+
+
+@pytest.mark.parametrize("n", [22, 100, 1000])
+@pytest.mark.parametrize("events", [None, lambda t, v, y: y])
+def test_a_world_of_few_large_calls_tells_it_after_the_first(n: int, events: Any) -> None:
+    """1.877ⁿ is a million in 22 steps and 10²⁷⁴ in 1000."""
+    v, y = np.zeros(3), np.ones(3)
+    world = sw.World(sw.Oscillator(np.array([1.0, 2.0, 3.0])), "false_euler", v=v, y=y, dt=0.7, events=events)
+    with pytest.warns(
+        sw.AccuracyWarning, match=f"1 of 3 members grew .*-fold in {n} steps: member 2: .* its stability limit is 0.66"
+    ):
+        world.step(n)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        world.step(1)
+
+
+def test_what_an_event_makes_of_a_state_is_not_told_as_growth() -> None:
+    v, y = np.zeros(()), np.ones(())
+    kick = sw.Event(lambda t, v, y: y, then=lambda t, v, y: (10.0 * v, y), name="kick")
+    world = sw.World(sw.Oscillator(1.0), "rk4", v=v, y=y, dt=0.1, events=kick)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        frames(world, 10, 30)
+    assert np.abs(v) + np.abs(y) > 1e6
+
+
+SWEEPS = [
+    (sw.Oscillator, {"omega": [1.0, 3.0, 3.1]}, "false_euler", {"v": 0.0, "y": 1.0, "dt": 0.7}, 2, "omega = 3:"),
+    (spring, {"k": [1.0, 1e4]}, "rk4", {"v": 0.0, "y": 0.0, "dt": 0.03}, 1, "k = 10000:"),
+    (lag, {"rate": [50.0, 10.0]}, "standard_euler", {"y": 1.0, "dt": 0.05}, 1, "rate = 50:"),
+    (lag, {"dt": [0.01, 0.05, 0.06]}, "standard_euler", {"y": 1.0}, 2, "dt = 0.05:"),
+    (sw.Chain(20), {"y": ("start", np.eye(20)[:, :4])}, "leapfrog", {"v": 0.0, "dt": 1.05}, 4, "member 0:"),
+]
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"transient": 150}, {"outcomes": "extremes"}, {"outcomes": lambda run: run.y[-1]}], ids=str
+)
+@pytest.mark.parametrize(("system", "axes", "method", "given", "number", "first"), SWEEPS)
+def test_a_sweep_tells_how_many_members_grew_and_which_first(
+    system: Any, axes: dict[str, Any], method: str, given: dict[str, Any], number: int, first: str, options: dict[str, Any]
+) -> None:
+    steps = {"steps": 200 - options.get("transient", 0)}
+    with pytest.warns(sw.AccuracyWarning, match=rf"{number} of \d members grew .*-fold in 200 steps") as told:
+        sw.sweep(system, axes, method, **given, **steps, chunk=2, **options)
+    assert len(told) == 1
+    assert f" at {first} each step of" in str(told[0].message)
+
+
+def test_a_sweep_passes_over_members_that_grow_by_themselves() -> None:
+    """The first two grow as e²⁰ and e⁴⁰ do; the last is the spring that its steps make grow."""
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 3 members grew .* at square = -30000:") as told:
+        sw.sweep(pushed_off, {"square": [100.0, 400.0, -3e4]}, "rk4", v=0.0, y=1.0, dt=0.02, steps=100)
+    assert len(told) == 1
+
+
+@sw.system
+def pushed_off(t, v, y, *, square=1.0):
+    return square * y
+
+
+def test_a_small_member_beside_large_ones_is_told() -> None:
+    """The second begins 10⁻¹² of the first and grows by 10⁷ in 40 steps: in the sum of squares it is nothing."""
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 2 members grew .*e\+07-fold in 40 steps: member 1"):
+        sw.integrate(sw.Oscillator(np.array([1.0, 3.0])), "rk4", v=0.0, y=np.array([1e12, 1.0]), dt=1.0, steps=40)
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 2 members grew .* member 1"):
+        sw.integrate(sw.Oscillator(np.array([1.0, 3.0])), "rk4", v=0.0, y=np.array([1e12, 1.0]), dt=1.0, steps=400)
+
+
+def test_growth_of_the_motion_backward_in_time_is_its_own() -> None:
+    """Backward in time e⁻⁵⁰ᵗ is what grows, and e⁻ᵗ tells nothing of it."""
+    system = sw.LinearSystem([[-50.0, 0.0], [0.0, -1.0]], velocities=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = sw.integrate(system, "rk4", y=[1.0, 1.0], dt=-0.01, steps=100)
+    assert run.y[-1, 0] > 1e21
+
+
+def test_members_of_times_of_their_own_are_told() -> None:
+    with pytest.warns(sw.AccuracyWarning, match=r"2 of 2 members grew .* its stability limit is 0.02"):
+        sw.integrate(spring(), "rk4", v=0.0, y=1.0, dt=0.03, steps=300, t0=np.array([0.0, 5.0]))
 
 
 def test_the_steps_of_a_world_that_looks_are_those_of_one_that_does_not() -> None:

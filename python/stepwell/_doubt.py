@@ -48,18 +48,19 @@ class Ends(NamedTuple):
     moved: Array
 
 
-def warn_of_nonsense(run: Run, start: State | None) -> None:
+def warn_of_nonsense(run: Run, start: State | None, visited: _known_energy.Visited | None = None) -> None:
     """Warn of what is finite and yet means nothing, as far as it is seen at little cost.
 
     Args:
         run: which.
         start: velocities and coordinates at its start, spread over the batch; None if it went on from what a method carries.
+        visited: of adaptive steps, between which y some members have been, by their places.
     """
     system = run.system
     if (text := system.doubt(run.y)) is not None:
         warnings.warn(text, AccuracyWarning, stacklevel=3)
     if not isinstance(system, NBody):
-        if text is None and _is_heard(AccuracyWarning) and (text := _known_energy.told(run, start)) is not None:
+        if text is None and is_heard(AccuracyWarning) and (text := _known_energy.told(run, start, visited)) is not None:
             warnings.warn(text, AccuracyWarning, stacklevel=3)
         return
     if run.force is None:
@@ -82,7 +83,7 @@ def _of_a_control(run: Run, bodies: NBody, start: State | None) -> str | None:
     control = bodies.control
     if not (isinstance(control, EnergyControl) and control.form == "printed"):
         return None
-    if run.paces is not None or start is None or run.overshoots is None or not _is_heard(ControlWarning):
+    if run.paces is not None or start is None or run.overshoots is None or not is_heard(ControlWarning):
         return None
     with np.errstate(all="ignore"):
         gain = run.dt * np.asarray(control.gain)
@@ -113,7 +114,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
         start: where it began; None if it went on.
         doubtful: a member whose energy is doubtful, or None.
     """
-    if not _is_heard(AccuracyWarning):
+    if not is_heard(AccuracyWarning):
         return None
     suspects = [doubtful] if doubtful is not None else [] if start is None else _suspects(run, bodies, start)
     left = float(_encounters.MAX_RERUN)
@@ -133,7 +134,7 @@ def _of_encounters(run: Run, bodies: NBody, start: State | None, doubtful: tuple
     return None
 
 
-def _is_heard(kind: type[Warning]) -> bool:
+def is_heard(kind: type[Warning]) -> bool:
     """Whether such a warning is not ignored altogether: nothing need be looked for then."""
     for action, message, category, module, _ in warnings.filters:
         if message is None and module is None and issubclass(kind, category):

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._brief import first_of, share
-from ._checks import Array, Shape, member
+from ._checks import Array, Shape, once_of
+from ._doubt import is_heard
 from .errors import AccuracyWarning, UnsupportedError
 from .method_records import Method
+from .reference.types import Whole
 from .systems import NBody, System
 
 #: A state that is so many times as long as at the start is looked at; from rest, so many units long.
@@ -24,15 +26,15 @@ SQUARABLE = 1e-140
 #: The step explains growth if its eigenvalues make at least this share of its logarithm, and those of the rates at most that.
 BY_STEPS, BY_MOTION = 0.5, 0.25
 
-#: Matrices of more numbers, for all members together, are not computed.
+#: Matrices of more numbers, for all members that grew, are not computed: what the others are is not asked.
 MOST_NUMBERS = 1_000_000
 
 #: Of systems of up to so many numbers a state the limit is told, too.
 SMALL_SYSTEM = 8
 
-#: A world checks its state after so many calls of ``step``, then after twice as many more, and so on up to the last number:
-#: what grows by a thousandth a step has grown a million times by then.
-FIRST_LOOK, LAST_LOOK = 8, 16_384
+#: A world looks at its state after so many steps, then after twice as many more, and so on up to the last number: what grows by a
+#: thousandth a step has grown a million times by then. Calls of ``step`` may be shorter or longer than that.
+FIRST_LOOK, LAST_LOOK, ENDLESS = 8, 16_384, 1 << 62
 
 
 def lengths(system: System, v: Array, y: Array) -> Array:
@@ -41,7 +43,7 @@ def lengths(system: System, v: Array, y: Array) -> Array:
     v, y = (np.asarray(block, dtype=np.float64) for block in (v, y))
     with np.errstate(all="ignore"):
         if v.ndim == len(system.v_shape) and y.ndim == len(system.y_shape):
-            length = np.asarray(np.sqrt(np.vdot(v, v) + np.vdot(y, y)))  # of one member, ten times as fast
+            length = np.asarray(np.sqrt(_square(v) + _square(y)))  # of one member, ten times as fast
         else:
             length = np.asarray(np.sqrt((v * v).sum(axis=axes[0]) + (y * y).sum(axis=axes[1])))
         if (length > SQUARABLE).all() and (length < 1.0 / SQUARABLE).all():
@@ -53,40 +55,67 @@ def lengths(system: System, v: Array, y: Array) -> Array:
         return np.asarray(unit * np.sqrt(sum(squares)))
 
 
-def text_of(
-    system: System, method: Method, dt: float, steps: int, t: float, start: tuple[Array, Array], before: Array, after: Array
-) -> str | None:
-    """What is to be said of members that grew, or None.
+class Growth(NamedTuple):
+    """Members that grew by their steps alone.
+
+    Attributes:
+        number: how many they are.
+        first: the place of the first of them in the batch.
+        size: by what it grew, as words.
+        why: what made it grow, and what to do.
+    """
+
+    number: int
+    first: tuple[int, ...]
+    size: str
+    why: str
+
+    def in_words(self, shape: Shape) -> str:
+        """It in words, of members of a batch of this shape."""
+        size = math.prod(shape)
+        return f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
+
+
+def growth(
+    system: System, method: Method, dt: float, steps: int, t: Any, start: tuple[Array, Array], end: tuple[Array, Array]
+) -> Growth | None:
+    """The members that grew by their steps alone, or None.
 
     Args:
         system: what was stepped, with its control.
         method: by which.
         dt: the step.
         steps: how many were made.
-        t: the time of the start.
-        start: v and y there.
-        before: the members' lengths there.
-        after: and at the end.
+        t: the time of the start, of all members or of each.
+        start: v and y there, spread over the batch.
+        end: and at the end.
     """
     with np.errstate(all="ignore"):
-        grown = np.log(after) - np.log(np.where(before > 0.0, before, 1.0))  # the quotient may be no float
-        many = np.isfinite(after) & (grown > math.log(GROWN))
-    if not many.any() or system.contacts or system.rubbing is not None or isinstance(system, NBody):
+        before, after = lengths(system, *start), lengths(system, *end)
+        before = np.where(before > 0.0, before, 1.0)
+        many = np.isfinite(after) & (after / before > GROWN)
+    n = math.prod(system.v_shape) + math.prod(system.y_shape)
+    if not many.any() or n * n > MOST_NUMBERS or system.contacts or system.rubbing is not None or isinstance(system, NBody):
         return None
-    index = tuple(np.argwhere(many)[0].tolist())
+    suspects = np.flatnonzero(many)[: MOST_NUMBERS // (n * n)]
     try:
-        radius, rate = _eigenvalues(system, method, dt, t, start, many.shape, index) or (0.0, 0.0)
+        factors = _Factors(system, method, dt, t, start, many.shape)
+        radius, rate = factors.of(suspects)
     except UnsupportedError:
         return None
-    told, made = float(grown[index]), steps * math.log(max(radius, 1.0))
-    if not (made >= BY_STEPS * told and rate * dt * steps <= BY_MOTION * told):
+    # The quotient may be no float, but its logarithm is.
+    grown = np.log(after.reshape(-1)[suspects]) - np.log(before.reshape(-1)[suspects])
+    made = steps * np.log(np.maximum(radius, 1.0))
+    by_steps = np.flatnonzero((made >= BY_STEPS * grown) & (rate * steps <= BY_MOTION * grown))
+    if not by_steps.size:
         return None
-    some = int(np.count_nonzero(many))
-    return (
-        f"{share(some, many.shape, many.size)} grew {_power_of_ten(told)}-fold in {steps} steps"
-        f"{first_of(some, index, many.size)}: each step of {dt:g} by {method.name} multiplies a disturbance of the start by "
-        f"{radius:.4g}, and the motion itself does not grow; {_limit(system, method, dt, t, start, index)}"
+    k = by_steps[0]
+    why = (
+        f"each step of {dt:g} by {method.name} multiplies a disturbance of the start by {radius[k]:.4g}, and the motion itself "
+        f"does not grow; {factors.limit(suspects[k])}"
     )
+    first = tuple(int(i) for i in np.unravel_index(suspects[k], many.shape))
+    return Growth(len(by_steps), first, f"grew {_power_of_ten(float(grown[k]))}-fold in {steps} steps", why)
 
 
 def _power_of_ten(logarithm: float) -> str:
@@ -96,39 +125,46 @@ def _power_of_ten(logarithm: float) -> str:
     return f"{digit}e+{int(exponent):02d}" if digit < 10 else f"1e+{int(exponent) + 1:02d}"
 
 
-def _eigenvalues(
-    system: System, method: Method, dt: float, t: float, start: tuple[Array, Array], batch: Shape, index: tuple[int, ...]
-) -> tuple[float, float] | None:
-    """The largest magnitude of an eigenvalue of a member's step at the start, and the largest growth of its rates."""
-    from .stability import eigen, maps
+class _Factors:
+    """What a step, and the motion itself, make of disturbances of the start: of some members of a batch."""
 
-    n = sum(maps.size(system))
-    if n * n * math.prod(batch) > MOST_NUMBERS:
-        return None
-    at = (None, None) if system.linear else start
-    rates = maps.rates(system, t, *at)
-    step = (
-        maps.transition(system, method, np.asarray(dt))
-        if system.linear
-        else maps.jacobian(system, method, np.asarray(dt), t, *start)
-    )
-    aligned = (each.reshape(n, n, *(len(batch) + 2 - each.ndim) * (1,), *each.shape[2:]) for each in (rates, step))
-    rate, step = (member(np.broadcast_to(each, (n, n, *batch)), index) for each in aligned)
-    return float(np.abs(eigen.eigenvalues(step)).max()), float(eigen.eigenvalues(rate).real.max())
+    def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
+        from .stability.limit import part_of
 
+        self._system, self._method, self._dt = system, method, dt
+        self._part = part_of(system, method, batch, *((None, None) if system.linear else start))
+        self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
 
-def _limit(system: System, method: Method, dt: float, t: float, start: tuple[Array, Array], index: tuple[int, ...]) -> str:
-    """What to do, with the limit where it is known in a moment."""
-    from .stability import maps
-    from .stability.limit import limit_of
+    def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
+        """The system of some members, their time, and where they begin, if that matters."""
+        own, v, y = self._part(members)
+        return own, self._t if np.ndim(self._t) == 0 else self._t[members], v, y
 
-    if sum(maps.size(system)) > SMALL_SYSTEM or index:
-        return "use a shorter step; stability_limit says how short"
-    v, y = (None, None) if system.linear else start
-    limit = limit_of(system, method, v, y, t).stable
-    if limit == 0.0:
-        return f"{method.name} is stable with no step here, use another method"
-    return f"its stability limit is {limit:.6g}" if limit < dt else "use a shorter step"
+    def of(self, members: Whole) -> tuple[Array, Array]:
+        """The largest magnitude of an eigenvalue of each member's step, and the largest growth of its rates in a step."""
+        from .stability import eigen, maps
+
+        (own, t, v, y), dt = self._own(members), np.asarray(self._dt)
+        rates = maps.rates(own, t, v, y)
+        how = self._method
+        step = maps.transition(own, how, dt) if v is None or y is None else maps.jacobian(own, how, dt, t, v, y)
+        radius, rate = np.abs(eigen.eigenvalues(step)).max(axis=0), (self._dt * eigen.eigenvalues(rates).real).max(axis=0)
+        return np.broadcast_to(radius, members.shape), np.broadcast_to(rate, members.shape)
+
+    def limit(self, member: int) -> str:
+        """What to do, with the limit of a member where it is known in a moment."""
+        from .stability import maps
+        from .stability.limit import limit_of
+
+        if sum(maps.size(self._system)) > SMALL_SYSTEM:
+            return "use a shorter step; stability_limit says how short"
+        if self._dt < 0.0:
+            return "use a shorter step"
+        own, t, v, y = self._own(np.array([member]))
+        limit = float(np.max(limit_of(own, self._method, v, y, t).stable))
+        if limit == 0.0:
+            return f"{self._method.name} is stable with no step here, use another method"
+        return f"its stability limit is {limit:.6g}" if limit < self._dt else "use a shorter step"
 
 
 def _square(block: Array) -> float:
@@ -136,55 +172,80 @@ def _square(block: Array) -> float:
     if block.size == 1:
         number = float(block.item())
         return number * number
-    return float(np.vdot(block, block))
+    numbers = block.reshape(-1)
+    return float(np.einsum("i,i->", numbers, numbers))  # not by BLAS, whose threads wait where cores are busy
 
 
 def warn_of(run: Any, start: tuple[Array, Array] | None) -> None:
-    """Warn of members of a run with fixed steps that grew by its steps alone.
+    """Warn of members of a run with fixed steps that grew by its steps alone; ``start`` is None if it went on."""
+    if start is None or not is_heard(AccuracyWarning) or _is_tame(run, start):
+        return
+    if (grown := _of_run(run, start, run.steps)) is not None:
+        warnings.warn(grown.in_words(run.status.shape), AccuracyWarning, stacklevel=3)
 
-    Nearly all runs are seen to be tame by the squares of all their numbers.
+
+def of_last_piece(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
+    """The members that grew by so many fixed steps alone, of which the last are those of the run."""
+    return None if _is_tame(run, start) else _of_run(run, start, steps)
+
+
+def _of_run(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
+    v, y = (np.broadcast_to(block, end.shape) for block, end in zip(start, (run.v[-1], run.y[-1]), strict=True))
+    t = run.t0 + (run.start_step + run.steps - steps) * run.dt
+    return growth(run.system, run.method, run.dt, steps, t, (v, y), (run.v[-1], run.y[-1]))
+
+
+def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
+    """Whether no member has grown, which of nearly all runs is seen without a length of each.
+
+    All numbers at the end together are then not so much longer than the shortest member at the start.
     """
-    if start is None:
-        return
-    ends = run.v[-1], run.y[-1]
-    begun, ended = _square(start[0]) + _square(start[1]), _square(ends[0]) + _square(ends[1])
-    tame = ended * ends[1].size <= GROWN * GROWN * begun * start[1].size
-    if tame and (begun > SQUARABLE**2 or not any(block.any() for block in ends)):
-        return
-    v, y = (np.broadcast_to(block, end.shape) for block, end in zip(start, ends, strict=True))
-    before, after = (lengths(run.system, *blocks) for blocks in ((v, y), ends))
-    text = text_of(run.system, run.method, run.dt, run.steps, run.t0 + run.start_step * run.dt, (v, y), before, after)
-    if text is not None:
-        warnings.warn(text, AccuracyWarning, stacklevel=3)
+    least = _shortest(run, start)
+    return least > SQUARABLE and math.sqrt(_square(run.v[-1]) + _square(run.y[-1])) <= GROWN * least
 
 
-def watched(loop: Any, system: System, method: Method, dt: float, v: Array, y: Array) -> Callable[..., None]:
-    """The ``step`` of a world's loop, which checks the state from time to time, and warns once of growth by steps alone."""
-    make: Callable[..., None] = loop.step
+def _shortest(run: Any, start: tuple[Array, Array]) -> float:
+    """A length that each member has at least at the start; from rest the unit."""
+    if run.status.size == 1:
+        squares = _square(start[0]) + _square(start[1])
+        return math.sqrt(squares) if squares > 0.0 or any(block.any() for block in start) else 1.0
+    least = 0.0
+    for block, shape in zip(start, (run.system.v_shape, run.system.y_shape), strict=True):
+        sizes = np.abs(once_of(block))
+        sizes = sizes.max(axis=tuple(range(len(shape)))) if shape and block.size else sizes
+        least = max(least, float(sizes.min(initial=np.inf)) if block.size else 0.0)
+    if least == 0.0:
+        before = lengths(run.system, *start)
+        least = float(np.where(before > 0.0, before, 1.0).min(initial=np.inf))
+    return least
+
+
+def watched(
+    make: Callable[..., None], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array
+) -> Callable[..., None]:
+    """``make``, the ``step`` of a world, which looks at the state from time to time and warns once of growth by steps alone."""
     if v.size + y.size > MOST_NUMBERS:
         return make
-    v0, y0 = (np.array(block, dtype=np.float64) for block in (v, y))
-    first, t0, before = loop.step_number, loop.t, lengths(system, v0, y0)
+    start = np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)
+    first, t0 = loop.step_number, loop.t
     left = every = FIRST_LOOK
 
     def look() -> int:
-        """How many calls there are until the next check; below zero if there is none."""
+        """How many steps there are until the next look; endless if there is none."""
         nonlocal every
-        after = lengths(system, *(np.asarray(block, dtype=np.float64) for block in (v, y)))
-        if np.any(after > GROWN * before):
-            text = text_of(system, method, dt, loop.step_number - first, t0, (v0, y0), before, after)
-            if text is not None:
-                warnings.warn(text, AccuracyWarning, stacklevel=3)
-                return -1
+        grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
+        if grown is not None:
+            warnings.warn(grown.in_words(v.shape[len(system.v_shape) :]), AccuracyWarning, stacklevel=3)
+            return ENDLESS
         every *= 2
-        return every if every <= LAST_LOOK else -1
+        return every if every <= LAST_LOOK else ENDLESS
 
     def step(n: int = 1) -> None:
         """Make n steps in place."""
         nonlocal left
         make(n)
-        left -= 1
-        if left == 0:
+        left -= n or 1  # None is one step, too
+        if left <= 0:
             left = look()
 
     return step

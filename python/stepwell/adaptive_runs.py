@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from contextlib import nullcontext
+from functools import partial
 from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,11 +21,14 @@ from .errors import ArgumentError, DTypeError, ShapeError, ToleranceWarning, Uns
 from .method_records import Method
 from .method_records import methods as every_method
 from .reference.acceptance import Acceptance
+from .reference.types import Whole
 from .result import AdaptiveState, Paces, Run
 from .systems import System
 from .systems.base import TINY
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .events import Event
 
 #: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
@@ -69,8 +73,11 @@ def adaptive_run(
     backend: str,
     progress: bool,
     asked: list[Event] | None,
-) -> tuple[Run, tuple[Array, Array] | None]:
-    """The run with a tolerance, and where it began, if it did not go on from ``went``: a carry, its method and what it is for."""
+) -> tuple[Run, tuple[Array, Array] | None, Callable[[Whole], tuple[Array, Array, Array]]]:
+    """The run with a tolerance, where it began, and a function that finds between which y some of its members have been.
+
+    It did not begin anywhere if it went on from ``went``: a carry, its method and what it is for.
+    """
     control = _steppable(system, how, a_control(control), options, went)
     t0 = _checks.numbers("t0", t0, unit="units of time")
     times = _checks.numbers("at", options.at, unit="units of time").copy()  # they become those of the run
@@ -209,7 +216,15 @@ def adaptive_run(
         _warn_of_lost(out.paces, groups)
     if ended is not None:
         ended.tell(run)
-    return run, (v, y) if pacing.begins else None
+    return run, (v, y) if pacing.begins else None, partial(_visited, plan, pacing, paces, v, y)
+
+
+def _visited(
+    plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array, index: Whole
+) -> tuple[Array, Array, Array]:
+    from .events.attempts import extremes  # only runs beside a barrier need it
+
+    return extremes(plan, pacing, paces, v, y, index)
 
 
 def _steppable(system: System, how: Method, control: Any, options: AdaptiveOptions, went: Any) -> Any:

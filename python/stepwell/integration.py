@@ -194,10 +194,10 @@ def integrate(
         went = None if carry is None else (carry, carried_by, carried_for)
         asked = None if events is None else _asked(events, "direct")
         options = AdaptiveOptions(tolerance, at, max_steps, max_step, jumps, positive)
-        run, begun = adaptive_run(
+        run, begun, visited = adaptive_run(
             system, how, v, y, dt, options, record, t0, went, control, fused, threads, backend, progress, asked
         )
-        warn_of_nonsense(run, begun if _is_one_motion(asked) else None)
+        warn_of_nonsense(run, begun if _is_one_motion(asked) else None, visited)
         return run
     if max_steps is not None:
         raise ArgumentError("max_steps: goes with tolerance= and at= only; how many steps of fixed length there are is steps")

@@ -20,6 +20,8 @@ from .systems import System
 from .systems.base import a_system
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .events import Occurrences
 
 
@@ -58,8 +60,8 @@ class World:
     one happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts
     again from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies,
     whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It checks them now and then in its first calls
-    of ``step``, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
+    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It looks at them now and then after its first
+    steps, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
     library are stepped in place, too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
 
     System, method and step are fixed; ``World(…, **world.resume)`` makes another world that continues from here.
@@ -173,15 +175,17 @@ class World:
         self._given, self._system, self._method, self._dt = system, stepped, how, dt
         self._t0, self._start, self._v, self._y, self._force, self._fused = t0, start, v, y, force, plan.fused
         self._asked, self._frames = None, None
-        step = _growth.watched(loop, stepped, how, dt, v, y)
+        make: Callable[..., None] = loop.step
         if events is not None:
             from .events import event, frames  # only such worlds need it
 
             self._asked = event.several(events)
             self._frames = frames.Frames(plan, self._asked, v, y, loop)
-            step = self._frames.step
+            make = self._frames.step
+        # What an event makes of a state tells nothing of the steps.
+        is_one_motion = not any(each.then for each in self._asked or ())
         #: ``step(n=1)`` makes n steps in place.
-        object.__setattr__(self, "step", step)
+        object.__setattr__(self, "step", _growth.watched(make, loop, stepped, how, dt, v, y) if is_one_motion else make)
 
     step: Any
 

@@ -10,7 +10,12 @@ import numpy as np
 from .. import _core, engine
 from .._checks import Array
 from ..reference.bits import less, where
+from ..reference.types import Whole
 from ..systems.base import rows as rows_of
+from .members import Members
+
+#: So many attempts are made between two looks at where members are.
+ATTEMPTS = 256
 
 
 class Attempts(NamedTuple):
@@ -119,3 +124,42 @@ def _by_numpy(
                     pace = walls.crossed(pace, series=series)
     t, h, all_v, all_y = (np.stack(each) for each in zip(*rows, strict=True))
     return Attempts(t, h, all_v, all_y, engine.numbers_of(pace))
+
+
+def extremes(
+    plan: engine.Plan, pacing: engine.Pacing, paces: Array, v: Array, y: Array, index: Whole
+) -> tuple[Array, Array, Array]:
+    """Between which y some members are at the ends of steps within their run, which are made again; shape (*block, members).
+
+    And how many attempts were rejected: the run itself has more if states that it saved within a step made that one be rejected.
+
+    Args:
+        plan: of the run.
+        pacing: likewise.
+        paces: where members stand at its start.
+        v: velocities there.
+        y: coordinates there.
+        index: the places of these members, of all in one row.
+    """
+    numbers, total, every = engine.pace_numbers(plan), plan.members, Members(plan._replace(progress=None))
+    place = np.arange(len(index))
+    shapes = plan.system.v_shape, plan.system.y_shape
+    v, y = (block.reshape(*shape, total)[..., index] for block, shape in zip((v, y), shapes, strict=True))
+    paces = np.broadcast_to(paces.reshape(numbers, -1), (numbers, total))[:, index]
+    least, most, rejected = np.array(y), np.array(y), np.zeros(len(index))
+    until, jumps, begins = np.broadcast_to(pacing.at[-1], plan.batch).reshape(-1), pacing.jumps, pacing.begins
+    while len(index):
+        own = jumps
+        if jumps is not None and jumps.ndim > 1:
+            own = np.broadcast_to(jumps, (len(jumps), *plan.batch)).reshape(len(jumps), -1)[:, index]
+        some, end = every.plan(index), until[index]
+        before = np.zeros(len(index)) if begins else paces[engine.COUNTS][:2].sum(axis=0)
+        out = attempted(some, end, ATTEMPTS, pacing.budget, begins, np.ascontiguousarray(paces), v, y, own)
+        ys = np.where((out.t <= end).reshape(len(out.t), *(1,) * len(shapes[1]), -1), out.y, np.nan)
+        least[..., place] = np.fmin(least[..., place], np.fmin.reduce(ys, axis=0))
+        most[..., place] = np.fmax(most[..., place], np.fmax.reduce(ys, axis=0))
+        rejected[place] = out.paces[engine.COUNTS][1]
+        after = out.paces[engine.COUNTS][:2].sum(axis=0)
+        on = (out.t[-1] < end) & (after - before == ATTEMPTS) & (after < pacing.budget)
+        index, place, paces, v, y, begins = index[on], place[on], out.paces[:, on], out.v[-1][..., on], out.y[-1][..., on], False
+    return least, most, rejected

@@ -12,6 +12,7 @@ computed in more digits (``exact``), on a ladder of wider rungs.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from functools import partial
 from math import prod
 from typing import Any
@@ -134,21 +135,40 @@ def _of_all(
     _checks.fits("the limits", NUMBERS_OF_A_LIMIT + 4 * n, members, "ask for fewer, or of fewer states", beside=beside)
     if count <= at_once:
         return _of_some(Search(system, method, v, y, t))
-    every = Members(engine.Plan(system, method, members, 1.0))
+    part = part_of(system, method, members, v, y)
     limits, grows, modes = np.empty(count), np.empty(count), np.empty(count, dtype=object)
+    for k in range(0, count, at_once):
+        some = np.arange(k, min(k + at_once, count))
+        own, v, y = part(some)
+        limits[some], grows[some], modes[some] = _of_some(Search(own, method, v, y, t))
+    return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
+
+
+Part = tuple[System, Array | None, Array | None]
+
+
+def part_of(system: System, method: Method, members: Shape, v: Array | None, y: Array | None) -> Callable[[Any], Part]:
+    """A function of the places of some members, of all in one row: their system, and their states or None.
+
+    Without states the system is linear, and its inputs do not matter.
+    """
+    if v is None or y is None:
+        system = system.without_inputs()
+    every, count = Members(engine.Plan(system, method, members, 1.0)), prod(members)
     blocks = None
     if v is not None and y is not None:
         both = ((v, system.v_shape), (y, system.y_shape))
         blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
-    for k in range(0, count, at_once):
-        some = np.arange(k, min(k + at_once, count))
+
+    def part(some: Any) -> Part:
         own = every.plan(some).system
         if blocks is None:
             complete(own, without_inputs=partial(changed, own))  # it has none
-        else:
-            v, y = (block[..., some] for block in blocks)
-        limits[some], grows[some], modes[some] = _of_some(Search(own, method, v, y, t))
-    return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
+            return own, None, None
+        v, y = (block[..., some] for block in blocks)
+        return own, v, y
+
+    return part
 
 
 def _of_some(search: Search) -> tuple[Array, Array, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import _checks, _single
 from .._brief import counted
+from .._growth import Growth
 from ..errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, ToleranceWarning, UnsupportedError
 from ..method_records import Method
 from ..method_records import method as find_method
@@ -158,7 +159,9 @@ def sweep(
         DivergenceWarning: how many members left the finite range, and which first. The others are not affected.
         ToleranceWarning: how many members stopped before the last time, which first, and why; or that an absolute tolerance is
             so large that the motion is lost in it.
-        AccuracyWarning: if numbers are finite and mean nothing. Encounters of bodies are not searched for here.
+        AccuracyWarning: if numbers are finite and mean nothing: how many members grew a million times by fixed steps that are
+            beyond the stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of
+            bodies are not searched for here.
 
     Example:
         >>> axes = {"omega": ("omega", [1.0, 2.0, 4.0]), "y": ("y0", [0.5, 1.0])}
@@ -339,6 +342,7 @@ class _Tally:
         self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1
         self.lost = self.status = 0
         self.doubts: dict[int, str] = {}
+        self.growths: dict[int, Growth] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
         status = np.where(np.isin(done.found["status"].values, happenings.EVENTS), 0, done.found["status"].values)
@@ -352,6 +356,8 @@ class _Tally:
         self.lost += done.lost
         if done.doubt is not None:
             self.doubts[chunk.first] = done.doubt
+        if done.growth is not None:
+            self.growths[chunk.first] = done.growth
 
     def warn(self) -> None:
         if self.bad and self.task.at is not None:
@@ -377,6 +383,15 @@ class _Tally:
             chunk = min(self.doubts)
             warnings.warn(
                 f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
+                AccuracyWarning,
+                stacklevel=4,
+            )
+        if self.growths:
+            chunk, number = min(self.growths), sum(each.number for each in self.growths.values())
+            first = self.growths[chunk]
+            warnings.warn(
+                f"{number} of {counted(self.members, 'member')} {first.size}, {'the first of them' if number > 1 else 'that'} at "
+                f"{self.grid.place(chunk + first.first[0])}: {first.why}",
                 AccuracyWarning,
                 stacklevel=4,
             )

@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import _checks, _core
+from .. import _checks, _core, _growth
 from .._checks import Array
+from .._growth import Growth
+from .._runs import spread
+from ..compatible import velocities
 from ..errors import AccuracyWarning, DivergenceWarning, EventWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..integration import integrate
 from ..result import Run
@@ -130,11 +133,13 @@ class Done(NamedTuple):
         found: results by name, values of shape (*own axes, members).
         doubt: a message if the numbers are finite and mean nothing, or None.
         lost: how many members have an absolute tolerance so large that the motion is lost in it.
+        growth: of the members that grew by fixed steps beyond their stability limit, or None.
     """
 
     found: Found
     doubt: str | None
     lost: int = 0
+    growth: Growth | None = None
 
 
 def made(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
@@ -174,7 +179,19 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     status = Variable((), np.array(last.status), "how the member ended")
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
-    return Done(together([*parts, {"status": status, "first_bad_step": bad}]), last.system.doubt(last.y), lost(last))
+    parts.append({"status": status, "first_bad_step": bad})
+    grown = _growth_of(task, given, last) if task.at is None else None
+    return Done(together(parts), last.system.doubt(last.y), lost(last), grown)
+
+
+def _growth_of(task: Task, given: dict[str, Any], last: Run) -> Growth | None:
+    """The members that grew by their steps alone, from the start of the sweep to the end of the last piece of its run."""
+    if any(event.then for event in given.get("events", ())):
+        return None  # what an event makes of a state tells nothing of the steps
+    system, batch = last.system, last.status.shape
+    blocks = (("v", velocities(system, given.get("v")), system.v_shape), ("y", given["y"], system.y_shape))
+    v, y = (spread(_checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
+    return _growth.of_last_piece(last, (v, y), task.transient + task.steps)
 
 
 def _reduced(

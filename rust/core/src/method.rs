@@ -73,7 +73,8 @@ pub struct Estimate {
     pub order: u32,
     /// The estimate for both blocks.
     pub error: Blocks,
-    /// A second estimate, of lower order, which corrects the first, so that both together behave as one of the method's order.
+    /// A second estimate, of other weights of the same stages, beside which the first may not be next to nothing by chance. One of lower
+    /// order corrects a first of more than the fifth, so that both together behave as one of the method's order.
     pub coarse: Option<Blocks>,
 }
 

@@ -43,6 +43,10 @@ const PUSHED: f64 = 1.0 / 64.0;
 const QUIET: f64 = 1.0 / 32.0;
 /// The most by which a coarse estimate e₃ may exceed a finer one, times √e₃, e₃ relative to the size: a constant of smooth motions.
 const SMOOTH: f64 = 32.0;
+/// Rates that differ within a step by more than WILD of the size while the finer estimate is more than CHANCE times less: a pole within
+/// the step, of which the method happens to be exact.
+const WILD: f64 = 0.5;
+const CHANCE: f64 = 1024.0;
 /// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 const OUTSIDE: f64 = 16.0;
 
@@ -472,11 +476,17 @@ pub fn judge<N: Number>(
     let (least, bound) = pace.tolerated(scales, outlook.step, counts, &made.old, &made.new);
     let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
     if let Some(coarse) = made.errors.get(1) {
-        let other = over(coarse, &bound) / r;
-        // Where rates jump, the finer estimate may be next to nothing by chance: it is corrected only where both are as of smooth rates.
         let size: Vec<N> = scales.longest.iter().zip(&made.new).map(|(so_far, new)| longer(*so_far, *new)).collect();
-        let smooth = (other * other * over(coarse, &size)).below(N::of(SMOOTH * SMOOTH));
-        r = N::choose(zero.below(r) & smooth, r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
+        let (second, share) = (over(coarse, &bound), over(coarse, &size));
+        let other = second / r;
+        let by_chance = N::of(CHANCE).below(other) & N::of(WILD).below(share);
+        if order > LOW {
+            // Where rates jump, the finer estimate may be next to nothing by chance: it is corrected only where both are as of smooth
+            // rates.
+            let smooth = (other * other * share).below(N::of(SMOOTH * SMOOTH));
+            r = N::choose(zero.below(r) & smooth, r / (N::of(1.0) + N::of(0.01) * (other * other)).sqrt(), r);
+        }
+        r = N::choose(by_chance, second, r);
     }
     // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
     let all = made.errors.first().map_or(total(&made.new), |error| total(&made.new) + total(error));

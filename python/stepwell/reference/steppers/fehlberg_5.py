@@ -2,6 +2,7 @@
 
 from .. import tableau
 from ..types import Array, Blocks, Scaled
+from .fehlberg import COARSE as COARSE
 from .fehlberg import ERROR as ERROR
 from .fehlberg import stages as stages
 

@@ -18,6 +18,10 @@ pub const TABLEAU: Tableau = Tableau {
 const WEIGHTS: &[f64] = &[25.0 / 216.0, 0.0, 1408.0 / 2565.0, 2197.0 / 4104.0, -1.0 / 5.0, 0.0];
 /// The fourth-order result less the fifth-order one.
 pub const ERROR: &[f64] = &[-1.0 / 360.0, 0.0, 128.0 / 4275.0, 2197.0 / 75240.0, -1.0 / 50.0, -2.0 / 55.0];
+/// How far the rates of all stages are from a polynomial of fourth order in time: their divided difference over the nodes, scaled such
+/// that positive weights add up to 1. Of a solution C/(t − a) of ẏ = −y/(t − a) the error is zero, within and across its pole.
+pub const COARSE: &[f64] =
+    &[-385.0 / 10188.0, 352.0 / 849.0, -39424.0 / 48393.0, -28561.0 / 193572.0, 77.0 / 849.0, 140.0 / 283.0];
 
 pub const RECORD: Record = Record {
     name: "fehlberg",
@@ -29,7 +33,7 @@ pub const RECORD: Record = Record {
     limit: 0.0,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: None }),
+    estimate: Some(Estimate { order: 5, error, coarse: Some(coarse) }),
     section: "§12",
     reference: "E. Fehlberg, Low-order classical Runge-Kutta formulas with stepsize control, NASA TR R-315 (1969)",
     about: "Advances with the fourth-order result, by five evaluations; with tolerance= a sixth estimates its error by the \
@@ -40,6 +44,10 @@ pub const RECORD: Record = Record {
 
 fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     plus(v, y, WEIGHTS, &TABLEAU.stages(s, t, h, v, y))
+}
+
+fn coarse(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
+    combined(COARSE, &TABLEAU.stages(s, t, h, v, y))
 }
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {

@@ -1,4 +1,4 @@
-use super::fehlberg::{ERROR, TABLEAU};
+use super::fehlberg::{COARSE, ERROR, TABLEAU};
 use crate::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
@@ -22,7 +22,7 @@ pub const RECORD: Record = Record {
     limit: 0.0,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: None }),
+    estimate: Some(Estimate { order: 5, error, coarse: Some(coarse) }),
     section: "§12",
     reference: "E. Fehlberg, Low-order classical Runge-Kutta formulas with stepsize control, NASA TR R-315 (1969)",
     about: "RK-Fehlberg with local extrapolation: the same six evaluations, advancing with the fifth-order result. It too adds \
@@ -32,6 +32,10 @@ pub const RECORD: Record = Record {
 
 fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     plus(v, y, WEIGHTS, &TABLEAU.stages(s, t, h, v, y))
+}
+
+fn coarse(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
+    combined(COARSE, &TABLEAU.stages(s, t, h, v, y))
 }
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
