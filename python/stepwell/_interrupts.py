@@ -25,8 +25,8 @@ _unfinished: list[threading.Event] = []
 def _wait_for(end: threading.Event) -> None:
     """Until it is set; Ctrl-C is heard.
 
-    No thread is joined here: before Python 3.13 a join that Ctrl-C interrupts takes the thread for dead (CPython gh-90882), and the
-    process then ends under a function of LAPACK that still runs, with a segmentation fault.
+    No thread is joined here: before Python 3.13 a join that Ctrl-C interrupts takes the thread for dead (CPython gh-90882), and
+    the process then ends under a function of LAPACK that still runs, with a segmentation fault.
     """
     while not end.wait(POLL):
         pass
