@@ -34,7 +34,7 @@ from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
 from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
 from .parts import parts
-from .small_motions import lifted, linearised
+from .small_motions import free_numbers, lifted, linearised
 from .some_members import Batch
 
 #: A state is at rest if its rates are below so many roundings of the products that they are sums of.
@@ -103,10 +103,12 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
 def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
     """``stability_limit`` of arguments that were checked, without a warning where it is not decided."""
     members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
-    _fit(sum(maps.size(system)), members)
-    if v is not None and y is not None and not system.linear:
-        if isinstance(system, Springs) and system.control is None:
-            return _of_springs(system, method, v, y, members)
+    if v is None or y is None or system.linear:
+        _fit(sum(maps.size(system)), members)
+    elif isinstance(system, Springs) and system.control is None:
+        return _of_springs(system, method, v, y, members)
+    else:
+        _fit(sum(maps.size(system)), members)
         if (motions := _linear_part(system, method, v, y, t, members)) is not None:
             return _reshaped(system, limit_of(motions, method))
     limits, grows, modes = _of_all(system, method, v, y, t, members)
@@ -117,15 +119,17 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     return limits_of(limits, modes, grows)
 
 
-#: Numbers that the limit of a member takes beside the shape of its mode, and those that an element of the matrix of its small
-#: motions takes until the search begins: two are of that matrix and of one that it is cut out of or joined from, two of copies.
-NUMBERS_OF_A_LIMIT, NUMBERS_OF_A_MATRIX = 250, 4
+#: Numbers that the limit of a member takes beside the shape of its mode.
+NUMBERS_OF_A_LIMIT = 250
+
+#: How often the matrix of small motions is there before the search begins: as it is made, cut or joined, and in the system.
+COPIES_OF_A_MATRIX = 4
 
 
-def _fit(n: int, members: Shape, matrices: bool = False) -> None:
-    """Raise if the limits of systems of n states do not fit in memory, with a matrix for each member if they have one."""
+def _fit(n: int, members: Shape, of_matrix: int = 0) -> None:
+    """Raise if the limits of systems of n states do not fit in memory, with a matrix of so many numbers for each member."""
     beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(prod(members), members_at_once(n))
-    numbers = NUMBERS_OF_A_LIMIT + 4 * n + (NUMBERS_OF_A_MATRIX * n * n if matrices else 0)
+    numbers = NUMBERS_OF_A_LIMIT + 4 * n + COPIES_OF_A_MATRIX * of_matrix
     _checks.fits("the limits", numbers, members, "ask for fewer, or of fewer states", beside=beside)
 
 
@@ -184,7 +188,7 @@ def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, m
         if not of.linear and not _is_at_rest(own, matrix, rates, own_v, own_y):
             return None
         if not found:
-            _fit(n, members, matrices=True)
+            _fit(n, members, n * n)
         found.append(matrix)
     return LinearSystem(np.concatenate(found, axis=-1).reshape(n, n, *members), velocities=maps.size(system)[0])
 
@@ -234,7 +238,7 @@ def _warn(system: System, method: Method, found: Any) -> None:
 
 def _of_springs(springs: Springs, method: Method, v: Array, y: Array, members: Shape) -> Any:
     """The limit of small motions about a state."""
-    _fit(sum(maps.size(springs)), members, matrices=True)
+    _fit(2 * len(free_numbers(springs)), members, sum(maps.size(springs)) ** 2)
     found = limit_of(linearised(springs, v, y), method)
     if isinstance(found, StabilityLimit):
         return StabilityLimit(found.stable, lifted(springs, found.mode), found.grows)
