@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import pickle
 import sys
-from collections.abc import Callable
 from functools import lru_cache
+from types import FunctionType
 from typing import Any
 
 from ..equations.definition import Definition
@@ -31,7 +31,7 @@ def packed(task: Task) -> bytes:
     class Pickler(cloudpickle.Pickler):  # type: ignore[misc, name-defined]
         def reducer_override(self, obj: Any) -> Any:
             if isinstance(obj, Definition) and not _found_by_name(obj):
-                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines)
+                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines, obj.scale)
                 return _defined, (obj.function, told, obj.__module__, obj.__qualname__, list(obj.invariants.values()))
             return super().reducer_override(obj)
 
@@ -57,7 +57,7 @@ def _found_by_name(definition: Definition) -> bool:
 
 
 def _defined(
-    function: Callable[..., Any], told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
+    function: FunctionType, told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
 ) -> Definition:
     """A definition, of its function."""
     made = Definition(function, *told)
