@@ -236,6 +236,20 @@ def test_a_search_for_limits_is_counted_before_it_begins(monkeypatch: pytest.Mon
         sw.stability_limit(sw.Pendulum(), "rk4", v=0.0, y=np.ones(100_000))
 
 
+def test_unit_vectors_take_the_matrices_of_their_members_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of n vectors takes an n × n matrix of its member along: all at once they were n³ numbers, and one long copy."""
+    widths: list[int] = []
+    one_step = linear.one_step
+    monkeypatch.setattr(linear, "one_step", lambda plan, v, y: widths.append(plan.batch[0]) or one_step(plan, v, y))
+    A = np.random.default_rng(5).normal(size=(6, 6, 50))
+    plan = engine.Plan(sw.LinearSystem(A), sw.method("rk4"), (50,), 0.1)
+    whole = linear.transition(plan)
+    monkeypatch.setattr(linear, "NUMBERS_AT_ONCE", 4000)  # of two vectors: 2·6·6·50 = 3600
+    np.testing.assert_array_equal(linear.transition(plan), whole)
+    linear.transition(engine.Plan(sw.LinearSystem(A[..., 0]), sw.method("rk4"), (), 0.1))
+    assert widths == [6, 2, 2, 2, 6]
+
+
 @sw.system(shape=(60,))
 def ring(t: Any, v: Any, y: Any) -> Any:
     return -np.sin(y) + 0.1 * np.roll(y, 1)
