@@ -441,6 +441,10 @@ class Search:
         )
 
 
+#: What ``growth`` says of members that are not sought: on the circle, to a tolerance of any size, without doubt.
+NOTHING = (0.0, 1.0, 0, False)
+
+
 class Sought:
     """The members of a search whose limit is still sought; what is asked of others is not computed."""
 
@@ -454,11 +458,11 @@ class Sought:
         return self._part
 
     def growth(self, dt: Array) -> Any:
-        """``Search.growth`` of steps of shape (…, *members); zero of members that are not sought any more."""
+        """``Search.growth`` of steps of shape (…, *members); of members that are not sought, that they neither grow nor damp."""
         if self._at is ...:
             return self._search.growth(dt)
         of_part = self._part.growth(dt[(..., *self._at)])
-        whole = tuple(np.zeros(dt.shape, dtype=each.dtype) for each in of_part)
+        whole = tuple(np.full(dt.shape, nothing, dtype=each.dtype) for each, nothing in zip(of_part, NOTHING, strict=True))
         for each, some in zip(whole, of_part, strict=True):
             each[(..., *self._at)] = some
         return whole
