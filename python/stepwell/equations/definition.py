@@ -39,7 +39,7 @@ class Definition:
 
     def __init__(
         self,
-        function: FunctionType,
+        function: Callable[..., Any],
         order: int,
         blocks: int,
         shape: tuple[Any, Any],
@@ -148,22 +148,13 @@ _NAMES: dict[Any, tuple[str, ...]] = {}
 MOST_NAMES = 1024
 
 
-def _parameters(function: FunctionType, state: int) -> dict[str, Any]:
+def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     """Names and defaults of the arguments after the time and the state."""
-    positional, named = function.__defaults__ or (), function.__kwdefaults__ or {}
-    key = function.__code__, len(positional), tuple(named), state
     # The attributes of a function, such as the one that a decorator wraps, may say that its arguments are others.
-    names = None if vars(function) else _NAMES.get(key)
-    if names is None:
-        parameters = _checked(function, state)
-        if not vars(function):
-            if len(_NAMES) >= MOST_NAMES:
-                _NAMES.clear()
-            _NAMES[key] = tuple(parameters)
+    if isinstance(function, FunctionType) and not vars(function):
+        parameters = _known(function, state)
     else:
-        code = function.__code__
-        last = dict(zip(code.co_varnames[code.co_argcount - len(positional) : code.co_argcount], positional, strict=True))
-        parameters = {name: named[name] if name in named else last[name] for name in names}
+        parameters = _checked(function, state)
     for parameter, default in parameters.items():
         if not _changes(default):
             numbers = _checks.numbers(f"{function.__name__}: default of {parameter}", default)
@@ -172,7 +163,19 @@ def _parameters(function: FunctionType, state: int) -> dict[str, Any]:
     return parameters
 
 
-def _checked(function: FunctionType, state: int) -> dict[str, Any]:
+def _known(function: FunctionType, state: int) -> dict[str, Any]:
+    """The same of a function whose code alone tells its arguments, which are looked at once."""
+    code, positional, named = function.__code__, function.__defaults__ or (), function.__kwdefaults__ or {}
+    key = code, len(positional), tuple(named), state
+    if (names := _NAMES.get(key)) is None:
+        if len(_NAMES) >= MOST_NAMES:
+            _NAMES.clear()
+        names = _NAMES[key] = tuple(_checked(function, state))
+    last = dict(zip(code.co_varnames[code.co_argcount - len(positional) : code.co_argcount], positional, strict=True))
+    return {name: named[name] if name in named else last[name] for name in names}
+
+
+def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
     """The same as ``inspect`` tells them, which takes as long as all else; raise if these are no arguments of such a function."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"

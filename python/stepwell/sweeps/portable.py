@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import pickle
 import sys
+from collections.abc import Callable
 from functools import lru_cache
-from types import FunctionType
 from typing import Any
 
 from ..equations.definition import Definition
@@ -57,7 +57,7 @@ def _found_by_name(definition: Definition) -> bool:
 
 
 def _defined(
-    function: FunctionType, told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
+    function: Callable[..., Any], told: tuple[Any, ...], module: str, qualified: str, invariants: list[Invariant]
 ) -> Definition:
     """A definition, of its function."""
     made = Definition(function, *told)
