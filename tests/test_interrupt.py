@@ -27,6 +27,10 @@ RUNS = {
     "events=sw.Event(lambda t, v, y: y, most=9))",
     "many digits": "sw.stability_limit(sw.LinearSystem(np.eye(30, k=1) - np.eye(30) + np.diag([1e-9], -29)), 'false_heun')",
     "exponents": "sw.lyapunov(sw.Pendulum(np.ones(3000)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**7, every=10**4)",
+    "exponents with a tolerance": "sw.lyapunov(sw.Pendulum(np.ones(3000)), 'dop853', v=0.0, y=1.0, tolerance=1e-10, "
+    "at=np.linspace(1.0, 1e5, 3000))",
+    "limits at many states": "sw.stability_limit(sw.system(shape=(20,))(lambda t, v, y: np.roll(y, 1) - 3.0 * np.sin(y)), 'rk4', "
+    "v=np.zeros((20, 10**5)), y=np.ones((20, 10**5)))",
     "matrices of many rows": "sw.stability_limit(sw.Chain(400), 'rk4')",
     "a jacobian of many operations": "sw.jacobian(sw.system(lambda t, v, y: sum(1.0 / (k + y * y) for k in range(1, 600)))(), "
     "v=0.0, y=np.ones(10**6))",
@@ -148,6 +152,8 @@ SWEEPS = {
     "with a tolerance": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'dop853', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
     "with a tolerance, bodies": "bodies, {'G': np.linspace(1, 2, 40)}, 'dop853', v=0.0, y=y, tolerance=1e-12, at=[1e6]",
     "of a Taylor series": "sw.Pendulum, {'omega': np.linspace(1, 2, 4000)}, 'taylor', v=0.0, y=1.0, tolerance=1e-12, at=[1e6]",
+    "of exponents": "sw.Pendulum, {'omega': np.linspace(1, 2, 9999)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**6, "
+    "outcomes='lyapunov'",
     "of a function": "sw.Pendulum, {'omega': np.linspace(1, 2, 999)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, outcomes=f",
     "in threads of the caller's": "sw.Pendulum, {'omega': np.linspace(1, 2, 99)}, 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**9, "
     "engine=pool",

@@ -236,6 +236,77 @@ def test_a_search_for_limits_is_counted_before_it_begins(monkeypatch: pytest.Mon
         sw.stability_limit(sw.Pendulum(), "rk4", v=0.0, y=np.ones(100_000))
 
 
+def test_unit_vectors_take_the_matrices_of_their_members_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of n vectors takes an n × n matrix of its member along: all at once they were n³ numbers, and one long copy."""
+    widths: list[int] = []
+    one_step = linear.one_step
+    monkeypatch.setattr(linear, "one_step", lambda plan, v, y: widths.append(plan.batch[0]) or one_step(plan, v, y))
+    A = np.random.default_rng(5).normal(size=(6, 6, 50))
+    plan = engine.Plan(sw.LinearSystem(A), sw.method("rk4"), (50,), 0.1)
+    whole = linear.transition(plan)
+    monkeypatch.setattr(linear, "NUMBERS_AT_ONCE", 4000)  # of two vectors: 2·6·6·50 = 3600
+    np.testing.assert_array_equal(linear.transition(plan), whole)
+    linear.transition(engine.Plan(sw.LinearSystem(A[..., 0]), sw.method("rk4"), (), 0.1))
+    assert widths == [6, 2, 2, 2, 6]
+
+
+@sw.system(shape=(60,))
+def ring(t: Any, v: Any, y: Any) -> Any:
+    return -np.sin(y) + 0.1 * np.roll(y, 1)
+
+
+def of_springs(particles: int, fixed: Any = (), members: Any = ()) -> tuple[sw.Springs, Any]:
+    """A row of particles at rest."""
+    pairs = [(i, i + 1) for i in range(particles - 1)]
+    y = np.stack([np.arange(float(particles)), np.zeros(particles)], axis=-1)
+    return sw.Springs(pairs, stiffness=1.0, rest=1.0, fixed=fixed), np.broadcast_to(
+        y.reshape(*y.shape, *(1 for _ in members)), (*y.shape, *members)
+    )
+
+
+def test_matrices_of_small_motions_are_counted_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four times the matrix of every member, n = 80 004, 40 and 120 states, and sixty numbers for an element in the search.
+
+    163 members of 40 states and 18 of 120 are searched at once, in 0.12 GB.
+    """
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(1.5e9, "memory of this machine")]))
+    monkeypatch.setattr(limit, "Search", None)  # no work is begun
+    springs, y = of_springs(20_001)
+    with pytest.raises(TooLargeError, match=r"the limits of 1 members need 3.05e\+03 GiB"):  # 64·80 004²·8 bytes
+        sw.stability_limit(springs, "rk4", v=0.0, y=y)
+    springs, y = of_springs(10, members=(200_000,))
+    with pytest.raises(TooLargeError, match=r"the limits of 200000 members need 10.3 GiB"):  # (250 + 4·40 + 4·40²)·8 bytes each
+        sw.stability_limit(springs, "rk4", v=0.0, y=y)
+    at_rest = np.broadcast_to(0.0, (60, 20_000))
+    with pytest.raises(TooLargeError, match=r"the limits of 20000 members need 8.81 GiB"):  # (250 + 4·120 + 4·120²)·8 bytes each
+        sw.stability_limit(ring, "rk4", v=0.0, y=at_rest)
+    straight = sw.system(shape=(60,))(lambda t, v, y: 0.1 * np.roll(y, 1) - y)
+    with pytest.raises(TooLargeError, match=r"the limits of 20000 members need"):
+        sw.stability_limit(straight, "rk4", v=0.0, y=at_rest + 1.0)
+
+
+def test_a_net_that_is_mostly_fixed_is_counted_by_what_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """4·(4·500)² numbers for the whole net, 0.13 GB; sixty numbers an element of all of it were 2 GB."""
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(1e9, "memory of this machine")]))
+    springs, y = of_springs(500, fixed=range(1, 500))
+    assert sw.stability_limit(springs, "rk4", v=0.0, y=y) > 0.0
+
+
+def test_members_that_move_are_searched_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their matrices are never all there: 18 members of 120 states at once, of some 4·120² numbers each."""
+    searched: list[int] = []
+
+    def some(search: limit.Search) -> Any:
+        searched.append(len(search.rates[0, 0]))
+        return np.zeros(searched[-1]), np.zeros(searched[-1]), np.full(searched[-1], None)
+
+    monkeypatch.setattr(_checks, "_bounds", lambda: iter([(0.2e9, "memory of this machine")]))  # with all it was 0.26 GB
+    monkeypatch.setattr(limit, "_of_some", some)
+    limit.limit_of(ring().sized(), sw.method("rk4"), np.zeros((60, 300)), np.ones((60, 300)))
+    assert sum(searched) == 300
+    assert max(searched) == 18
+
+
 @LINUX
 def test_limits_of_more_members_take_no_more_memory_than_their_results() -> None:
     """Of 12 numbers a state, 1820 members are searched at once, in 60 numbers for each element of their matrices: 126 MB."""

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+import re
 import warnings
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +28,7 @@ def quietly(system: Any, method: str, **options: Any) -> sw.Run:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sw.DivergenceWarning)
         warnings.simplefilter("ignore", sw.AccuracyWarning)
+        warnings.simplefilter("ignore", sw.ToleranceWarning)
         return sw.integrate(system, method, **options)
 
 
@@ -291,3 +297,170 @@ def test_outputs_and_limits_along_a_run_are_at_the_times_of_their_members() -> N
     for judged in (sw.stability_along, lambda run: sw.analyse(swept(), "rk4", dt=0.1, at=run)):
         with pytest.raises(UnsupportedError, match=r"run: expected steps forward in time, got dt = -0.1"):
             judged(back)
+
+
+def bodies(method: str, **options: Any) -> sw.Run:
+    scene = sw.scenes.figure_eight()
+    wide = {"v": np.stack([scene.v] * 2, axis=-1), "y": np.stack([scene.y] * 2, axis=-1)}
+    return sw.integrate(scene.system, method, **wide, **options)
+
+
+BEGINS, AT = np.array([0.0, 5.0]), np.array([[1.0, 7.0], [8.0, 9.0]])
+FIXED: dict[str, Any] = {"v": 0.3, "y": 1.0, "t0": BEGINS, "dt": 0.1, "steps": 20, "every": 5}
+ADAPTIVE: dict[str, Any] = {"v": 0.3, "y": 1.0, "tolerance": 1e-8}
+MASS = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], C=[0.2, 4.0], D=1.0, x=sw.Sinusoid(1.0, 2.0), velocities=1)
+
+#: Runs whose members begin, or are saved, at times of their own.
+OF_OWN_TIMES: dict[str, Callable[[], sw.Run]] = {
+    "t0": lambda: sw.integrate(driven(), "rk4", **FIXED),
+    "t0 of one member": lambda: sw.integrate(driven(), "rk4", **FIXED | {"t0": BEGINS[1:]}),
+    "t0 of rows": lambda: sw.integrate(driven(), "rk4", **FIXED | {"t0": BEGINS[:, np.newaxis], "y": np.ones((2, 3))}),
+    "t0, recorded": lambda: sw.integrate(driven(), "verlet", **FIXED, record="energy"),
+    "t0, events": lambda: sw.integrate(driven(), "rk4", **FIXED, events=sw.Event(lambda t, v, y: y - 0.5, name="half")),
+    "t0, bodies": lambda: bodies("leapfrog", t0=BEGINS, dt=0.01, steps=20),
+    "t0, outputs": lambda: sw.integrate(MASS, "rk4", **FIXED),
+    "t0, tolerance": lambda: sw.integrate(driven(), "dop853", t0=BEGINS, at=[6.0, 8.0], **ADAPTIVE),
+    "at": lambda: sw.integrate(driven(), "dop853", at=AT, **ADAPTIVE),
+    "t0 and at": lambda: sw.integrate(driven(), "dop853", t0=BEGINS, at=AT, **ADAPTIVE),
+    "at of columns": lambda: sw.integrate(driven(), "dop853", at=AT, **ADAPTIVE | {"y": np.ones((3, 2))}),
+    "at of rows": lambda: sw.integrate(driven(), "dop853", at=AT[..., np.newaxis], **ADAPTIVE | {"y": np.ones((2, 3))}),
+    "at, events": lambda: sw.integrate(driven(), "dop853", at=AT, events=sw.Event(lambda t, v, y: y, name="zero"), **ADAPTIVE),
+    "at, stopped": lambda: quietly(driven(), "dop853", at=AT, max_steps=3, **ADAPTIVE),
+    "at, bodies": lambda: bodies("dop853", at=0.1 * AT, tolerance=1e-8),
+    "at, outputs": lambda: sw.integrate(MASS, "dop853", t0=BEGINS, at=AT, **ADAPTIVE),
+}
+
+
+def _goes_on(run: sw.Run) -> sw.Run:
+    how: dict[str, Any] = {"steps": 5} if run.paces is None else {"at": run.t[-1:] + 3.0}
+    return quietly(run.system, run.method.name, **how, **run.resume)
+
+
+def _saved(run: sw.Run, folder: Path, ending: str) -> None:
+    run.save(folder / f"run{ending}")
+    back = sw.load(folder / f"run{ending}", system=None if "own" not in type(run.system).__module__ else driven)
+    assert back == run
+    assert repr(back) == repr(run)
+    assert _goes_on(back).y.tobytes() == _goes_on(run).y.tobytes()
+
+
+def _xarray(run: sw.Run, _: Path) -> None:
+    pytest.importorskip("xarray")
+    assert run.to_xarray().y.shape == run.y.shape
+
+
+def _dataframe(run: sw.Run, _: Path) -> None:
+    pytest.importorskip("pandas")
+    assert len(run.to_dataframe()) == run.status.size * len(run.t)
+
+
+def _of_each_time(run: sw.Run, _: Path) -> None:
+    """Times and states have the same saved states and members, or all members have one time."""
+    assert run.t.shape in (run.y.shape[:1], (len(run.y), *run.status.shape))
+    assert np.shape(run.t0) in ((), run.status.shape)
+
+
+def _along(run: sw.Run, _: Path) -> None:
+    assert np.shape(sw.stability_along(run).when) == run.status.shape
+
+
+#: All that is done with a run, and the words in which it refuses one of own times, if it does.
+USES: dict[str, tuple[Callable[[sw.Run, Path], Any], str]] = {
+    "shapes": (_of_each_time, ""),
+    "repr": (lambda run, _: repr(run), ""),
+    "_repr_html_": (lambda run, _: run._repr_html_(), ""),
+    "save npz": (lambda run, folder: _saved(run, folder, ".npz"), ""),
+    "save zarr": (lambda run, folder: pytest.importorskip("zarr") and _saved(run, folder, ".zarr"), ""),
+    "resume": (lambda run, _: _goes_on(run), ""),
+    "pickle": (lambda run, _: pickle.loads(pickle.dumps(_told(run))), ""),
+    "copy": (lambda run, _: copy.deepcopy(run), ""),
+    "to_xarray": (_xarray, ""),
+    "to_dataframe": (_dataframe, ""),
+    "plot": (lambda run, _: run.plot(), "run: expected a run of one member, got a batch of shape"),
+    "animate": (lambda run, folder: run.animate(folder / "a.html"), "run: expected a run of one member, got a batch of shape"),
+    "quantity": (lambda run, _: run.quantity("energy"), "has no energy of its own"),
+    "energy": (lambda run, _: run.energy, "has no energy of its own"),
+    "dtype": (lambda run, _: run.dtype, ""),
+    "z": (lambda run, _: run.z, "has no auxiliary outputs"),
+    "collisions": (lambda run, _: run.collisions, "has no bodies that collide|expected a run with fixed steps"),
+    "encounters": (lambda run, _: run.encounters, "has no bodies that meet|expected a run with fixed steps"),
+    "stability_along": (_along, ""),
+    "analyse": (
+        lambda run, _: sw.analyse(run.system, "rk4", dt=0.1, at=run),
+        "at: expected a run whose members have their times in common",
+    ),
+    "run_picture": (
+        lambda run, _: sw.charts.run_picture(sw.scenes.figure_eight(), run),
+        "run: expected one member with states of shape|run: expected a run of the scene",
+    ),
+    "state_error": (lambda run, _: sw.scenes.figure_eight().state_error(run), "run: expected a run of the scene"),
+}
+
+
+def _told(run: sw.Run) -> dict[str, Any]:
+    return {name: getattr(run, name) for name in ("t", "v", "y", "t0", "resume")}
+
+
+@pytest.mark.parametrize("use", USES)
+@pytest.mark.parametrize("which", OF_OWN_TIMES)
+def test_a_run_of_own_times_is_used_or_refused_in_words(which: str, use: str, tmp_path: Path) -> None:
+    function, refusal = USES[use]
+    words = ""
+    try:
+        function(OF_OWN_TIMES[which](), tmp_path)
+    except sw.StepwellError as error:
+        words = str(error)
+    assert not words or (refusal and re.search(refusal, words)), words
+
+
+def test_every_public_name_of_a_run_is_tried() -> None:
+    public = {name for name in vars(sw.Run) if not name.startswith("_") or name in ("__repr__", "_repr_html_")}
+    tried = {use.partition(" ")[0] for use in USES} | {"__repr__"}
+    assert public <= tried, public - tried
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"y": np.ones(3), "at": np.ones((2, 5))}, ShapeError, r"do not broadcast to one: y \(3,\), at \(5,\)"),
+        ({"t0": np.zeros(3), "at": np.ones((2, 5))}, ShapeError, r"do not broadcast to one: t0 \(3,\), at \(5,\)"),
+        ({"t0": np.zeros((3, 2)), "at": np.ones((1, 3, 3))}, ShapeError, r"t0 \(3, 2\), at \(3, 3\)"),
+        ({"at": np.ones((2, 0))}, ShapeError, r"at: expected times along the first axis, got shape \(2, 0\)"),
+        ({"at": [[1.0, 3.0], [2.0, 2.5]]}, ArgumentError, r"ascend from t0 = 0 on, got \[3.0, 2.5\] of member 1$"),
+        ({"at": [[-1.0, -2.0], [-3.0, -1.5]]}, ArgumentError, r"descend from t0 = 0 on, got \[-2.0, -1.5\] of member 1$"),
+        ({"t0": [0.0, 2.0, 5.0], "at": [3.0, 4.0]}, ArgumentError, r"some of each"),
+        ({"t0": [0.0, 2.0, 3.5], "at": [3.0, 4.0]}, ArgumentError, r"ascend from t0 = 3.5 on, got \[3.0, 4.0\] of member 2$"),
+        (
+            {"t0": [0.0, 5.0], "at": [[6.0, 4.0], [7.0, 8.0]], "y": np.ones((3, 2))},
+            ArgumentError,
+            r"ascend from t0 = 5 on, got \[4.0, 8.0\] of member \(0, 1\)$",
+        ),
+        ({"at": [2.0, 1.0], "y": np.ones(3)}, ArgumentError, r"ascend from t0 = 0 on, got \[2.0, 1.0\]$"),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_with_times_is_said_of_their_member(options: dict[str, Any], kind: Any, message: str) -> None:
+    with pytest.raises(kind, match=message):
+        sw.integrate(swept(), "dop853", **ADAPTIVE | options)
+
+
+def test_a_run_that_goes_on_says_which_member_was_further() -> None:
+    half = sw.integrate(swept(), "dop853", at=AT, **ADAPTIVE)
+    with pytest.raises(ArgumentError, match=r"from the last time of the run that goes on, 9, on, got \[8.5\] of member 1$"):
+        sw.integrate(swept(), "dop853", at=[[9.0, 8.5]], **half.resume)
+
+
+def test_times_over_some_axes_are_those_of_each_member() -> None:
+    """``at`` and ``t0`` that broadcast are the same run as those of the whole batch, and are arrays of the run's own."""
+    at, begins, y = AT[..., np.newaxis].copy(), BEGINS[:, np.newaxis].copy(), np.linspace(0.5, 1.5, 3)
+    run = sw.integrate(swept(), "dop853", t0=begins, at=at, **ADAPTIVE | {"y": y})
+    whole = {"t0": np.repeat(begins, 3, 1), "at": np.repeat(at, 3, 2), "y": np.broadcast_to(y, (2, 3))}
+    assert run == sw.integrate(swept(), "dop853", **ADAPTIVE | whole)
+    begins[:] = at[:] = 7.0
+    assert run.t0[1].tolist() == [5.0] * 3
+    assert run.t[:, 1, 2].tolist() == [7.0, 9.0]
+
+
+def test_exponents_say_what_times_they_take() -> None:
+    with pytest.raises(ShapeError, match=r"at: expected times along one axis, the same for all members, got shape \(2, 2\)"):
+        sw.lyapunov(swept(), "dop853", at=AT, **ADAPTIVE)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
+import pickle
 import types
 from collections.abc import Callable
 from typing import Any
@@ -11,6 +14,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.equations import recognised
+from stepwell.errors import ArgumentError
+from stepwell.sweeps.portable import packed
 from stepwell.systems import own
 
 SCALE = 2.0
@@ -136,6 +141,69 @@ def test_the_same_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(traced) == 6
     sw.integrate(made(1.0)(), "rk4", v=np.zeros((2, 3)), y=np.ones((2, 3)), dt=0.1, steps=1)
     assert len(traced) == 6  # batches change nothing
+
+
+def test_arguments_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What ``inspect`` takes as long for as all else of a short run, of functions that share their code."""
+    looked: list[Any] = []
+    signature = inspect.signature
+    monkeypatch.setattr(inspect, "signature", lambda function: looked.append(function) or signature(function))
+
+    def made(k: float, drive: Any) -> Any:
+        def rates(t: Any, v: Any, y: Any, a: Any = k, *, drive: Any = drive) -> Any:
+            return drive - a * y
+
+        return rates
+
+    for k in (1.0, 2.0, [1.0, 2.0]):
+        for drive in (0.0, 0.5, sw.Sinusoid(1.0, 2.0)):
+            definition = sw.system(made(k, drive))
+            assert list(definition.parameters) == ["a", "drive"]
+            np.testing.assert_array_equal(definition.parameters["a"], k)
+            assert definition.parameters["drive"] is drive
+            assert definition.own_axes == {"a": np.ndim(k), "drive": 0}
+    assert len(looked) == 1
+
+
+def test_other_arguments_are_looked_at_again() -> None:
+    """Defaults that were added or taken away, and attributes of a function that tell other arguments."""
+
+    def rates(t: Any, v: Any, y: Any, a: Any = 1.0, *, b: Any = 2.0) -> Any:
+        return -a * b * y
+
+    assert sw.system(rates).parameters == {"a": 1.0, "b": 2.0}
+    rates.__defaults__, rates.__kwdefaults__ = (3.0,), {"b": 4.0}
+    assert sw.system(rates).parameters == {"a": 3.0, "b": 4.0}
+    rates.__defaults__ = None
+    with pytest.raises(ArgumentError, match="rates: expected a default of the parameter a"):
+        sw.system(rates)
+    rates.__defaults__, rates.__kwdefaults__ = (3.0,), None
+    with pytest.raises(ArgumentError, match="rates: expected a default of the parameter b"):
+        sw.system(rates)
+    rates.__kwdefaults__ = {"b": np.inf}
+    with pytest.raises(ArgumentError, match="default of b"):
+        sw.system(rates)
+    rates.__kwdefaults__ = {"b": 4.0}
+    with pytest.raises(ArgumentError, match="expected a default of the parameter y"):
+        sw.system(order=1)(lambda t, v, y: y)
+
+    @functools.wraps(rates)
+    def wrapped(*given: Any, **named: Any) -> Any:
+        return rates(*given, **named)
+
+    assert sw.system(wrapped).parameters == {"a": 3.0, "b": 4.0}
+
+    def bare(*given: Any, **named: Any) -> Any:
+        return rates(*given, **named)
+
+    with pytest.raises(ArgumentError, match="bare: expected a function"):
+        sw.system(bare)
+
+
+def test_what_goes_to_other_processes_keeps_its_scale() -> None:
+    pytest.importorskip("cloudpickle")
+    task = sw.system(scale="block", shape=(2,))(lambda t, v, y: -y)
+    assert pickle.loads(packed(task)).scale == "block"  # type: ignore[arg-type]  # it packs any object
 
 
 def test_functions_of_the_time_and_invariants_count() -> None:

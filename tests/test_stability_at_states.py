@@ -11,6 +11,7 @@ import pytest
 import stepwell as sw
 from stability_cases import EPS
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
+from stepwell.stability import eigen, limit_search
 
 
 def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:
@@ -252,3 +253,33 @@ def test_what_bends_is_decided_where_it_rests() -> None:
     assert not moving.decided
     assert 0.0 <= moving.stable < moving.grows
     assert "not decided" in repr(moving)
+
+
+@sw.system(shape=(4,))
+def coupled(t: Any, v: Any, y: Any, *, k: Any = 0.1) -> Any:
+    return (np.roll(y, 1) + np.roll(y, -1)) * k - np.sin(y)
+
+
+@pytest.mark.parametrize("method", ["rk4", "verlet", "fehlberg"])
+@pytest.mark.parametrize("of_each", [False, True])
+def test_only_members_whose_limit_is_sought_are_searched(method: str, of_each: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the bits and modes that all of them had together.
+
+    A member that grows by itself takes the eigenvalues of its rates, and of two steps for its mode. One that is sought takes
+    those of 562 rungs and 60 bisections at most, and of 16 steps around the crossing; members go when half of those left are
+    found, so up to as many again are computed with it.
+    """
+    random = np.random.default_rng(4)
+    y = np.where(np.arange(60) < 6, 0.3, 3.0) * random.uniform(0.5, 1.0, (4, 60))  # the sixth part hang, the others stand
+    system = coupled(k=np.linspace(0.05, 0.15, 60)) if of_each else coupled()
+    computed: list[int] = []
+    of_matrices = eigen.eigen
+    monkeypatch.setattr(eigen, "eigen", lambda m, *rest: computed.append(m[0, 0].size) or of_matrices(m, *rest))
+    found = sw.stability_limit(system, method, v=np.zeros(4), y=y)
+    assert (found[6:] == 0.0).all()
+    assert sum(computed) <= 3 * 60 + 2 * 6 * (562 + 60 + 16)
+    monkeypatch.setattr(limit_search.Search, "of", lambda self, members: (self, ...))
+    whole = sw.stability_limit(system, method, v=np.zeros(4), y=y)
+    np.testing.assert_array_equal(found, whole)
+    np.testing.assert_array_equal(found.grows, whole.grows)
+    assert found.modes.tolist() == whole.modes.tolist()

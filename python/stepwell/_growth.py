@@ -129,15 +129,16 @@ class _Factors:
     """What a step, and the motion itself, make of disturbances of the start: of some members of a batch."""
 
     def __init__(self, system: System, method: Method, dt: float, t: Any, start: tuple[Array, Array], batch: Shape) -> None:
-        from .stability.limit import part_of
+        from .stability.some_members import Batch
 
         self._system, self._method, self._dt = system, method, dt
-        self._part = part_of(system, method, batch, *((None, None) if system.linear else start))
+        of = (system.without_inputs(), method, None, None) if system.linear else (system, method, *start)
+        self._batch = Batch(*of, batch)
         self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
 
     def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
         """The system of some members, their time, and where they begin, if that matters."""
-        own, v, y = self._part(members)
+        own, v, y = self._batch.of(members)
         return own, self._t if np.ndim(self._t) == 0 else self._t[members], v, y
 
     def of(self, members: Whole) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import _checks, _going_on, engine
-from ._brief import share
+from ._brief import of_member, share
 from ._checks import Array, Shape
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, quantities, spread
 from ._stops import warn_of_stops
@@ -80,9 +80,14 @@ def adaptive_run(
     """
     control = _steppable(system, how, a_control(control), options, went)
     t0 = _checks.numbers("t0", t0, unit="units of time")
-    times = _checks.numbers("at", options.at, unit="units of time").copy()  # they become those of the run
+    times = _checks.numbers("at", options.at, unit="units of time")
     if times.ndim == 0 or times.size == 0:
         raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
+    v = _checks.block("v", v, system.v_shape, system.axes)
+    y = _checks.block("y", y, system.y_shape, system.axes)
+    batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
+    batches |= {"t0": t0.shape, "at": times.shape[1:]}
+    _checks.batch_shape(batches)  # before t0 and at are compared
     backward = _is_backward(times, t0)
     if backward and (acting := system.keeper if control is None else control) is not None and getattr(acting, "pushes", True):
         raise UnsupportedError(
@@ -92,8 +97,6 @@ def adaptive_run(
     sign = -1.0 if backward else 1.0
     backend = _checks.known("backend", backend, BACKENDS)
     budget = MOST_STEPS if options.max_steps is None else _checks.count("max_steps", options.max_steps, 1)
-    v = _checks.block("v", v, system.v_shape, system.axes)
-    y = _checks.block("y", y, system.y_shape, system.axes)
     acceptance = Acceptance(system.groups, positive=_positive(system, options.positive, v, y))
     numbers = prod(system.v_shape) + prod(system.y_shape)
     groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
@@ -101,8 +104,6 @@ def adaptive_run(
     if went is not None:
         carry = _paces_of(how, went, groups, numbers)
         acceptance = acceptance._replace(own=len(carry) == engine.PACE_NUMBERS + 3 * groups + numbers)
-    batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-    batches |= {"t0": t0.shape, "at": times.shape[1:]}
     first = most_step = None
     if carry is not None:
         if dt is not None:
@@ -135,8 +136,6 @@ def adaptive_run(
     batch = _checks.batch_shape(batches)
     if carry is not None and carry.shape[1:] != batch:
         raise ShapeError(f"carry: expected that of a run of batch {batch}, got one of batch {carry.shape[1:]}")
-    since = sign * t0 if carry is None else np.maximum(carry[engine.TARGET], sign * t0)
-    _ascending(sign * times, since, sign, carry is not None)
     for end in (t0, times):
         system.check_time(float(np.abs(end).max()))
     record = quantities(system, record)
@@ -146,8 +145,11 @@ def adaptive_run(
         len(times) * numbers + (NUMBERS_PER_STATE + 3) * (numbers + 1),
         batch,
         "ask for fewer times or split the batch",
-        beside=times.size * BYTES_PER_TIME,
+        beside=len(times) * (prod(batch) if times.ndim > 1 else 1) * BYTES_PER_TIME,
     )
+    t0, times = _of_the_run(t0, times, batch)
+    since = sign * t0 if carry is None else np.maximum(carry[engine.TARGET], sign * t0)
+    _ascending(sign * times, since, sign, carry is not None)
     v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
     ended, adapt = None, engine.adapt
     if asked is not None:
@@ -191,7 +193,7 @@ def adaptive_run(
         system=system,
         method=how,
         dt=1.0,
-        t0=t0.item() if t0.size == 1 and t0.ndim == 0 else t0,
+        t0=t0 if t0.ndim else t0.item(),
         start_step=0,
         steps=0,
         start=None,
@@ -259,16 +261,26 @@ def _is_backward(times: Array, t0: Array) -> bool:
     return bool((ahead < 0.0).any()) or (not (ahead > 0.0).any() and len(times) > 1 and bool((times[1] < times[0]).any()))
 
 
+def _of_the_run(t0: Array, times: Array, batch: Shape) -> tuple[Array, Array]:
+    """Times of the start and of saved states, as the run keeps them: copies, those of members over the whole batch."""
+    if t0.ndim:
+        t0 = spread(t0, (), batch)
+    if times.ndim > 1:
+        times = spread(times, times.shape[:1], batch)
+    return t0.copy(), times.copy()
+
+
 def _ascending(times: Array, since: Array, sign: float, goes_on: bool) -> None:
     """Raise unless times go on from where members stand, in the direction of the run."""
-    if (times[0] >= since).all() and (len(times) == 1 or (np.diff(times, axis=0) > 0).all()):
+    ascends = (times[0] >= since) & (np.diff(times, axis=0) > 0.0).all(axis=0)
+    if ascends.all():
         return
+    index = tuple(np.argwhere(~ascends)[0].tolist())
+    shown = (sign * (_checks.member(times, index) if times.ndim > 1 else times)).tolist()
+    start = sign * np.broadcast_to(since, ascends.shape)[index]
     word = "descend" if sign < 0.0 else "ascend"
-    start = sign * np.asarray(since)
-    at = f"{start.flat[0]:g}" if start.min() == start.max() else f"{start.min():g} to {start.max():g}"
-    begin = f"the last time of the run that goes on, {at}, on" if goes_on else f"t0 = {at} on"
-    shown = (sign * times).reshape(len(times), -1)[:5, 0].tolist()
-    raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown}{'…' * (len(times) > 5)}")
+    begin = f"the last time of the run that goes on, {start:g}, on" if goes_on else f"t0 = {start:g} on"
+    raise ArgumentError(f"at: expected times that {word} from {begin}, got {shown[:5]}{'…' * (len(shown) > 5)}{of_member(index)}")
 
 
 def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:

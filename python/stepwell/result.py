@@ -240,10 +240,11 @@ class Run(Value):
         had diverged before this run are left out.
 
         Raises:
-            UnsupportedError: if the system has no bodies.
+            UnsupportedError: if the system has no bodies, or the run has a tolerance, which chooses steps that follow collisions.
         """
         if self.collision is None:
-            raise UnsupportedError(f"collisions: {self.system!r} has no bodies that collide")
+            why = f"{self.system!r} has no bodies that collide" if self.paces is None else "expected a run with fixed steps"
+            raise UnsupportedError(f"collisions: {why}")
         diverged = np.argwhere(self.first_bad_step > self.start_step).tolist()
         return tuple(self.collision(tuple(index), int(self.first_bad_step[tuple(index)])) for index in diverged)
 

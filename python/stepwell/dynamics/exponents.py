@@ -20,7 +20,7 @@ from .._interrupts import POLL, available
 from .._value import Value
 from ..compatible import fits_together
 from ..derivatives.traced import Traced, together
-from ..errors import ArgumentError, DivergenceWarning, ToleranceWarning, UnsupportedError
+from ..errors import ArgumentError, DivergenceWarning, ShapeError, ToleranceWarning, UnsupportedError
 from ..events.members import Members
 from ..integration import integrate
 from ..method_records import Method
@@ -268,7 +268,9 @@ def adaptive_averages(
         raise ArgumentError(f"{'at' if at is None else 'tolerance'}: expected too, since the other was given")
     t0 = _checks.number("t0", t0, unit="units of time")
     times = np.atleast_1d(_checks.numbers("at", at, unit="units of time"))
-    if times.ndim > 1 or not times.size or (np.diff(times, prepend=t0) <= 0.0).any():
+    if times.ndim > 1:
+        raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
+    if not times.size or (np.diff(times, prepend=t0) <= 0.0).any():
         raise ArgumentError(f"at: expected times after t0 = {t0:g}, ascending, got {_checks.short(at)}")
     transient = _checks.count("transient", transient, 0, len(times) - 1)
     n_v, n_y = maps.size(system)

@@ -22,6 +22,10 @@ from .plan import BEGINS, Outcome, Plan
 #: them; and of powers one that is squared, one that is made, and their product.
 NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
 
+#: Numbers of states, and of matrices that members have of their own, that are stepped at once: an operation with so many takes a
+#: millisecond.
+NUMBERS_AT_ONCE = 1 << 20
+
 
 def _fits(plan: Plan, numbers: int) -> None:
     """Raise if there is no memory for transition matrices."""
@@ -30,15 +34,22 @@ def _fits(plan: Plan, numbers: int) -> None:
 
 
 def transition(plan: Plan) -> Array:
-    """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first)."""
+    """P of shape (n, n, *batch), from one step of each unit vector of the slots (v slot first).
+
+    Each vector of a member takes the member's parameters with it, as many as a matrix has, so some vectors go at once.
+    """
     n_v, n_y = (prod(shape) for shape in (plan.system.v_shape, plan.system.y_shape))
     n = n_v + n_y
-    unit = np.broadcast_to(np.eye(n).reshape(n, n, *(1,) * len(plan.batch)), (n, n, *plan.batch))
-    v, y = (
-        unit[:n_v].reshape(*plan.system.v_shape, n, *plan.batch),
-        unit[n_v:].reshape(*plan.system.y_shape, n, *plan.batch),
-    )
-    return one_step(plan._replace(system=plan.system.without_inputs(), batch=(n, *plan.batch)), v, y)
+    free = plan._replace(system=plan.system.without_inputs())
+    at_once = max(1, NUMBERS_AT_ONCE // (n * n * prod(plan.batch))) if plan.system.batch else n
+    made: Array = np.empty((n, n, *plan.batch))
+    for k in range(0, n, at_once):
+        along = np.eye(n)[:, k : k + at_once].reshape(n, -1, *(1,) * len(plan.batch))
+        batch = (along.shape[1], *plan.batch)
+        unit = np.broadcast_to(along, (n, *batch))
+        v, y = unit[:n_v].reshape(*plan.system.v_shape, *batch), unit[n_v:].reshape(*plan.system.y_shape, *batch)
+        made[:, k : k + at_once] = one_step(free._replace(batch=batch), v, y)
+    return made
 
 
 def pulses(plan: Plan, inputs: Iterable[str]) -> Array:

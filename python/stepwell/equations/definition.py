@@ -19,6 +19,7 @@ from .invariants import Invariant, invariant
 
 #: What the error of an adaptive step is relative to.
 Scale = Literal["component", "row", "block"]
+SCALES = get_args(Scale)
 
 
 class Definition:
@@ -32,6 +33,7 @@ class Definition:
         quick_sines: whether sine and cosine are those of the built-in systems.
         scale: what the error of an adaptive step is relative to: each "component", "row" or "block".
         parameters: names and defaults.
+        own_axes: how many axes of its own each parameter has, as its default does.
         invariants: the declared invariants, by name.
     """
 
@@ -50,6 +52,7 @@ class Definition:
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
         self.parameters = _parameters(function, 3 if self.has_v else 2)
+        self.own_axes = {name: 0 if _changes(default) else np.ndim(default) for name, default in self.parameters.items()}
         self.invariants: dict[str, Invariant] = {}
 
     @property
@@ -135,8 +138,45 @@ def _found(module: str, name: str) -> Any:
     return found
 
 
+def _changes(value: Any) -> bool:
+    """Whether a parameter changes in time."""
+    return isinstance(value, (Sinusoid, Sampled)) or callable(value)
+
+
+#: Names of the parameters of functions, by what they follow from; and of how many functions.
+_NAMES: dict[Any, tuple[str, ...]] = {}
+MOST_NAMES = 1024
+
+
 def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
     """Names and defaults of the arguments after the time and the state."""
+    # The attributes of a function, such as the one that a decorator wraps, may say that its arguments are others.
+    if isinstance(function, FunctionType) and not vars(function):
+        parameters = _known(function, state)
+    else:
+        parameters = _checked(function, state)
+    for parameter, default in parameters.items():
+        if not _changes(default):
+            numbers = _checks.numbers(f"{function.__name__}: default of {parameter}", default)
+            if numbers.ndim:
+                parameters[parameter] = frozen(parameter, numbers)
+    return parameters
+
+
+def _known(function: FunctionType, state: int) -> dict[str, Any]:
+    """The same of a function whose code alone tells its arguments, which are looked at once."""
+    code, positional, named = function.__code__, function.__defaults__ or (), function.__kwdefaults__ or {}
+    key = code, len(positional), tuple(named), state
+    if (names := _NAMES.get(key)) is None:
+        if len(_NAMES) >= MOST_NAMES:
+            _NAMES.clear()
+        names = _NAMES[key] = tuple(_checked(function, state))
+    last = dict(zip(code.co_varnames[code.co_argcount - len(positional) : code.co_argcount], positional, strict=True))
+    return {name: named[name] if name in named else last[name] for name in names}
+
+
+def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
+    """The same as ``inspect`` tells them, which takes as long as all else; raise if these are no arguments of such a function."""
     name = function.__name__
     expected = "(t, v, y, *, …)" if state == 3 else "(t, y, *, …)"
     given = list(inspect.signature(function).parameters.values())
@@ -153,11 +193,6 @@ def _parameters(function: Callable[..., Any], state: int) -> dict[str, Any]:
         if each.default is each.empty:
             raise ArgumentError(f"{name}: expected a default of the parameter {each.name}, such as {each.name}=1.0")
         parameters[each.name] = each.default
-    for parameter, default in parameters.items():
-        if not isinstance(default, (Sinusoid, Sampled)) and not callable(default):
-            numbers = _checks.numbers(f"{name}: default of {parameter}", default)
-            if numbers.ndim:
-                parameters[parameter] = frozen(parameter, numbers)
     return parameters
 
 
@@ -220,7 +255,7 @@ def system(
         raise ArgumentError("blocks: expected 1 with order=1, whose state is one block; for (v̇, ẏ) leave order out")
     shapes = _shapes(shape, order, blocks)
     quick_sines = _checks.flag("quick_sines", quick_sines)
-    scale = _checks.known("scale", scale, get_args(Scale))
+    scale = _checks.known("scale", scale, SCALES)
 
     def define(function: Any) -> Definition:
         if isinstance(function, Definition):

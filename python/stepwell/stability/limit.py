@@ -12,21 +12,17 @@ computed in more digits (``exact``), on a ladder of wider rungs.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from functools import partial
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from .. import _checks, engine
+from .. import _checks
 from .._brief import share
 from .._checks import Array, Shape
-from .._value import changed, complete
 from ..compatible import fits_together
 from ..derivatives import traced
 from ..errors import AccuracyWarning, UnsupportedError
-from ..events.members import Members
 from ..method_records import Method
 from ..method_records import method as find_method
 from ..systems import LinearSystem, Springs, System
@@ -38,7 +34,8 @@ from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
 from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
 from .parts import parts
-from .small_motions import lifted, linearised
+from .small_motions import free_numbers, lifted, linearised
+from .some_members import Batch
 
 #: A state is at rest if its rates are below so many roundings of the products that they are sums of.
 RESTS = 32.0 * EPS
@@ -106,10 +103,13 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
 def limit_of(system: System, method: Method, v: Array | None = None, y: Array | None = None, t: float = 0.0) -> Any:
     """``stability_limit`` of arguments that were checked, without a warning where it is not decided."""
     members = system.batch if v is None or y is None else maps.together(system, np.asarray(1.0), v, y)
-    if v is not None and y is not None and not system.linear:
-        if isinstance(system, Springs) and system.control is None:
-            return _of_springs(system, method, v, y)
-        if (motions := _linear_part(system, v, y, t)) is not None:
+    if v is None or y is None or system.linear:
+        _fit(sum(maps.size(system)), members)
+    elif isinstance(system, Springs) and system.control is None:
+        return _of_springs(system, method, v, y, members)
+    else:
+        _fit(sum(maps.size(system)), members)
+        if (motions := _linear_part(system, method, v, y, t, members)) is not None:
             return _reshaped(system, limit_of(motions, method))
     limits, grows, modes = _of_all(system, method, v, y, t, members)
     spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
@@ -122,6 +122,16 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
 #: Numbers that the limit of a member takes beside the shape of its mode.
 NUMBERS_OF_A_LIMIT = 250
 
+#: How often the matrix of small motions is there before the search begins: as it is made, cut or joined, and in the system.
+COPIES_OF_A_MATRIX = 4
+
+
+def _fit(n: int, members: Shape, of_matrix: int = 0) -> None:
+    """Raise if the limits of systems of n states do not fit in memory, with a matrix of so many numbers for each member."""
+    beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(prod(members), members_at_once(n))
+    numbers = NUMBERS_OF_A_LIMIT + 4 * n + COPIES_OF_A_MATRIX * of_matrix
+    _checks.fits("the limits", numbers, members, "ask for fewer, or of fewer states", beside=beside)
+
 
 def _of_all(
     system: System, method: Method, v: Array | None, y: Array | None, t: float, members: Shape
@@ -131,44 +141,15 @@ def _of_all(
         system, v, y, t, members = system.without_inputs(), None, None, 0.0, system.batch
     n, count = sum(maps.size(system)), prod(members)
     at_once = members_at_once(n)
-    beside = 8.0 * NUMBERS_OF_AN_ELEMENT * n * n * min(count, at_once)
-    _checks.fits("the limits", NUMBERS_OF_A_LIMIT + 4 * n, members, "ask for fewer, or of fewer states", beside=beside)
     if count <= at_once:
         return _of_some(Search(system, method, v, y, t))
-    part = part_of(system, method, members, v, y)
     limits, grows, modes = np.empty(count), np.empty(count), np.empty(count, dtype=object)
+    every = Batch(system, method, v, y, members)
     for k in range(0, count, at_once):
         some = np.arange(k, min(k + at_once, count))
-        own, v, y = part(some)
-        limits[some], grows[some], modes[some] = _of_some(Search(own, method, v, y, t))
+        own, own_v, own_y = every.of(some)
+        limits[some], grows[some], modes[some] = _of_some(Search(own, method, own_v, own_y, t))
     return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
-
-
-Part = tuple[System, Array | None, Array | None]
-
-
-def part_of(system: System, method: Method, members: Shape, v: Array | None, y: Array | None) -> Callable[[Any], Part]:
-    """A function of the places of some members, of all in one row: their system, and their states or None.
-
-    Without states the system is linear, and its inputs do not matter.
-    """
-    if v is None or y is None:
-        system = system.without_inputs()
-    every, count = Members(engine.Plan(system, method, members, 1.0)), prod(members)
-    blocks = None
-    if v is not None and y is not None:
-        both = ((v, system.v_shape), (y, system.y_shape))
-        blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
-
-    def part(some: Any) -> Part:
-        own = every.plan(some).system
-        if blocks is None:
-            complete(own, without_inputs=partial(changed, own))  # it has none
-            return own, None, None
-        v, y = (block[..., some] for block in blocks)
-        return own, v, y
-
-    return part
 
 
 def _of_some(search: Search) -> tuple[Array, Array, Any]:
@@ -179,7 +160,7 @@ def _of_some(search: Search) -> tuple[Array, Array, Any]:
     return limits, grows, search.modes(grows)[0]
 
 
-def _linear_part(system: System, v: Array, y: Array, t: float) -> LinearSystem | None:
+def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, members: Shape) -> LinearSystem | None:
     """A linear system whose steps are those of small disturbances of a state of own equations, or None.
 
     There is one where the derivative of the rates is the same in all stages of a step: of equations that are linear but for what
@@ -190,18 +171,35 @@ def _linear_part(system: System, v: Array, y: Array, t: float) -> LinearSystem |
     of = traced.reading(system)
     if not of.linear and of.time:
         return None
-    matrix, rates = traced.matrix(system, "rates", None, maps.together(system, np.asarray(1.0), v, y), v, y, t)
-    if not of.linear:
-        members = rates.shape[1:]
-        numbers = np.zeros((0, *members))
-        for block, shape in ((v, system.v_shape), (y, system.y_shape)):
-            own = block.shape[len(shape) :]
-            aligned = block.reshape(prod(shape), *(1,) * (len(members) - len(own)), *own)
-            numbers = np.concatenate([numbers, np.broadcast_to(aligned, (prod(shape), *members))])
-        rounding = RESTS * np.einsum("ij...,j...->i...", np.abs(matrix), np.abs(numbers))
-        if not (np.abs(rates) <= rounding).all():
+    n, count = sum(maps.size(system)), prod(members)
+    if count <= members_at_once(n):
+        matrix, rates = traced.matrix(system, "rates", None, members, v, y, t)
+        if not of.linear and not _is_at_rest(system, matrix, rates, v, y):
             return None
-    return LinearSystem(matrix, velocities=maps.size(system)[0])
+        return LinearSystem(matrix, velocities=maps.size(system)[0])
+    every = Batch(system, method, v, y, members)
+    found: list[Array] = []
+    for k in range(0, count, members_at_once(n)):
+        some = np.arange(k, min(k + members_at_once(n), count))
+        own, own_v, own_y = every.of(some)
+        assert own_v is not None
+        assert own_y is not None
+        matrix, rates = traced.matrix(own, "rates", None, some.shape, own_v, own_y, t)
+        if not of.linear and not _is_at_rest(own, matrix, rates, own_v, own_y):
+            return None
+        if not found:
+            _fit(n, members, n * n)
+        found.append(matrix)
+    return LinearSystem(np.concatenate(found, axis=-1).reshape(n, n, *members), velocities=maps.size(system)[0])
+
+
+def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array) -> bool:
+    """Whether the rates of all members are no more than the rounding of what they are sums of."""
+    members = rates.shape[1:]
+    blocks = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
+    numbers = np.concatenate([block.reshape(-1, *members) for block in blocks])
+    rounding = RESTS * np.einsum("ij...,j...->i...", np.abs(matrix), np.abs(numbers))
+    return bool((np.abs(rates) <= rounding).all())
 
 
 def _reshaped(system: System, found: Any) -> Any:
@@ -238,8 +236,9 @@ def _warn(system: System, method: Method, found: Any) -> None:
     )
 
 
-def _of_springs(springs: Springs, method: Method, v: Array, y: Array) -> Any:
+def _of_springs(springs: Springs, method: Method, v: Array, y: Array, members: Shape) -> Any:
     """The limit of small motions about a state."""
+    _fit(2 * len(free_numbers(springs)), members, sum(maps.size(springs)) ** 2)
     found = limit_of(linearised(springs, v, y), method)
     if isinstance(found, StabilityLimit):
         return StabilityLimit(found.stable, lifted(springs, found.mode), found.grows)

@@ -16,6 +16,7 @@ from .eigen import EPS, Complex, Truths
 from .limit_digits import LADDER, RUNG_RATIO, in_many_digits, passes_zero
 from .limit_result import Mode
 from .parts import rates
+from .some_members import Batch
 
 #: Rungs that are computed at once, and elements of the matrices of all members in them, so that Ctrl-C is noticed in between and
 #: memory has room for them.
@@ -68,13 +69,43 @@ def members_at_once(n: int) -> int:
 class Search:
     """P as a function of the step, for every member at once."""
 
-    def __init__(self, system: System, method: Method, v: Array | None, y: Array | None, t: float) -> None:
+    def __init__(
+        self,
+        system: System,
+        method: Method,
+        v: Array | None,
+        y: Array | None,
+        t: float,
+        rates: Array | None = None,
+        exact_rates: eigen.Eigen | None = None,
+    ) -> None:
         self.system, self.method, self.v, self.y, self.t = system, method, v, y, t
-        self.rates = maps.rates(system, t, v, y)
+        self.rates = maps.rates(system, t, v, y) if rates is None else rates
         self.members: Shape = self.rates.shape[2:]
-        self.exact = eigen.eigen(self.rates)
+        self.exact = eigen.eigen(self.rates) if exact_rates is None else exact_rates
         #: Whether eigenvalues that nearly meet can be had in as many digits as it takes.
         self.exactable = v is None and 2 < len(self.rates) <= exact.MAX_ROWS
+
+    @cached_property
+    def _batch(self) -> Batch:
+        return Batch(self.system, self.method, self.v, self.y, self.members)
+
+    def of(self, members: Truths) -> tuple[Search, Any]:
+        """The search of these members and their places among all, or that of all if these are most of them.
+
+        A step is the same for one member as among others; so is what was found of the rates. Members of two states cost less
+        than it takes to part them, and those that are found in many digits are all looked at as long as one needs it.
+        """
+        if len(self.rates) <= 2 or self.exactable or 2 * np.count_nonzero(members) > members.size:
+            return self, ...
+        index = np.flatnonzero(members)
+
+        def some(each: Any) -> Any:
+            return each.reshape(*each.shape[: each.ndim - len(self.members)], -1)[..., index]
+
+        system, v, y = self._batch.of(index)
+        part = Search(system, self.method, v, y, self.t, some(self.rates), eigen.Eigen(*map(some, self.exact)))
+        return part, np.nonzero(members)
 
     @cached_property
     def fastest(self) -> Array:
@@ -173,10 +204,14 @@ class Search:
         low, high = np.zeros(self.members), np.full(self.members, LADDER[-1]) / fastest
         crept, previous, before = np.zeros(self.members, dtype=bool), np.zeros(self.members), np.zeros(self.members, dtype=int)
         doubtful, sure = np.zeros(self.members, dtype=bool), np.zeros(self.members)
-        at_once = self.rungs_at_once
-        for start in range(0, none, at_once):
+        sought, start = Sought(self), 0
+        while start < none:
+            settled = self.grows_by_itself | (first < none)
+            if (settled | (doubtful & self.exactable)).all():
+                break
+            at_once = sought.keep(~settled).rungs_at_once
             rungs = LADDER[start : start + at_once].reshape(-1, *(1,) * len(self.members)) / fastest
-            beyond, tolerance, side, doubt = self.growth(rungs)
+            beyond, tolerance, side, doubt = sought.growth(rungs)
             for i in range(len(rungs)):
                 k = start + i
                 sure = np.where(~doubtful & doubt[i] & (first == none), previous, sure)
@@ -187,17 +222,17 @@ class Search:
                 ratio = LADDER[k] / LADDER[k - 1] if k else np.inf
                 crept = np.where(new, (before >= 0) & (beyond[i] <= tolerance[i] * ratio**GROWTH_EXPONENT), crept)
                 previous, before = rungs[i], side[i]
-            if (doubtful | (first < none)).all() and (self.exactable or (first < none).all()):
-                break
+            start += at_once
         crept &= ~doubtful
         never = self.grows_by_itself | crept
         if len(self.rates) == 2:
             low, high, first = self.valleys(fastest, low, high, first, never)
         seek = (first < none) & ~never & ~doubtful
         if seek.any():
-            low, high = self.bisected(np.where(seek, low, 0.5 * high), high)
-            high, blurred = self.crossing(low, high, seek)
-            doubtful |= seek & blurred & self.exactable
+            part, at = self.of((first < none) & ~never)
+            narrow = part.bisected(np.where(seek, low, 0.5 * high)[at], high[at])
+            high[at], blurred = part.crossing(*narrow, seek[at])
+            doubtful[at] |= seek[at] & blurred & self.exactable
         grows = np.where(never, 0.0, np.where((first < none) & (self.fastest > 0.0), high, np.inf))
         found = np.where(doubtful & ~never, sure, grows)
         for index in np.argwhere(doubtful & ~never & self.exactable).tolist():
@@ -251,6 +286,8 @@ class Search:
         """The same enclosure, as narrow as numbers allow."""
         for _ in range(60):
             middle = 0.5 * (low + high)
+            if ((middle == low) | (middle == high)).all():
+                break
             grows = self.growth(middle)[2] > 0
             low, high = np.where(grows, low, middle), np.where(grows, middle, high)
         return low, high
@@ -402,3 +439,30 @@ class Search:
             v=shape[:n_v].reshape(self.system.v_shape),
             y=shape[n_v:].reshape(self.system.y_shape),
         )
+
+
+#: What ``growth`` says of members that are not sought: on the circle, to a tolerance of any size, without doubt.
+NOTHING = (0.0, 1.0, 0, False)
+
+
+class Sought:
+    """The members of a search whose limit is still sought; what is asked of others is not computed."""
+
+    def __init__(self, search: Search) -> None:
+        self._search, self._part, self._at = search, search, ...  # of the part's members, where they stand among all
+
+    def keep(self, members: Truths) -> Search:
+        """Let all but these members go, once they are less than half of those that are left. Returns the search of the rest."""
+        if 2 * np.count_nonzero(members) <= self._part.rates[0, 0].size:
+            self._part, self._at = self._search.of(members)
+        return self._part
+
+    def growth(self, dt: Array) -> Any:
+        """``Search.growth`` of steps of shape (…, *members); of members that are not sought, that they neither grow nor damp."""
+        if self._at is ...:
+            return self._search.growth(dt)
+        of_part = self._part.growth(dt[(..., *self._at)])
+        whole = tuple(np.full(dt.shape, nothing, dtype=each.dtype) for each, nothing in zip(of_part, NOTHING, strict=True))
+        for each, some in zip(whole, of_part, strict=True):
+            each[(..., *self._at)] = some
+        return whole

@@ -23,9 +23,6 @@ from ..systems import System
 #: step, f'(x) = Im f(x + iε)/ε, have no truncation error.
 COMPLEX_STEP = 1e-200
 
-#: Numbers of states that are stepped at once: an operation with so many takes a millisecond.
-NUMBERS_AT_ONCE = 1 << 20
-
 
 def size(system: System) -> tuple[int, int]:
     """The number of components of each block."""
@@ -171,7 +168,7 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
 
     unit_v, unit_y = unit(system, members)
     derivative = np.empty((n, n, *members))
-    at_once = max(1, NUMBERS_AT_ONCE // max(1, n * prod(members)))
+    at_once = max(1, linear.NUMBERS_AT_ONCE // max(1, n * prod(members)))
     for k in range(0, n, at_once):
         some = slice(k, k + at_once)
         along_v, along_y = (
@@ -179,5 +176,6 @@ def _derivative(system: System, members: Shape, v: Array, y: Array, f: Callable[
         )
         with np.errstate(all="ignore"):
             made = rows(system, *f(seeded(v, system.v_shape, along_v), seeded(y, system.y_shape, along_y)))
-            derivative[:, some] = made.imag / COMPLEX_STEP
+            for row, of_row in zip(derivative, made, strict=True):  # the memory of all rows at once may take a second to get
+                row[some] = of_row.imag / COMPLEX_STEP
     return derivative

@@ -31,7 +31,7 @@ def packed(task: Task) -> bytes:
     class Pickler(cloudpickle.Pickler):  # type: ignore[misc, name-defined]
         def reducer_override(self, obj: Any) -> Any:
             if isinstance(obj, Definition) and not _found_by_name(obj):
-                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines)
+                told = (obj.order, obj.blocks, obj.shape, obj.quick_sines, obj.scale)
                 return _defined, (obj.function, told, obj.__module__, obj.__qualname__, list(obj.invariants.values()))
             return super().reducer_override(obj)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from math import prod
 from typing import Any
@@ -36,6 +36,7 @@ MOST_TRACED = 256
 _TRACED: dict[Any, Any] = {}
 #: Without a state the shortest vector is looked for that the function can do with, up to this length.
 LONGEST_GUESS = 32
+SHORTEST: tuple[Shape, ...] = ((), *((n,) for n in range(1, LONGEST_GUESS + 1)))
 
 
 class OwnSystem(System):
@@ -53,8 +54,7 @@ class OwnSystem(System):
         self.parameters_given: dict[str, Any] = {}
         batches = {}
         for name, value in parameters.items():
-            default = definition.parameters[name]
-            own = 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+            own = definition.own_axes[name]
             argument = f"{definition.name}: {name}"
             if isinstance(value, (Sinusoid, Sampled)) or callable(value):
                 if own:
@@ -111,8 +111,7 @@ class OwnSystem(System):
 
     def own_axes(self, name: str) -> int:
         """How many axes of its own a parameter has."""
-        default = self.definition.parameters[name]
-        return 0 if isinstance(default, (Sinusoid, Sampled)) or callable(default) else np.ndim(default)
+        return self.definition.own_axes[name]
 
     # ---- shapes
 
@@ -168,19 +167,19 @@ class OwnSystem(System):
         """Shapes of v and y that the function may be written for, the shortest first."""
         declared_v, declared_y = self.definition.shape
         v, y = shapes.get("v", ()), shapes.get("y", ())
+        pairs: Iterable[tuple[Shape, Shape]]
         if self.definition.blocks == 2:
-            pairs = [(v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1)]
+            pairs = ((v[:i], y[:j]) for j in range(len(y) + 1) for i in range(len(v) + 1))
         elif not (v or y):
             # The state is not known: a number, or the shortest vector.
-            shortest = [(), *((n,) for n in range(1, LONGEST_GUESS + 1))]
             whole = declared_y is not None and None not in declared_y
-            sizes: list[Shape] = [tuple(n or 1 for n in declared_y)] if whole and declared_y is not None else shortest
-            pairs = [((0,) if self.definition.order == 1 else size, size) for size in sizes]
+            sizes: Sequence[Shape] = (tuple(n or 1 for n in declared_y),) if whole and declared_y is not None else SHORTEST
+            pairs = (((0,) if self.definition.order == 1 else size, size) for size in sizes)
         elif self.definition.order == 1:
-            pairs = [((0,), y[:n]) for n in range(len(y) + 1)]
+            pairs = (((0,), y[:n]) for n in range(len(y) + 1))
         else:
             longest = max(v, y, key=len)
-            pairs = [(longest[:n], longest[:n]) for n in range(len(longest) + 1)]
+            pairs = ((longest[:n], longest[:n]) for n in range(len(longest) + 1))
         for v_shape, y_shape in pairs:
             if fits(v_shape, declared_v) and fits(y_shape, declared_y):
                 yield v_shape, y_shape
