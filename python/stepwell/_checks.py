@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import operator
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sized
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from itertools import islice
 from math import isfinite, prod
 from numbers import Real
@@ -264,6 +265,29 @@ def callback(argument: str, value: Any) -> Any:
     if value is not None and not callable(value):
         raise DTypeError(f"{argument}: expected a function or None, got {short(value)} ({type(value).__name__})")
     return value
+
+
+def argument_order(argument: str, function: Any, places: Sequence[str]) -> None:
+    """Raise if a function of time and state has the name of one of them at the place of another: it would get other numbers.
+
+    Args:
+        argument: what the function was given as.
+        function: what is called with the time and blocks of the state by position; nothing is known of one without a signature.
+        places: what stands at each place, such as ``("t", "v", "y")``. A state without velocities may be called v.
+    """
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # what is not written in Python may not tell
+        return
+    by_place = [each for each in signature.parameters.values() if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    names = [each.name for each in by_place[: len(places)]]
+    for name, place in zip(names, places, strict=False):
+        others = {"t", "v", "y"} if place == "t" or "v" in places else {"t", "y"}
+        if name in others - {place}:
+            raise ArgumentError(
+                f"{argument}: expected a function f({', '.join(places)}), got ({', '.join(names)}): {name} stands "
+                f"at the place of {place}; put the arguments in this order, or give {name} another name if it means {place}"
+            )
 
 
 def flag(argument: str, value: Any) -> bool:
