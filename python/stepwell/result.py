@@ -48,8 +48,8 @@ class Status(IntEnum):
     NOT_FINITE = 4
     #: A terminal event stopped it; ``Run.stopped_at`` says when.
     EVENT = 5
-    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest; ``Run.stopped_at`` says
-    #: when.
+    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest, or lead it back onto the
+    #: event, as the level of an empty tank; ``Run.stopped_at`` says when.
     REST = 6
 
 

@@ -16,7 +16,7 @@ from ..result import Status
 from .collected import Collected, Known
 from .event import Event
 from .parts import At, Changes
-from .resets import Resets, Stretch, warn_of_rest
+from .resets import Resets, Stretch
 from .traced import watched
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
@@ -250,7 +250,8 @@ class _Resetting(_Driver):
         plan = self.plan
         if not carried:
             states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
-            self.resets.begin(np.ravel(plan.t0) + plan.first * plan.dt, *states)
+            t = np.broadcast_to(plan.t0 + plan.first * plan.dt, plan.batch).reshape(-1)
+            self.resets.begin(t, np.full(plan.members, plan.dt), *states)
         return super().run(v, y, before, carried)
 
     def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
@@ -335,4 +336,4 @@ class _Resetting(_Driver):
         rests = (self.rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
-            warn_of_rest([event.name for event in self.events], self.rests, self.stopped_at, self.plan.batch)
+            self.resets.warn_of_rest(self.rests, self.stopped_at)
