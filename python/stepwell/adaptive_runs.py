@@ -151,7 +151,8 @@ def adaptive_run(
     with bar_of(f"{how.title} to t = {times[-1].max():g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        order = order_of_series(how, tolerances.relative if tolerances is not None else _relative(carry, acceptance, groups))
+        relative = tolerances.relative if tolerances is not None else _relative(carry, acceptance, groups)
+        order = order_of_series(how, relative.min(axis=0) if acceptance.own else relative)
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
             system, how, batch, 1.0, begin, threads=workers, backend=backend, progress=told, fused=fused, order=order,
@@ -331,7 +332,9 @@ def _aimed(paces: Array, target: float) -> Array:
 
 
 def order_of_series(method: Method, relative: Array) -> int:
-    """The order of a series for relative tolerances; 0 of a method that has one order.
+    """The order of a series for relative tolerances, one for each member or all; 0 of a method that has one order.
+
+    Of tolerances of components the least of a member counts.
 
     Raises:
         UnsupportedError: if they ask for different orders.
