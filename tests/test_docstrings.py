@@ -80,7 +80,7 @@ def test_what_is_used_daily_comes_first() -> None:
     """And what only ``run.resume`` gives comes last."""
     order = list(inspect.signature(sw.integrate).parameters)
     assert order[:9] == ["system", "method", "v", "y", "dt", "steps", "every", "tolerance", "at"]
-    assert order[-6:] == ["start_step", "carry", "carried_by", "carried_for", "first_bad_step", "dt_before"]
+    assert order[-7:] == ["start_step", "carry", "carried_by", "carried_for", "first_bad_step", "dt_before", "changed_by"]
     text = inspect.getdoc(sw.integrate) or ""
     arguments = text.partition("Args:")[2].partition("Returns:")[0]
     places = [arguments.index(f"\n    {name}: ") for name in order]

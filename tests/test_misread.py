@@ -78,6 +78,18 @@ def test_names_of_ones_own() -> None:
     first(k=np.cos)
 
 
+def test_arguments_that_a_class_does_not_take() -> None:
+    """What it takes is told, for every class that is called with numbers: a floor has no height, but an offset."""
+    for call, told in (
+        (lambda: sw.Floor(0.2), "Floor: too many positional arguments; expected Floor(*, restitution=1.0, friction=None, normal"),  # type: ignore[misc]
+        (lambda: sw.Floor(height=0.2), "Floor: got an unexpected keyword argument 'height'; expected Floor(*, restitution"),  # type: ignore[call-arg]
+        (lambda: sw.Sphere(), "Sphere: missing a required argument: 'centre'; expected Sphere(centre, radius, *, inside"),  # type: ignore[call-arg]
+        (lambda: sw.NBody([1.0], mass=2.0), "NBody: got an unexpected keyword argument 'mass'; expected NBody(masses="),  # type: ignore[call-arg]
+    ):
+        with pytest.raises(DTypeError, match=re.escape(told)):
+            call()
+
+
 def test_masks_are_not_lost() -> None:
     masked = np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False])
     for call in (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import operator
 import os
 import sys
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _core
+from ._brief import counted
 from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
 from .reference.types import Array as Array
 from .reference.types import Whole
@@ -275,6 +275,8 @@ def argument_order(argument: str, function: Any, places: Sequence[str]) -> None:
         function: what is called with the time and blocks of the state by position; nothing is known of one without a signature.
         places: what stands at each place, such as ``("t", "v", "y")``. A state without velocities may be called v.
     """
+    import inspect  # which is slow to import, and only functions need it
+
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # what is not written in Python may not tell
@@ -415,8 +417,8 @@ def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0
         return
     available, bound = available_memory()
     if needed > available:
-        left = _bytes(max(available, 0.0))
-        raise TooLargeError(f"{what} of {members} members need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
+        left, of = _bytes(max(available, 0.0)), f" of {counted(members, 'member')}" if batch else ""
+        raise TooLargeError(f"{what}{of} need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
 
 
 def _bytes(n: float) -> str:

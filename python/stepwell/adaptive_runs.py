@@ -271,14 +271,7 @@ def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
 
 def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:
     """Places of the components that must not become negative, among the numbers of v and then of y."""
-    if given is None or given is False:
-        return ()
-    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
-    if given is True:
-        places = list(range(n_v, n_v + n_y))
-    else:
-        parts = given if isinstance(given, (list, np.ndarray)) else [given]
-        places = sorted({_place(system, part) for part in parts})
+    places = places_of(system, given)
     rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
     for place in places:
         if (rows[place] < 0.0).any():
@@ -286,6 +279,17 @@ def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]
                 f"positive: expected a start at which {_name_of(system, place)} is not negative, got {rows[place].min():g}"
             )
     return tuple(places)
+
+
+def places_of(system: System, given: Any) -> list[int]:
+    """The same from what ``positive=`` is given, without a look at the start."""
+    if given is None or given is False:
+        return []
+    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
+    if given is True:
+        return list(range(n_v, n_v + n_y))
+    parts = given if isinstance(given, (list, np.ndarray)) else [given]
+    return sorted({_place(system, part) for part in parts})
 
 
 def _rows_of(block: Array, axes: int) -> list[Array]:

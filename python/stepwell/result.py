@@ -135,6 +135,9 @@ class Run(Value):
         ((3,), (3,))
     """
 
+    #: Names of the events that change the state, ``Event(…, then=…)``.
+    changed_by: tuple[str, ...] = ()
+
     def __init__(
         self,
         *,
@@ -272,7 +275,8 @@ class Run(Value):
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
         last one. A carry is for the same method only; with another system, or ``v`` or ``y`` of your own, the run begins anew
         from the state at its last time. ``save`` writes all of it to a file. ``dt`` is that of this run; another is refused,
-        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again.
+        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again;
+        if one changes the state, ``integrate`` asks for them.
 
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
@@ -292,6 +296,8 @@ class Run(Value):
         told: dict[str, Any] = {"fused": True} if self.fused else {}
         if self.dtype != "float64":
             told["dtype"] = self.dtype
+        if self.changed_by:
+            told["changed_by"] = self.changed_by
         if self.stand is not None:
             return _going_on.with_tolerance(self) | told
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}

@@ -19,7 +19,7 @@ from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
 from .collected import AT_START, Collected, Stops
-from .event import Event
+from .event import Event, names_of_changing
 from .parts import Changes
 from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
 from .trials import AdaptiveTrials
@@ -63,7 +63,7 @@ class AdaptiveRun:
         """Give the result what was found."""
         assert self._driver is not None
         by_themselves, stops = run.stopped_at, self._driver.stops()
-        run.events = self._driver.occurrences()
+        run.events, run.changed_by = self._driver.occurrences(), names_of_changing(self._events)
         if stops is not None:
             run.status = np.where(np.isnan(stops), run.status, Status.EVENT).astype(np.int8)
             run.stopped_at = stops if by_themselves is None else np.where(np.isnan(stops), by_themselves, stops)

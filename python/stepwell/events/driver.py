@@ -14,7 +14,7 @@ from ..reference.events import near
 from ..reference.types import Whole
 from ..result import Status
 from .collected import Collected, Known
-from .event import Event
+from .event import Event, names_of_changing
 from .parts import At, Changes
 from .resets import Resets, Stretch
 from .traced import watched
@@ -68,6 +68,7 @@ class Run:
         """Give the result what was found."""
         assert self._driver is not None
         run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
+        run.changed_by = names_of_changing(self._events)
         if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
             run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
             run.encounter = run.overshoots = None  # these go through all of the steps
