@@ -33,6 +33,9 @@ ARRIVED = 1e-12
 #: only rounding is left.
 NEARLY_ARRIVED = 1e-7
 
+#: Rates are zero, but for the rounding of their terms, below this fraction of these.
+RATES_ARE_ZERO = 64.0 * EPS
+
 #: Two equilibria nearer than this fraction of their size are one: far more than rounding, far less than users distinguish.
 SAME = 1e-8
 
@@ -271,6 +274,8 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
     alive = np.ones(states.shape[1], dtype=np.bool_)
     least = _size(system, states)
     least = np.where(least > 0.0, least, 1.0)
+    # The largest that each rate has been by its derivatives: their terms, of which it is a sum, are at least that large.
+    terms = np.zeros_like(states)
     for _ in range(MAX_ITERATIONS):
         which = np.flatnonzero(alive)
         if not which.size:
@@ -283,10 +288,16 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
         if not which.size:
             break
         change = -_solved(matrix, rates)
+        terms[:, which] = np.maximum(
+            terms[:, which], np.einsum("ijk,jk->ik", np.abs(matrix), np.maximum(_size(system, at), least[:, which]))
+        )
+        # Where the Jacobian is singular, a step of zero may leave the rates as they are: an extreme of a rate is no zero.
+        remainder = np.abs(np.einsum("ijk,jk->ik", matrix, change) + rates)
+        vanishes = (remainder <= RATES_ARE_ZERO * terms[:, which]).all(axis=0)
         relative = (np.abs(change) / np.maximum(_size(system, at), least[:, which])).max(axis=0)
-        there = relative <= ARRIVED
+        there = vanishes & (relative <= ARRIVED)
         best, better = _damped(system, at, change, rates, t)
-        stuck = ~better & (relative <= NEARLY_ARRIVED)
+        stuck = vanishes & ~better & (relative <= NEARLY_ARRIVED)
         states[:, which] = np.where(better, best, at)
         arrived[which] = there | stuck
         alive[which] = better & ~there
