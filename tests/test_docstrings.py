@@ -86,4 +86,4 @@ def test_what_is_used_daily_comes_first() -> None:
     places = [arguments.index(f"\n    {name}: ") for name in order]
     assert places == sorted(places)
     resumed = sw.integrate(sw.Oscillator(), "verlet", v=0.0, y=1.0, dt=0.1, steps=10).resume
-    assert set(order[-6:]) - set(resumed) <= {"first_bad_step"}
+    assert set(order[-7:]) - set(resumed) <= {"first_bad_step", "changed_by"}

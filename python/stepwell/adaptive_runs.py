@@ -272,6 +272,8 @@ def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
 def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:
     """Places of the components that must not become negative, among the numbers of v and then of y."""
     places = places_of(system, given)
+    if not places:
+        return ()
     rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
     for place in places:
         if (rows[place] < 0.0).any():
@@ -282,7 +284,7 @@ def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]
 
 
 def places_of(system: System, given: Any) -> list[int]:
-    """The same from what ``positive=`` is given, without a look at the start."""
+    """The same, whatever the start is."""
     if given is None or given is False:
         return []
     n_v, n_y = prod(system.v_shape), prod(system.y_shape)
@@ -293,7 +295,7 @@ def places_of(system: System, given: Any) -> list[int]:
 
 
 def _rows_of(block: Array, axes: int) -> list[Array]:
-    return list(block.reshape((-1, *block.shape[axes:])))
+    return list(block.reshape((prod(block.shape[:axes]), *block.shape[axes:])))
 
 
 def _place(system: System, part: Any) -> int:
