@@ -80,10 +80,10 @@ def test_what_is_used_daily_comes_first() -> None:
     """And what only ``run.resume`` gives comes last."""
     order = list(inspect.signature(sw.integrate).parameters)
     assert order[:9] == ["system", "method", "v", "y", "dt", "steps", "every", "tolerance", "at"]
-    assert order[-6:] == ["start_step", "carry", "carried_by", "carried_for", "first_bad_step", "dt_before"]
+    assert order[-7:] == ["start_step", "carry", "carried_by", "carried_for", "first_bad_step", "dt_before", "changed_by"]
     text = inspect.getdoc(sw.integrate) or ""
     arguments = text.partition("Args:")[2].partition("Returns:")[0]
     places = [arguments.index(f"\n    {name}: ") for name in order]
     assert places == sorted(places)
     resumed = sw.integrate(sw.Oscillator(), "verlet", v=0.0, y=1.0, dt=0.1, steps=10).resume
-    assert set(order[-6:]) - set(resumed) <= {"first_bad_step"}
+    assert set(order[-7:]) - set(resumed) <= {"first_bad_step", "changed_by"}

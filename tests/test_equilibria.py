@@ -231,3 +231,58 @@ def test_what_nothing_holds_is_undecided(n: int) -> None:
     (found,) = sw.equilibria(floating(k=3.7), near=(np.zeros(n), np.arange(n) + 0.1))
     assert found.kind == "undecided to first order"
     assert not found.isolated
+
+
+#: Roots of several multiplicities, written as a product and as a sum whose roundings hide the place: the p-th root of ε from it.
+MULTIPLE: list[Any] = [
+    (lambda t, y: -(y**2), 0.0, [0.3, -0.3, 0.0, 1e-9, 50.0]),
+    (lambda t, y: -(y**3), 0.0, [0.3, -0.3, 0.0, 1e-9, 50.0]),
+    (lambda t, y: 2.0 * y**4, 0.0, [0.3, -0.3, 0.0, 1e-9, 50.0]),
+    (lambda t, y: -(y**2 - 2.0 * y + 1.0), 1.0, [0.5, 1.7, 1.0, 30.0, -3.0, 0.99]),
+    (lambda t, y: -(y**3 - 3.0 * y**2 + 3.0 * y - 1.0), 1.0, [0.5, 1.7, 1.0, 30.0, -3.0, 0.99]),
+    (lambda t, y: y**4 - 4.0 * y**3 + 6.0 * y * y - 4.0 * y + 1.0, 1.0, [0.5, 1.7, 1.0, 30.0, -3.0, 0.99]),
+    (lambda t, y: 1e-20 * (y**3 - 1.5 * y**2 + 0.75 * y - 0.125), 0.5, [0.2, 0.7, 0.5, -1.0]),
+]
+
+
+@pytest.mark.parametrize(("rate", "root", "starts"), MULTIPLE)
+def test_a_multiple_root_is_one_equilibrium(rate: Any, root: float, starts: list[float]) -> None:
+    """From every start, and first order does not decide it; the place is known to ε^(1/4), 1.2·10⁻⁴, at worst."""
+    found = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
+    assert [each.starts for each in found] == [tuple(range(len(starts)))]
+    assert found[0].kind == "undecided to first order"
+    assert abs(float(found[0].y) - root) <= 2.0 * (2.0**-52) ** 0.25 * max(root, 1e-6)
+
+
+def test_a_multiple_root_across_the_axes() -> None:
+    """Three equal roots along a direction between two axes, beside one that decays."""
+
+    def rate(t: Any, y: Any) -> Any:
+        a, b = 0.8 * y[0] - 0.6 * y[1], 0.6 * y[0] + 0.8 * y[1]
+        return np.array([-0.8 * a**3 - 0.6 * b, 0.6 * a**3 - 0.8 * b])
+
+    starts = np.array([[0.3, -0.3, 0.0, 1.0], [0.2, 0.5, 0.0, -2.0]])
+    assert len(sw.equilibria(sw.system(order=1)(rate)(), near=(None, starts))) == 1
+
+
+@pytest.mark.parametrize(
+    ("rate", "roots", "starts"),
+    [
+        (lambda t, y: (y - 1.0) * (y - 1.0 - 1e-6), [1.0, 1.0 + 1e-6], [0.0, 2.0]),
+        (lambda t, y: (y - 1.0) ** 2 - 1e-12, [1.0 - 1e-6, 1.0 + 1e-6], [0.0, 2.0]),
+        (lambda t, y: y * (y - 1e-12), [0.0, 1e-12], [0.0, 0.1, -0.1, 1.2e-12]),
+        (lambda t, y: 1e-14 * y - y**3, [0.0, 1e-7, -1e-7], [0.0, 0.2, -0.2]),
+    ],
+)
+def test_near_roots_stay_apart(rate: Any, roots: list[float], starts: list[float]) -> None:
+    found = sw.equilibria(sw.system(order=1)(rate)(), near=(None, np.array(starts)))
+    # Rates are right to some roundings of their terms, and change by 1e-6 of these, so places to some 1e-9.
+    np.testing.assert_allclose([float(each.y) for each in found], roots, rtol=1e-9, atol=1e-22)
+    assert "undecided to first order" not in {each.kind for each in found}
+
+
+@pytest.mark.parametrize("least", [1.0, 1e-12])
+def test_an_extreme_of_a_rate_is_no_equilibrium(least: float) -> None:
+    """There Newton's step is zero, but the rate is not."""
+    found = sw.equilibria(sw.system(order=1)(lambda t, y: (y - 1.0) ** 2 + least)(), near=(None, np.array([1.0])))
+    assert (len(found), found.lost) == (0, (0,))

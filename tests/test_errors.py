@@ -403,7 +403,7 @@ BAD: list[tuple[Callable[[], Any], type[Exception], str]] = [
         E.ShapeError,
         "y: expected a number or a regular array, got list",
     ),
-    (lambda: sw.Chain(10**14), E.TooLargeError, "n: stiffnesses and masses of 1 members need 1.49e+06 GiB"),
+    (lambda: sw.Chain(10**14), E.TooLargeError, "n: stiffnesses and masses need 1.49e+06 GiB"),
     (lambda: sw.scenes.clover().run("rk4", v=0.0), E.ArgumentError, "v: expected the scene's own, which need not be given"),
     (lambda: sw.scenes.scene(3), E.DTypeError, "scene: expected a Scene or its name, got int"),
     (lambda: sw.advise("clover", methods=4), E.DTypeError, "methods: expected a list of names, got 4 (int)"),

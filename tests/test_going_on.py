@@ -264,3 +264,38 @@ def test_a_system_is_known_by_all_of_its_numbers(name: str) -> None:
             moved = [each.copy() for each in state]
             moved[block].flat[-1] = 1e-300
             assert identity(system, (3,), *moved) != known
+
+
+drug = sw.system(order=1)(lambda t, c, *, k=0.3: -k * c)
+dose = sw.Event(lambda t, c: np.sin(t), then=lambda t, c: c + 2.0, name="dose")
+PIECES: list[tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = [
+    ({"dt": 0.1, "steps": 50}, {"steps": 50}, {"dt": 0.1, "steps": 100}),
+    ({"tolerance": 1e-8, "at": [5.0]}, {"at": [10.0]}, {"tolerance": 1e-8, "at": [5.0, 10.0]}),
+]
+
+
+@pytest.mark.parametrize(("first", "second", "whole"), PIECES)
+def test_events_that_change_the_state_are_asked_for(first: Any, second: Any, whole: Any) -> None:
+    """Without them another motion would follow without a word; ``[]`` says that this is meant."""
+    run = sw.integrate(drug(), "dop853", y=1.0, events=dose, **first)
+    file = io.BytesIO()
+    np.savez(file, **run.resume)
+    file.seek(0)
+    for resume in (run.resume, dict(np.load(file))):
+        with pytest.raises(ArgumentError, match=r"events: .* of which dose changed the state so far, got None; give them again"):
+            sw.integrate(drug(), "dop853", **second, **resume)
+        again = sw.integrate(drug(), "dop853", events=dose, **second, **resume)
+        assert again.y[-1] == sw.integrate(drug(), "dop853", y=1.0, events=dose, **whole).y[-1]
+        assert again.resume["changed_by"] == ("dose",)
+        assert "changed_by" not in sw.integrate(drug(), "dop853", events=[], **second, **resume).resume
+    seen = sw.Event(lambda t, c: np.sin(t), name="seen")
+    sw.integrate(drug(), "dop853", **second, **sw.integrate(drug(), "dop853", y=1.0, events=seen, **first).resume)
+
+
+def test_a_world_asks_for_them_too() -> None:
+    world = sw.World(drug(), "rk4", v=np.zeros((0, 2)), y=np.ones(2), dt=0.1, events=dose)
+    world.step(40)
+    with pytest.raises(ArgumentError, match=r"events: .* of which dose changed the state so far"):
+        sw.World(drug(), "rk4", dt=0.1, **world.resume)
+    with pytest.raises(ArgumentError, match=r"changed_by: expected names of events, as run\.resume has them, got 3"):
+        sw.integrate(drug(), "rk4", y=1.0, dt=0.1, steps=3, changed_by=[3])

@@ -26,6 +26,70 @@ def test_a_list_as_tolerance() -> None:
     assert members.y.shape == pair.y.shape == (1, 2)
 
 
+second = sw.system(lambda t, v, y, *, k=1.0: -k * y)
+first = sw.system(order=1)(lambda t, y, *, k=1.0: -k * y)
+
+
+def located(event: Any) -> Any:
+    return sw.integrate(second(), "rk4", **FIXED, events=event)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: sw.system(lambda t, y, v: -y), "f(t, v, y), got (t, y, v): y stands at the place of v"),
+        (lambda: sw.system(lambda t, x, v: -x), "f(t, v, y), got (t, x, v): v stands at the place of y"),
+        (lambda: sw.system(lambda v, y, t: -y), "f(t, v, y), got (v, y, t): v stands at the place of t"),
+        (lambda: sw.system(blocks=2)(lambda t, y, v: (-y, v)), "f(t, v, y), got (t, y, v)"),
+        (lambda: sw.system(order=1)(lambda y, t: -y), "f(t, y), got (y, t): y stands at the place of t"),
+        (lambda: sw.system(order=1)(lambda x, t: -x), "f(t, y), got (x, t): t stands at the place of y"),
+        (lambda: sw.system(order=1)(lambda v, y: -y), "f(t, y), got (v, y): v stands at the place of t"),
+        (lambda: located(sw.Event(lambda t, y, v: y, name="e")), "events: e: expected a function f(t, v, y), got (t, y, v)"),
+        (
+            lambda: located(sw.Event(lambda t, v, y: y, then=lambda t, y, v: (v, y), name="e")),
+            "events: e: then: expected a function f(t, v, y), got (t, y, v)",
+        ),
+        (lambda: second.invariant(lambda y, v: v * v + y * y), "f(v, y), got (y, v): y stands at the place of v"),
+        (lambda: second.invariant(lambda v, y, t: v * v + y * y), "f(t, v, y), got (v, y, t)"),
+        (lambda: first.invariant(lambda y, t: y * y), "f(t, y), got (y, t)"),
+        (lambda: second(k=lambda v: abs(v)), "k: expected a function f(t), got (v): v stands at the place of t"),
+        (lambda: sw.sweeps.Crossing(lambda v, y, t: y), "of: expected a function f(t, v, y), got (v, y, t)"),
+        (lambda: sw.solve_ivp(lambda y, t: -y, (0.0, 1.0), [1.0]), "fun: <lambda>: expected a function f(t, y), got (y, t)"),
+        (
+            lambda: sw.solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], events=lambda y, t: y[0]),
+            "events: <lambda>: expected a function f(t, y), got (y, t)",
+        ),
+    ],
+)
+def test_a_name_at_the_place_of_another(call: Any, told: str) -> None:
+    """Arguments go by their place, so a swapped name would silently stand for another number."""
+    with pytest.raises(ArgumentError, match=re.escape(told)):
+        call()
+
+
+def test_names_of_ones_own() -> None:
+    """Other names may stand anywhere, and so may v for the state where there is no velocity, and any name as a parameter's."""
+    sw.system(lambda t, x, y: -y)
+    sw.system(lambda time, v, x: -x)
+    sw.system(order=1)(lambda t, v: -v)
+    sw.system(order=1)(lambda t, x, *, v=1.0, y=2.0: -v * x * y)
+    sw.solve_ivp(lambda x, u: -u, (0.0, 1.0), [1.0])
+    first.invariant(lambda t, v, *, k: k * v)
+    first(k=np.cos)
+
+
+def test_arguments_that_a_class_does_not_take() -> None:
+    """What it takes is told, for every class that is called with numbers: a floor has no height, but an offset."""
+    for call, told in (
+        (lambda: sw.Floor(0.2), "Floor: too many positional arguments; expected Floor(*, restitution=1.0, friction=None, normal"),  # type: ignore[misc]
+        (lambda: sw.Floor(height=0.2), "Floor: got an unexpected keyword argument 'height'; expected Floor(*, restitution"),  # type: ignore[call-arg]
+        (lambda: sw.Sphere(), "Sphere: missing a required argument: 'centre'; expected Sphere(centre, radius, *, inside"),  # type: ignore[call-arg]
+        (lambda: sw.NBody([1.0], mass=2.0), "NBody: got an unexpected keyword argument 'mass'; expected NBody(masses="),  # type: ignore[call-arg]
+    ):
+        with pytest.raises(DTypeError, match=re.escape(told)):
+            call()
+
+
 def test_masks_are_not_lost() -> None:
     masked = np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False])
     for call in (

@@ -7,12 +7,14 @@ import math
 import pickle
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 import stepwell as sw
 from PIL import Image
 from stepwell.charts import attitude_picture, body_picture, orbits_picture, runs_animation, runs_picture, style
+from stepwell.charts.runs import own_picture
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError, UnsupportedError
 
 
@@ -583,3 +585,25 @@ def test_a_notebook_shows_a_figure_without_pyplot():
     assert figure._repr_png_() == style.png(figure)
     assert figure._repr_png_().startswith(b"\x89PNG")
     assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("scene", ["oscillator", "clover", "dzhanibekov", "aircraft"])
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_a_run_back_in_time_is_drawn(scene: str, adaptive: bool, tmp_path: Path) -> None:
+    """The time goes on to the right as the run went, to ever smaller numbers; and trails end where the body is."""
+    own = sw.scenes.scene(scene)
+    start = {"v": own.v, "y": own.y}
+    if adaptive:
+        run = sw.integrate(own.system, "dop853", **start, tolerance=1e-8, at=-own.dt * np.arange(1.0, 16.0))
+    else:
+        run = sw.integrate(own.system, "rk4", **start, dt=-own.dt, steps=15, every=1)
+    picture = own_picture(run)
+    assert (np.diff(picture.elapsed) > 0.0).all()
+    figure = run.plot(tmp_path / "back.png")
+    over_time = [axes for axes in figure.axes if axes.get_xlabel() == "time"]
+    assert over_time
+    for axes in over_time:
+        left, right = axes.get_xlim()
+        assert left > right
+    run.animate(tmp_path / "back.html")
+    run.animate(tmp_path / "back.gif", seconds=0.5, fps=4.0)

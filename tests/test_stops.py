@@ -133,3 +133,35 @@ def test_an_event_and_a_stop_are_told_side_by_side() -> None:
     assert run.status.tolist() == [sw.Status.EVENT, sw.Status.UNDERFLOW]
     assert run.stopped_at is not None
     np.testing.assert_allclose(run.stopped_at, [np.log(1.04) / 0.1, 0.25], rtol=1e-6)
+
+
+def told(system: Any, method: str = "merson", **how: Any) -> str:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sw.integrate(system, method, **{"tolerance": 1e-6, **how})
+    (message,) = (str(each.message) for each in caught)
+    return message
+
+
+def test_what_positive_keeps_is_told_first() -> None:
+    """Not that the solution blows up: it would be negative from there on. Two tanks: the one that is empty first is named."""
+    tanks = sw.system(order=1, shape=(2,))(lambda t, y: np.array([-1.0, -0.3]))()
+    message = told(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=True)
+    assert re.search(r"at t = 0\.333333; y\[1\] becomes negative in every step, however short, which positive= does", message)
+    assert "blows up" not in message
+    message = told(tanks, y=np.array([1.0, 0.1]), at=[2.0], positive=[0])
+    assert "at t = 1; y[0] becomes negative" in message
+    assert "at t = 3; v becomes negative" in told(sw.system(lambda t, v, y: -1.0)(), v=3.0, y=0.0, at=[9.0], positive=[("v",)])
+
+
+def test_a_time_of_too_many_digits_is_no_collision() -> None:
+    """An oscillator's step of about 0.1 to 1 at a time whose roundings are 16, or after some steps where the step shrinks."""
+    message = told(sw.Oscillator(), v=0.0, y=1.0, t0=1e17, at=[1e17 + 1600.0])
+    assert "too small to move the time, whose roundings there are 16: count times from a nearer origin" in message
+    assert "collision" not in message
+    message = told(sw.Oscillator(3e3), v=0.0, y=1.0, t0=1e12, at=[1e12 + 10.0])
+    assert "whose roundings there are 0.00012" in message
+    # A pole remains one, at t = 1 and at 1e9 + 1, where the time has 24 binary digits for a unit.
+    pole = sw.system(order=1)(lambda t, y: y * y)()
+    assert "the solution blows up there" in told(pole, y=1.0, at=[2.0])
+    assert "the solution blows up there" in told(pole, y=1.0, t0=1e9, at=[1e9 + 2.0])

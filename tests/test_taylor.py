@@ -412,6 +412,35 @@ def test_what_is_refused() -> None:
     assert sw.integrate(bouncing, "taylor", v=0.0, y=1.0, dt=0.1, steps=3).status == 0  # within a step the choice stays
 
 
+@pytest.mark.parametrize("absolute", [None, 0.0, np.array([1e-9, 1e-12])])
+def test_tolerances_of_components(absolute: Any) -> None:
+    """The least of a member chooses the order, which is that of a run with this for all; before they were refused as members'.
+
+    ẏ₀ = y₁² − y₀, ẏ₁ = −3·y₁ from (1, 1): y₁ = e^(−3t), y₀ = (6·e^(−t) − e^(−6t))/5. Disturbances do not grow, so the error of
+    y₁ is at most that of all steps, and that of y₀ twice that, for ∫2·y₁ < 1: twice what is estimated is allowed, tolerance·size
+    in each of some steps.
+    """
+    decays = sw.system(order=1, shape=(2,))(lambda t, y: np.array([y[1] ** 2 - y[0], -3.0 * y[1]]))()
+    relative = np.array([1e-4, 1e-9])
+    tolerance = relative if absolute is None else (relative, absolute)
+    run, by_reference = (
+        sw.integrate(decays, "taylor", y=np.ones(2), tolerance=tolerance, at=[0.5, 1.0], backend=backend)
+        for backend in ("rust", "numpy")
+    )
+    assert np.array_equal(run.y, by_reference.y)
+    assert run.paces is not None
+    t = np.array([[0.5], [1.0]])
+    exact = np.concatenate([(6.0 * np.exp(-t) - np.exp(-6.0 * t)) / 5.0, np.exp(-3.0 * t)], axis=1)
+    assert (np.abs(run.y - exact) <= 4.0 * (run.paces.accepted + 1) * relative).all()
+
+    first = sw.integrate(decays, "taylor", y=np.ones(2), tolerance=tolerance, at=[0.5])
+    assert np.array_equal(sw.integrate(decays, "taylor", at=[1.0], **first.resume).y[-1], run.y[-1])
+    members = np.array([[1e-4, 1e-3], [1e-9, 1e-9]])
+    assert sw.integrate(decays, "taylor", y=np.ones(2), tolerance=members, at=[1.0]).y.shape == (1, 2, 2)
+    with pytest.raises(UnsupportedError, match=r"one order for all members.* got 1e-09 \(order 14\) to 1e-06 \(order 10\)"):
+        sw.integrate(decays, "taylor", y=np.ones(2), tolerance=np.array([[1e-4, 1e-3], [1e-9, 1e-6]]), at=[1.0])
+
+
 #: What is made of pieces, as rates of v.
 PIECES: dict[str, Callable[[Any, Any, Any], Any]] = {
     "ceil of the time": lambda t, v, y: -np.ceil(t),

@@ -282,6 +282,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "carried_for": None,
             "first_bad_step": None,
             "dt_before": None,
+            "changed_by": None,
         }
         | {"control": None, "tolerance": None, "at": None, "max_steps": None},
     ),

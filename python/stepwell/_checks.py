@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from . import _core
+from ._brief import counted
 from .errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, TooLargeError, UnknownNameError
 from .reference.types import Array as Array
 from .reference.types import Whole
@@ -266,6 +267,31 @@ def callback(argument: str, value: Any) -> Any:
     return value
 
 
+def argument_order(argument: str, function: Any, places: Sequence[str]) -> None:
+    """Raise if a function of time and state has the name of one of them at the place of another: it would get other numbers.
+
+    Args:
+        argument: what the function was given as.
+        function: what is called with the time and blocks of the state by position; nothing is known of one without a signature.
+        places: what stands at each place, such as ``("t", "v", "y")``. A state without velocities may be called v.
+    """
+    import inspect  # which is slow to import, and only functions need it
+
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # what is not written in Python may not tell
+        return
+    by_place = [each for each in signature.parameters.values() if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
+    names = [each.name for each in by_place[: len(places)]]
+    for name, place in zip(names, places, strict=False):
+        others = {"t", "v", "y"} if place == "t" or "v" in places else {"t", "y"}
+        if name in others - {place}:
+            raise ArgumentError(
+                f"{argument}: expected a function f({', '.join(places)}), got ({', '.join(names)}): {name} stands "
+                f"at the place of {place}; put the arguments in this order, or give {name} another name if it means {place}"
+            )
+
+
 def flag(argument: str, value: Any) -> bool:
     """Return ``value`` if it is True or False."""
     if value is False or value is True:
@@ -399,8 +425,8 @@ def fits(what: str, rows: float, batch: Shape, remedy: str, *, beside: float = 0
         return
     available, bound = available_memory()
     if needed > available:
-        left = _bytes(max(available, 0.0))
-        raise TooLargeError(f"{what} of {members} members need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
+        left, of = _bytes(max(available, 0.0)), f" of {counted(members, 'member')}" if batch else ""
+        raise TooLargeError(f"{what}{of} need {_bytes(needed)}, but {left} are available ({bound}); {remedy}")
 
 
 def _bytes(n: float) -> str:

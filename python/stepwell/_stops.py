@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,14 @@ from .systems import System
 #: Why a member stopped, in words.
 WHY_STOPPED = {
     Status.BUDGET: "out of max_steps",
-    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time: the solution blows up there (a "
-    "collision, a pole), or does so by the errors that the tolerance allows: try a smaller one, or a pair (relative, absolute)",
+    Status.UNDERFLOW: "the step that the tolerance asks for is too small to move the time",
     Status.NOT_FINITE: "no step, however small, gives finite numbers",
 }
+#: Why steps shrink without an end where rates are finite and the time has digits enough.
+BLOWS_UP = (
+    "the solution blows up there (a collision, a pole), or does so by the errors that the tolerance allows: try a smaller one, "
+    "or a pair (relative, absolute)"
+)
 
 #: Whether stability holds the step down is looked at after so many attempts, of at most so many rates and numbers in all: that is
 #: little work against the run.
@@ -30,6 +35,8 @@ ATTEMPTS, MOST_RATES, MOST_NUMBERS = 1000, 32, 100_000
 DECAYED, SHARE_OF_LIMIT = 100.0, 0.2
 #: Roundings of the time by which rates are looked at beyond where a member stopped.
 BEYOND = 8.0
+#: The time has too few digits where a member stops at its start, or if a step of this share of the mean one is within roundings.
+USUAL = 2.0**-10
 #: The part of a number by which it is changed to find a derivative: half of its digits.
 PART = 2.0**-26
 
@@ -64,7 +71,20 @@ def _why(run: Run, index: Shape) -> str:
         return f"{WHY_STOPPED[status]}: {tried}{held}; max_steps= allows more"
     if status == Status.UNDERFLOW and (beyond := _of_rates_beyond(run, index)):
         return f"{WHY_STOPPED[Status.NOT_FINITE]}: {beyond} beyond"
-    return f"{WHY_STOPPED[status]}{_of_rates(run, index, status)}"
+    if wrong := _of_rates_there(run, index):
+        return f"{WHY_STOPPED[status]}: {wrong}"
+    if status == Status.NOT_FINITE:
+        assert run.stand is not None
+        longest = max(float(np.abs(_checks.member(block, index)).max(initial=0.0)) for block in (run.stand.v, run.stand.y))
+        return f"{WHY_STOPPED[status]}: the state reached {longest:.3g}"
+    if left := _left_for_below_zero(run, index):
+        return f"{left} becomes negative in every step, however short, which positive= does not allow"
+    if spacing := _roundings_of_the_time(run, index):
+        return (
+            f"{WHY_STOPPED[status]}, whose roundings there are {spacing:.2g}: count times from a nearer origin, "
+            f"or give a larger tolerance"
+        )
+    return f"{WHY_STOPPED[status]}: {BLOWS_UP}; {_largest_rate(run, index)}"
 
 
 def _of_member(run: Run, times: Any, index: Shape) -> Any:
@@ -87,26 +107,56 @@ def _of_rates_beyond(run: Run, index: Shape) -> str:
     return _not_finite(_rates(run.system, run.status.shape, t + ahead, (v + ahead * dv, y + ahead * dy)), index)
 
 
-def _of_rates(run: Run, index: Shape, status: Status) -> str:
-    """Which rate is not finite where a member stopped, or else which is the largest."""
+def _rates_there(run: Run) -> State:
+    """v̇ and ẏ where members stopped."""
     assert run.paces is not None
     assert run.stand is not None
-    state = run.stand.v, run.stand.y
-    rates = _rates(run.system, run.status.shape, run.paces.t, state)
-    where = "at the start" if float(run.paces.t[index]) == _start(run, index) else "there"
-    if wrong := _not_finite(rates, index):
-        return f": {wrong} {where}"
-    from .reference.adaptive import OUTSIDE  # which imports much
+    return _rates(run.system, run.status.shape, run.paces.t, (run.stand.v, run.stand.y))
 
-    if run.stand.pace[engine.ERROR][index] == OUTSIDE:
-        return "; every step leads a component below zero that positive= keeps from there"
-    if status == Status.NOT_FINITE:
-        longest = max(float(np.abs(_checks.member(block, index)).max(initial=0.0)) for block in state)
-        return f": the state reached {longest:.3g}"
-    each = ((_checks.member(block, index), name) for block, name in zip(rates, "vy", strict=True) if block.size)
+
+def _of_rates_there(run: Run, index: Shape) -> str:
+    """Which rate is not finite where a member stopped; empty if all are."""
+    assert run.paces is not None
+    wrong = _not_finite(_rates_there(run), index)
+    return wrong and f"{wrong} {'at the start' if float(run.paces.t[index]) == _start(run, index) else 'there'}"
+
+
+def _largest_rate(run: Run, index: Shape) -> str:
+    """Which rate is the largest where a member stopped."""
+    each = ((_checks.member(block, index), name) for block, name in zip(_rates_there(run), "vy", strict=True) if block.size)
     block, name = max(each, key=lambda each: float(np.abs(each[0]).max()))
     place = np.unravel_index(int(np.abs(block).argmax()), block.shape)
-    return f"; the largest rate there is that of {_component(name, tuple(map(int, place)))}, {float(block[place]):.3g}"
+    return f"the largest rate there is that of {_component(name, tuple(map(int, place)))}, {float(block[place]):.3g}"
+
+
+def _left_for_below_zero(run: Run, index: Shape) -> str:
+    """Which component that ``positive=`` keeps from there every step leads below zero; empty if none does.
+
+    Several may be kept: it is the one that would be at zero first.
+    """
+    from .adaptive_runs import places_of  # which import this
+    from .reference.adaptive import OUTSIDE
+
+    assert run.stand is not None
+    if run.stand.pace[engine.ERROR][index] != OUTSIDE:
+        return ""
+    blocks, rates = (run.stand.v, run.stand.y), _rates_there(run)
+    state, rate = (np.concatenate([_checks.member(block, index).reshape(-1) for block in each]) for each in (blocks, rates))
+    kept = np.array(places_of(run.system, run.stand.options["positive"]))
+    with np.errstate(all="ignore"):
+        left = np.where(rate[kept] < 0.0, state[kept] / -rate[kept], np.inf)
+    place, n_v = int(kept[left.argmin()]), prod(run.system.v_shape)
+    name, shape, number = ("v", run.system.v_shape, place) if place < n_v else ("y", run.system.y_shape, place - n_v)
+    return _component(name, tuple(map(int, np.unravel_index(number, shape))) if shape else ())
+
+
+def _roundings_of_the_time(run: Run, index: Shape) -> float:
+    """The distance between floats at the time at which a member stopped, if usual steps are no longer than that; else 0."""
+    assert run.paces is not None
+    t, accepted = float(run.paces.t[index]), int(run.paces.accepted[index])
+    spacing, elapsed = float(np.spacing(abs(t))), abs(t - _start(run, index))
+    few = t != 0.0 if not accepted else spacing > USUAL * elapsed / accepted
+    return spacing if few else 0.0
 
 
 def of_the_start(system: System, batch: Shape, t: Any, state: State, index: Shape) -> str:

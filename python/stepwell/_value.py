@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ._brief import one_line
-from .errors import FixedError
+from .errors import DTypeError, FixedError
 
 Kind = TypeVar("Kind")
 Object = TypeVar("Object")
@@ -87,6 +87,18 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
+def takes(kind: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+    """Raise if a class cannot be called with these arguments; the message says which it takes."""
+    import inspect
+
+    signature = inspect.signature(kind)
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError as error:
+        bare = [each.replace(annotation=inspect.Parameter.empty) for each in signature.parameters.values()]
+        raise DTypeError(f"{kind.__name__}: {error}; expected {kind.__name__}{inspect.Signature(bare)}") from None
+
+
 class Maker(ABCMeta):
     """Makes objects that cannot be changed once ``__init__`` is over."""
 
@@ -94,7 +106,11 @@ class Maker(ABCMeta):
 
         def __call__(cls, *args: Any, **kwargs: Any) -> Any:
             """A new object; its arrays are its own from now on, and read-only."""
-            made = super().__call__(*args, **kwargs)
+            try:
+                made = super().__call__(*args, **kwargs)
+            except TypeError:
+                takes(cls, args, kwargs)
+                raise
             read_only(vars(made))
             vars(made)[DONE] = True
             return made

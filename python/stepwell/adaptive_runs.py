@@ -160,7 +160,8 @@ def adaptive_run(
     with bar_of(f"{how.title} to t = {times[-1].max():g}") if _checks.flag("progress", progress) else nullcontext(None) as told:
         if control is not None:
             system = system.controlled(control, v, y, TINY)
-        order = order_of_series(how, tolerances.relative if tolerances is not None else _relative(carry, acceptance, groups))
+        relative = tolerances.relative if tolerances is not None else _relative(carry, acceptance, groups)
+        order = order_of_series(how, relative.min(axis=0) if acceptance.own else relative)
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
             system, how, batch, 1.0, begin, threads=workers, backend=backend, progress=told, fused=fused, order=order,
@@ -301,14 +302,9 @@ def _jumps(system: System, given: Any, t0: Array, times: Array) -> Array | None:
 
 def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]:
     """Places of the components that must not become negative, among the numbers of v and then of y."""
-    if given is None or given is False:
+    places = places_of(system, given)
+    if not places:
         return ()
-    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
-    if given is True:
-        places = list(range(n_v, n_v + n_y))
-    else:
-        parts = given if isinstance(given, (list, np.ndarray)) else [given]
-        places = sorted({_place(system, part) for part in parts})
     rows = [row for block, axes in ((v, len(system.v_shape)), (y, len(system.y_shape))) for row in _rows_of(block, axes)]
     for place in places:
         if (rows[place] < 0.0).any():
@@ -318,8 +314,19 @@ def _positive(system: System, given: Any, v: Array, y: Array) -> tuple[int, ...]
     return tuple(places)
 
 
+def places_of(system: System, given: Any) -> list[int]:
+    """The same, whatever the start is."""
+    if given is None or given is False:
+        return []
+    n_v, n_y = prod(system.v_shape), prod(system.y_shape)
+    if given is True:
+        return list(range(n_v, n_v + n_y))
+    parts = given if isinstance(given, (list, np.ndarray)) else [given]
+    return sorted({_place(system, part) for part in parts})
+
+
 def _rows_of(block: Array, axes: int) -> list[Array]:
-    return list(block.reshape((-1, *block.shape[axes:])))
+    return list(block.reshape((prod(block.shape[:axes]), *block.shape[axes:])))
 
 
 def _place(system: System, part: Any) -> int:
@@ -362,7 +369,9 @@ def _aimed(paces: Array, target: float) -> Array:
 
 
 def order_of_series(method: Method, relative: Array) -> int:
-    """The order of a series for relative tolerances; 0 of a method that has one order.
+    """The order of a series for relative tolerances, one for each member or all; 0 of a method that has one order.
+
+    Of tolerances of components the least of a member counts.
 
     Raises:
         UnsupportedError: if they ask for different orders.

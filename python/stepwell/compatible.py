@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _checks
 from .control import Control, EnergyControl, NormControl
-from .errors import ArgumentError, UnsupportedError
+from .errors import ArgumentError, DTypeError, UnsupportedError
 from .method_records import Method
 from .method_records import methods as every_method
 from .systems import Sampled, System
@@ -75,6 +75,20 @@ def goes_on_alike(method: Method, dt: float, carried_by: Any, dt_before: Any) ->
         raise ArgumentError(
             f"method: expected {str(carried_by)!r}, by which the run goes on and whose carry was given, got {method.name!r}; "
             f"{anew}"
+        )
+
+
+def changes_on(events: Any, changed_by: Any) -> None:
+    """Raise if a run goes on without the events that changed the state so far: another motion would follow, without a word."""
+    if changed_by is None:
+        return
+    names = _checks.several("changed_by", changed_by, "names of events")
+    if wrong := [each for each in names if not isinstance(each, str)]:
+        raise DTypeError(f"changed_by: expected names of events, as run.resume has them, got {_checks.short(wrong[0])}")
+    if events is None and names:
+        raise ArgumentError(
+            f"events: expected the events of the run that goes on, of which {', '.join(names)} changed the state so far, got "
+            f"None; give them again, or events=[] to go on without"
         )
 
 

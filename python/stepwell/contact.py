@@ -111,7 +111,8 @@ class Floor(Surface):
         restitution: e, the velocity after an impact divided by that before it, 0 to 1, without a unit; broadcasts over the batch.
         friction: Coulomb's coefficient μ, without a unit, zero or more; broadcasts. None leaves the term out.
         normal: a vector out of the floor, of any length, shape (dim,) or (dim, *batch); the last axis if None.
-        offset: distance of the plane from the origin along the normal, in units of length; broadcasts.
+        offset: distance of the plane from the origin along the normal, in units of length; broadcasts. Without ``normal`` it is
+            the height of the floor.
         way: one of the table.
         omega: ω of the spring in rad per unit of time, its stiffness per mass being ω²; with ``way="spring"`` only. Broadcasts.
 

@@ -112,7 +112,7 @@ class ControlWarning(UserWarning):
 
 
 class EventWarning(UserWarning):
-    """Some members came to rest at an event whose changes of the state follow each other within no time.
+    """Some members came to rest at an event: its changes of the state follow each other within no time, or lead back onto it.
 
     Example:
         >>> @sw.system

@@ -16,7 +16,7 @@ from ._checks import Array
 from ._doubt import warn_of_nonsense
 from ._runs import BACKENDS, BYTES_PER_TIME, NUMBERS_PER_STATE, bar_of, goes_with_times, quantities, spread, time_of
 from .adaptive_runs import AdaptiveOptions, adaptive_run
-from .compatible import fits_own_times, fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
+from .compatible import changes_on, fits_own_times, fits_together, forced, goes_back, goes_on_alike, goes_on_by_a_rule, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, DivergenceWarning, UnsupportedError
 from .method_records import Method
@@ -68,6 +68,7 @@ def integrate(
     carried_for: str | None = None,
     first_bad_step: Any = None,
     dt_before: float | None = None,
+    changed_by: Any = None,
 ) -> Run:
     """Step a system, or a batch of it.
 
@@ -143,6 +144,8 @@ def integrate(
         first_bad_step: members that diverged before, from ``run.resume``: the step at which they did, or −1, shape (*batch); only
             they may begin with NaN or infinities.
         dt_before: the step so far, from ``run.resume``. Another ``dt`` is then refused, since t0 + k·dt would be another time.
+        changed_by: names of the events that changed the state so far, from ``run.resume``. ``events`` is then needed: the same
+            events again, or ``[]`` to go on without.
 
     Returns:
         A ``Run``.
@@ -174,6 +177,7 @@ def integrate(
     fits_together(system, how)
     fused = _checks.flag("fused", fused)
     single = _checks.is_single(dtype)
+    changes_on(events, changed_by)
     if single and (tolerance is not None or at is not None):
         raise UnsupportedError("dtype: float32 goes with fixed steps only, and tolerance= or at= was given; use dt= and steps=")
     if tolerance is not None or at is not None:

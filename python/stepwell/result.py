@@ -48,8 +48,8 @@ class Status(IntEnum):
     NOT_FINITE = 4
     #: A terminal event stopped it; ``Run.stopped_at`` says when.
     EVENT = 5
-    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest; ``Run.stopped_at`` says
-    #: when.
+    #: Changes of its state by an event follow each other within no time, as of a ball that came to rest, or lead it back onto the
+    #: event, as the level of an empty tank; ``Run.stopped_at`` says when.
     REST = 6
 
 
@@ -134,6 +134,9 @@ class Run(Value):
         >>> run.y.shape, run.energy.shape
         ((3,), (3,))
     """
+
+    #: Names of the events that change the state, ``Event(…, then=…)``.
+    changed_by: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -273,7 +276,8 @@ class Run(Value):
         Give system, method and form again, and for a run with a tolerance also ``max_steps`` and ``at``, whose times follow the
         last one. A carry is for the same method only; with another system, or ``v`` or ``y`` of your own, the run begins anew
         from the state at its last time. ``save`` writes all of it to a file. ``dt`` is that of this run; another is refused,
-        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again.
+        since step k is at t0 + k·dt. Members that diverged stay as they are, without a second warning. Events are given again;
+        if one changes the state, ``integrate`` asks for them.
 
         Raises:
             UnsupportedError: if a terminal event stopped a member, which has a time of its own.
@@ -293,6 +297,8 @@ class Run(Value):
         told: dict[str, Any] = {"fused": True} if self.fused else {}
         if self.dtype != "float64":
             told["dtype"] = self.dtype
+        if self.changed_by:
+            told["changed_by"] = self.changed_by
         if self.stand is not None:
             return _going_on.with_tolerance(self) | told
         state: dict[str, Any] = {"v": self.v[-1], "y": self.y[-1], "t0": self.t0, "start_step": self.start_step + self.steps}

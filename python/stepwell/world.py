@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _checks, _core, _going_on, _growth, engine
-from ._brief import MAX_LINE, shortened
+from ._brief import MAX_LINE, counted, shortened
 from ._checks import Array
-from .compatible import fits_together, forced, goes_back, goes_on_alike, velocities
+from .compatible import changes_on, fits_together, forced, goes_back, goes_on_alike, velocities
 from .control import AnyControl, a_control
 from .errors import ArgumentError, FixedError, ShapeError
 from .method_records import Method
@@ -50,6 +50,7 @@ class World:
         dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
         events: quantities whose changes of sign are located, as of ``integrate``; those of the last call of ``step`` are in
             ``world.events``. No event stops a member of a world; one with ``then=`` changes its state within the step.
+        changed_by: names of the events that changed the state so far, from ``resume``; ``events`` is then needed.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -114,8 +115,10 @@ class World:
         fused: bool = False,
         dtype: Any = "float64",
         events: Any = None,
+        changed_by: Any = None,
     ) -> None:
         how = find_method(method)
+        changes_on(events, changed_by)
         system = copy.deepcopy(a_system(system).sized(v, y))
         fits_together(system, how)
         dt = _checks.step(dt)
@@ -230,6 +233,11 @@ class World:
             state["control"] = self._system.keeper
         if self._force is not None:
             state["force"] = self._force.copy()
+        if self._asked is not None:
+            from .events.event import names_of_changing  # which they imported
+
+            if names := names_of_changing(self._asked):
+                state["changed_by"] = names
         carry = self._core.carry() if self._method.carry is not None else None
         if carry is None:
             return state
@@ -239,7 +247,7 @@ class World:
 
     def __repr__(self) -> str:
         members = self._y.shape[len(self._system.y_shape) :]
-        many = f", {prod(members)} members" if members else ""
+        many = f", {counted(prod(members), 'member')}" if members else ""
         where = f"dt = {self._dt:g}, step {self.step_number}, t = {self.t:g}{many}"
         return shortened(f"<world of {self._system!r} by {self._method.name}: {where}>", MAX_LINE)
 

@@ -251,6 +251,7 @@ WORK = frozenset(
         "spin",
         "start_step",
         "dt_before",
+        "changed_by",
         "backend",
     }
 )

@@ -236,7 +236,8 @@ def animated(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], None], 
     turn = figure_of(axes, make, axis, reach, screen)
     trail = axes.plot([], [], color="#7a7a7a", linewidth=1.6, zorder=1)[0]
     path = screen.flat(np.copysign(REACH, reach) * matrices[:, axis].T)
-    length = TRAIL * float(chart.run.t[-1] - chart.run.t[0])
+    elapsed = chart.elapsed
+    length = TRAIL * float(elapsed[-1])
     omega = figure.add_axes((0.57, 0.64, 0.36, 0.22))
     energy = figure.add_axes((0.57, 0.37, 0.36, 0.17))
     state = figure.add_axes((0.57, 0.1, 0.36, 0.17))
@@ -247,7 +248,7 @@ def animated(figure: Figure, chart: RunPicture) -> tuple[Callable[[int], None], 
 
     def show(frame: int) -> None:
         turn(matrices[..., frame])
-        first = int(np.searchsorted(chart.run.t, chart.run.t[frame] - length))
+        first = int(np.searchsorted(elapsed, elapsed[frame] - length))
         trail.set_data(*path[first : frame + 1].T)
 
     return show, [omega, *greyed(energy, state, chart)]

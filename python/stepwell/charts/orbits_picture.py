@@ -236,8 +236,8 @@ def _paths(axes: Axes, chart: RunPicture, plane: tuple[int, int], *, legend: boo
         pale = 0.25 if shared else 0.45 if many else 1.0
         axes.plot(*y[:, i].T, linewidth=width, alpha=pale, zorder=2, rasterized=long, **line)
         if shared and chart.scene.period is not None:
-            t = chart.run.t[chart.finite]
-            arc = y[t >= t[-1] - chart.scene.period / bodies, i]  # where it went last, up to where the next one began
+            elapsed = chart.elapsed[chart.finite]
+            arc = y[elapsed >= elapsed[-1] - chart.scene.period / bodies, i]  # where it went last, up to where the next one began
             axes.plot(*arc.T, color=look["color"], linewidth=3.0, zorder=3, solid_capstyle="butt")
         mark: dict[str, Any] = {"marker": look["marker"], "linestyle": "", "markersize": 4.0 if many else 10.0, "zorder": 4}
         start: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": "black", "markeredgewidth": 0.7 if many else 1.6}

@@ -71,7 +71,7 @@ def data(chart: RunPicture, seconds: float, fps: float) -> dict[str, Any]:
     if between:
         about += f" {number} of {len(run.t)} saved states, and straight lines between them."
     make = {"orbits": _orbits, "swing": _swing, "rows": _rows, "attitude": _attitude, "body": _body}[chart.kind]
-    span = float(t[-1] - t[0])
+    span = abs(float(t[-1] - t[0]))
     return {
         "title": chart.title,
         "about": about,
@@ -124,7 +124,7 @@ def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
         centre, half = view(chart, (0, 1))
     half = max(half, 1e-12 * max(float(np.abs(centre).max()), 1.0))
     seen = np.clip(seen, centre - 4.0 * half, centre + 4.0 * half)  # far outside; the codes are for what is seen
-    length = TRAIL * float(chart.run.t[-1] - chart.run.t[0])
+    length = TRAIL * float(chart.elapsed[-1])
     if chart.scene.period is not None:
         length = min(length, TRAIL_OF_PERIOD * chart.scene.period)
     some: Any = [] if exact is None or count > len(BODIES) else np.linspace(0, len(exact) - 1, EXACT_POINTS).astype(int)
@@ -221,7 +221,7 @@ def _body(chart: RunPicture, shown: Array) -> list[Panel]:
     )
     tip = np.zeros(3)
     tip[axis] = np.copysign(body_picture.REACH, reach)
-    length = body_picture.TRAIL * float(chart.run.t[-1] - chart.run.t[0])
+    length = body_picture.TRAIL * float(chart.elapsed[-1])
     return [panel | {"tip": tip.tolist(), "trail": length, "name": f"the tip of axis {axis + 1} leaves a trail"}]
 
 

@@ -92,6 +92,11 @@ class RunPicture(Drawn, Value):
         ]
 
     @property
+    def elapsed(self) -> Array:
+        """How long after the first saved state each was, which ascends for a run back in time too."""
+        return np.asarray(np.abs(self.run.t - self.run.t[0]))
+
+    @property
     def title(self) -> str:
         """The scene and the method."""
         return f"{self.scene.title} by {self.run.method.title}"
@@ -268,8 +273,8 @@ def own_picture(run: Run) -> RunPicture:
         raise ArgumentError(f"run: expected two saved states or more, got {len(run.t)}; run with every=")
     system = run.system.uncontrolled
     title = system.kind_name
-    horizon = float(run.t[-1] - run.t[0])
-    scene = Scene(system, v=run.v[0], y=run.y[0], dt=run.dt, horizon=horizon, name=title, title=title)
+    horizon = abs(float(run.t[-1] - run.t[0]))
+    scene = Scene(system, v=run.v[0], y=run.y[0], dt=abs(run.dt), horizon=horizon, name=title, title=title)
     return run_picture(scene, run)
 
 

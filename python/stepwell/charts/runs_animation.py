@@ -97,7 +97,7 @@ def stage(chart: RunPicture) -> tuple[Figure, Show]:
         show_left = {"orbits": _orbits, "swing": _swing, "rows": _rows}[chart.kind](figure, chart)
         shown = _errors(figure, chart, {"orbits": 0.56, "swing": 0.66, "rows": 0.66}[chart.kind])
     cursors = [axes.axvline(float(run.t[0]), color="black", linewidth=2.0) for axes in shown]
-    digits = max(0, min(6, 2 - int(np.floor(np.log10(max(float(run.t[-1] - run.t[0]) / 100.0, 1e-300))))))
+    digits = max(0, min(6, 2 - int(np.floor(np.log10(max(float(chart.elapsed[-1]) / 100.0, 1e-300))))))
     width = len(f"{run.t[-1]:.{digits}f}")
 
     def show(frame: int) -> None:
@@ -122,7 +122,7 @@ def _errors(figure: Figure, chart: RunPicture, left: float) -> list[Axes]:
 def _orbits(figure: Figure, chart: RunPicture) -> Show:
     """Bodies with trails; those in space are seen along z."""
     plane = (0, 1)
-    run, bodies = chart.run, chart.places.shape[1]
+    bodies = chart.places.shape[1]
     centre, size = view(chart, plane)
     axes = figure.add_axes((0.06, 0.1, 0.43, 0.76))
     square(axes, centre, size, plane, chart.places.shape[2])
@@ -134,7 +134,8 @@ def _orbits(figure: Figure, chart: RunPicture) -> Show:
     if left_picture(chart, [(centre, size)], size):
         figure.text(0.06, 0.02, "A body leaves the picture.", size=13, color=GREY)
     many = bodies > len(BODIES)
-    length = TRAIL * float(run.t[-1] - run.t[0])
+    elapsed = chart.elapsed
+    length = TRAIL * float(elapsed[-1])
     if chart.scene.period is not None:
         length = min(length, TRAIL_OF_PERIOD * chart.scene.period)
     trails, marks = [], []
@@ -145,7 +146,7 @@ def _orbits(figure: Figure, chart: RunPicture) -> Show:
         marks += axes.plot([], [], linestyle="", marker=look["marker"], markersize=6 if many else 15, zorder=4, **face)
 
     def show(frame: int) -> None:
-        first = int(np.searchsorted(run.t, run.t[frame] - length))
+        first = int(np.searchsorted(elapsed, elapsed[frame] - length))
         for i, (trail, mark) in enumerate(zip(trails, marks, strict=True)):
             trail.set_data(*y[first : frame + 1, i].T)
             mark.set_data(*y[frame : frame + 1, i].T)

@@ -139,7 +139,7 @@ def _of_attitude(chart: RunPicture) -> str:
     """Where roll and pitch settled, or how far they went."""
     system: Any = chart.run.system
     roll, pitch = np.asarray(system.angles(chart.run.y, axis=1))[:, :2].T
-    last = chart.run.t >= chart.run.t[-1] - LAST_SHARE * (chart.run.t[-1] - chart.run.t[0])
+    last = chart.elapsed >= (1.0 - LAST_SHARE) * chart.elapsed[-1]
     if max(np.ptp(roll[last]), np.ptp(pitch[last])) < SETTLED:
         return f"settles at {roll[-1]:.1f}° roll and {pitch[-1]:.1f}° pitch"
     ways = (f"{name} from {angle.min():.0f}° to {angle.max():.0f}°" for name, angle in (("roll", roll), ("pitch", pitch)))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks
+from .._brief import counted
 from .._checks import Array, Shape
 from .._value import Value
 from ..derivatives import traced
@@ -74,7 +75,7 @@ class Jacobian(Value):
 
     def __repr__(self) -> str:
         members = self.matrix.shape[2:]
-        what = f"{prod(members)} members" if members else f"largest growth {self.eigenvalues[0].real:.6g}"
+        what = counted(prod(members), "member") if members else f"largest growth {self.eigenvalues[0].real:.6g}"
         return f"<Jacobian of {self.system!r}: {len(self.matrix)} × {len(self.matrix)}, {what}>"
 
 

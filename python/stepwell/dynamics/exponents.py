@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import _checks, _core, engine
-from .._brief import share
+from .._brief import counted, share
 from .._checks import Array
 from .._interrupts import POLL, available
 from .._value import Value
@@ -102,7 +102,7 @@ class Lyapunov(Value):
 
     def __repr__(self) -> str:
         members = self.exponents.shape[1:]
-        what = f"{prod(members)} members" if members else ", ".join(f"{each:.6g}" for each in self.exponents)
+        what = counted(prod(members), "member") if members else ", ".join(f"{each:.6g}" for each in self.exponents)
         return f"<Lyapunov exponents of {self.system!r} by {self.method.name}: {what}>"
 
 

@@ -33,12 +33,22 @@ ARRIVED = 1e-12
 #: only rounding is left.
 NEARLY_ARRIVED = 1e-7
 
+#: Rates are zero, but for the rounding of their terms, below this fraction of these.
+RATES_ARE_ZERO = 64.0 * EPS
+
 #: Two equilibria nearer than this fraction of their size are one: far more than rounding, far less than users distinguish.
 SAME = 1e-8
 
 #: A singular value of the Jacobian below this fraction of the largest counts as zero: the equilibrium is part of a line or
 #: surface of equilibria, or a double root.
 SINGULAR = 1e-10
+
+#: The place of a root is known to so many times the Newton step that is left: at a p-fold root that step is the p-th part of the
+#: distance. The rates there are uncertain by their rounding: by how much they are not straight over such shares of the place.
+#: No place is taken for less certain than a share of the size: roundings ε leave ε^(1/p) of a p-fold root, 7·10⁻⁴ for five.
+MULTIPLE, BESIDE, LEAST_CERTAIN = 16.0, 2.0**-33 * np.array([-7.0, -5.0, -3.0, -1.0, 1.0, 3.0, 5.0, 7.0]), 2.0**-10
+#: A singular value below this fraction of the largest is rounding: along it nothing is known, as on a line of equilibria.
+ROUNDING = 16.0 * EPS
 
 #: A real part counts as zero below this fraction of the fastest rate, plus the rounding error; and if an eigenvalue changes by
 #: half of it within ``SAME`` of the place, or on so many steps of Newton's method. A multiple root is found to the root of a
@@ -179,20 +189,52 @@ def equilibria(
     n = sum(maps.size(system))
     _checks.fits("the Jacobians", 8 * n * n, starts.shape[1:], "give fewer starts")
     states, arrived = _newton(system, starts, t)
+    found = _one_by_one(system, states, starts, np.flatnonzero(arrived), t)
+    each = tuple(_equilibrium(system, at, uncertain, t, how, step, own) for at, uncertain, own in found)
+    return Equilibria(system, each, tuple(np.flatnonzero(~arrived).tolist()))
+
+
+def _one_by_one(
+    system: System, states: Array, starts: Array, arrived: Any, t: float
+) -> list[tuple[Array, Array, tuple[int, ...]]]:
+    """Each equilibrium once: where it is, how uncertain that is, and the starts that reached it."""
     sizes, begun = _size(system, states), _size(system, starts)
-    found: list[tuple[Array, list[int]]] = []
-    for k in np.flatnonzero(arrived).tolist():
-        at = states[:, k]
-        for other, own in found:
+    alike: list[list[int]] = []
+    for k in arrived.tolist():
+        for own in alike:
             # The size of a coordinate that is 0 up to rounding is that of the coordinates at the start.
             size = np.maximum(np.maximum(sizes[:, k], sizes[:, own[0]]), np.minimum(begun[:, k], begun[:, own[0]]))
-            if (np.abs(at - other) <= SAME * size).all():
+            if (np.abs(states[:, k] - states[:, own[0]]) <= SAME * size).all():
                 own.append(k)
                 break
         else:
-            found.append((at, [k]))
-    each = tuple(_equilibrium(system, at, t, how, step, tuple(own)) for at, own in found)
-    return Equilibria(system, each, tuple(np.flatnonzero(~arrived).tolist()))
+            alike.append([k])
+    firsts = [own[0] for own in alike]
+    uncertain, residuals = _uncertain(system, states[:, firsts], np.maximum(sizes, begun)[:, firsts], t)
+    found: list[tuple[int, list[int]]] = []
+    for i, own in enumerate(alike):
+        for place, (j, others) in enumerate(found):
+            apart = np.abs(states[:, firsts[i]] - states[:, firsts[j]])
+            if (apart <= uncertain[:, i] + uncertain[:, j]).all():
+                found[place] = i if residuals[i] < residuals[j] else j, sorted(others + own)
+                break
+        else:
+            found.append((i, own))
+    return [(states[:, firsts[i]], uncertain[:, i], tuple(own)) for i, own in found]
+
+
+def _uncertain(system: System, states: Array, sizes: Array, t: float) -> tuple[Array, Array]:
+    """How uncertain the places of equilibria are, each number by itself, and the largest rate at each."""
+    if not states.size:
+        return np.zeros(states.shape), np.zeros(states.shape[1])
+    matrix, rates = linearised(system, *_blocks(system, states), t)
+    left = np.abs(_solved(matrix, rates, ROUNDING))
+    for share in BESIDE:
+        change = share * states
+        near = linearised(system, *_blocks(system, states + change), t)[1]
+        bent = near - np.einsum("ijk,jk->ik", matrix, change)
+        left = np.maximum(left, np.abs(_solved(matrix, np.where(np.isfinite(bent), bent, rates), ROUNDING)))
+    return np.minimum(MULTIPLE * left, LEAST_CERTAIN * sizes), np.abs(rates).max(axis=0)
 
 
 def _starts(system: System, v: Array, y: Array) -> Array:
@@ -232,6 +274,8 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
     alive = np.ones(states.shape[1], dtype=np.bool_)
     least = _size(system, states)
     least = np.where(least > 0.0, least, 1.0)
+    # The largest that each rate has been by its derivatives: their terms, of which it is a sum, are at least that large.
+    terms = np.zeros_like(states)
     for _ in range(MAX_ITERATIONS):
         which = np.flatnonzero(alive)
         if not which.size:
@@ -244,25 +288,34 @@ def _newton(system: System, states: Array, t: float) -> tuple[Array, Any]:
         if not which.size:
             break
         change = -_solved(matrix, rates)
+        terms[:, which] = np.maximum(
+            terms[:, which], np.einsum("ijk,jk->ik", np.abs(matrix), np.maximum(_size(system, at), least[:, which]))
+        )
+        # Where the Jacobian is singular, a step of zero may leave the rates as they are: an extreme of a rate is no zero.
+        remainder = np.abs(np.einsum("ijk,jk->ik", matrix, change) + rates)
+        vanishes = (remainder <= RATES_ARE_ZERO * terms[:, which]).all(axis=0)
         relative = (np.abs(change) / np.maximum(_size(system, at), least[:, which])).max(axis=0)
-        there = relative <= ARRIVED
+        there = vanishes & (relative <= ARRIVED)
         best, better = _damped(system, at, change, rates, t)
-        stuck = ~better & (relative <= NEARLY_ARRIVED)
+        stuck = vanishes & ~better & (relative <= NEARLY_ARRIVED)
         states[:, which] = np.where(better, best, at)
         arrived[which] = there | stuck
         alive[which] = better & ~there
     return states, arrived
 
 
-def _solved(matrix: Array, rates: Array) -> Array:
-    """The least-squares solution x of matrix·x = rates, the shortest of several, for each column."""
+def _solved(matrix: Array, rates: Array, zero: float = SINGULAR) -> Array:
+    """The least-squares solution x of matrix·x = rates, the shortest of several, for each column.
+
+    A singular value below the fraction ``zero`` of the largest counts as zero.
+    """
     of_rows, of_columns = _units(matrix)
     stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]
     singular = np.linalg.svd(stacked, compute_uv=False)
-    regular = singular[:, -1] > SINGULAR * singular[:, 0]
+    regular = singular[:, -1] > zero * singular[:, 0]
     found = np.empty(right.shape)
     found[regular] = np.linalg.solve(stacked[regular], right[regular])
-    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=SINGULAR) @ right[~regular]
+    found[~regular] = np.linalg.pinv(stacked[~regular], rcond=zero) @ right[~regular]
     return np.asarray(found[:, :, 0].T / of_columns)
 
 
@@ -294,7 +347,7 @@ def _damped(system: System, at: Array, change: Array, rates: Array, t: float) ->
 
 
 def _equilibrium(
-    system: System, at: Array, t: float, method: Method | None, dt: float | None, starts: tuple[int, ...]
+    system: System, at: Array, uncertain: Array, t: float, method: Method | None, dt: float | None, starts: tuple[int, ...]
 ) -> Equilibrium:
     v, y = _blocks(system, at)
     matrix, rates = linearised(system, v, y, t)
@@ -306,17 +359,19 @@ def _equilibrium(
             analysis = analyse(system, method, dt=dt, at=None if linear else (v, y), t=t)
     of_rows, of_columns = _units(matrix)
     _, singular, across = np.linalg.svd(matrix / of_rows[:, np.newaxis] / of_columns)
-    exactly, least = _known(system, at, matrix, rates, across[-1] / of_columns, t)
+    exactly, least = _known(system, at, uncertain, matrix, rates, across[-1] / of_columns, t)
     isolated = bool(singular[-1] > SINGULAR * singular[0]) and bool((np.abs(exactly) > least).all())
     return Equilibrium(v, y, float(np.abs(rates).max()), values, _kind(exactly, least), isolated, analysis, starts)
 
 
-def _known(system: System, at: Array, matrix: Array, rates: Array, weakest: Array, t: float) -> tuple[Complex, Array]:
+def _known(
+    system: System, at: Array, uncertain: Array, matrix: Array, rates: Array, weakest: Array, t: float
+) -> tuple[Complex, Array]:
     """Eigenvalues, and up to which size each is zero as far as the place of an equilibrium is known.
 
     ``weakest`` is the direction that changes the rates least.
     """
-    size = SAME * _size(system, at[:, np.newaxis])[:, 0]
+    size = np.maximum(SAME * _size(system, at[:, np.newaxis])[:, 0], uncertain)
     along = weakest / np.abs(weakest).max() * np.min(size, where=size > 0.0, initial=np.inf) if size.any() else size
     left = -LEFT * _solved(matrix[:, :, np.newaxis], rates[:, np.newaxis])[:, 0]
     places = np.stack([at + size, at - size, at + along, at - along, at + left], axis=1)

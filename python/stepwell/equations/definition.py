@@ -184,6 +184,7 @@ def _checked(function: Callable[..., Any], state: int) -> dict[str, Any]:
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
         first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
         raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))}){first_order}")
+    _checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"))
     parameters = {}
     for each in given:
         if each in positional[:state]:

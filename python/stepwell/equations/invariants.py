@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .. import _core
+from .. import _checks, _core
 from ..errors import ArgumentError
 from ..reference.marks import recording
 from ..reference.replayed import Operations
@@ -51,6 +51,7 @@ def invariant(definition: Definition, function: Any) -> Invariant:
     expected = f"({', '.join(state)}, *, …) or (t, {', '.join(state)}, *, …)"
     if in_place[:n] != given[:n] or len(in_place) < n:
         raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, given))})")
+    _checks.argument_order(name, function, ("t", *state) if takes_time else state)
     for each in given[n:]:
         if each.name not in definition.parameters:
             known = ", ".join(definition.parameters) or "none"

@@ -19,9 +19,9 @@ from ..reference.types import Whole
 from ..result import Status
 from .attempts import Attempts, attempted
 from .collected import AT_START, Collected, Stops
-from .event import Event
+from .event import Event, names_of_changing
 from .parts import Changes
-from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets, warn_of_rest
+from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
 from .trials import AdaptiveTrials
 
 #: Numbers of the states of members that are looked at together: a megabyte, which stays in a cache.
@@ -33,6 +33,8 @@ LEAST_ATTEMPTS = 16
 #: Times between changes of the state that shrink geometrically end in a limit. A member is set there when no more than this share
 #: of its time is left to it, and when the time since the last change is less than NO_FLIGHT of it, however they shrink.
 LEFT_OF_SERIES, NO_FLIGHT = 2.0**-20, 2.0**-44
+#: Before the first step of a run this share of it stands for the length of a step.
+SHARE_OF_RUN = 2.0**-10
 
 
 class AdaptiveRun:
@@ -61,7 +63,7 @@ class AdaptiveRun:
         """Give the result what was found."""
         assert self._driver is not None
         by_themselves, stops = run.stopped_at, self._driver.stops()
-        run.events = self._driver.occurrences()
+        run.events, run.changed_by = self._driver.occurrences(), names_of_changing(self._events)
         if stops is not None:
             run.status = np.where(np.isnan(stops), run.status, Status.EVENT).astype(np.int8)
             run.stopped_at = stops if by_themselves is None else np.where(np.isnan(stops), by_themselves, stops)
@@ -228,6 +230,8 @@ class _Resetting(_Driver):
         self._longest = np.zeros((engine.groups_of(plan), total))
         #: From which side members came to each event that ended their part, 0 for others, and how large it was around.
         self._sides, self._sizes = (np.zeros((len(events), total)) for _ in range(2))
+        #: How long the steps were that ended in these events.
+        self._lengths = np.zeros(total)
         #: The number of the event at which a member is at rest; else −1.
         self._rests = np.full(total, -1)
 
@@ -238,7 +242,7 @@ class _Resetting(_Driver):
             self._start[:] = np.broadcast_to(self.plan.t0, batch).reshape(-1)
             begins = [block.reshape(*shape, total) for block, shape in zip((v, y), shapes, strict=True)]
             self._state = tuple(block.copy() for block in begins)
-            self._resets.begin(self._start, *begins)
+            self._resets.begin(self._start, SHARE_OF_RUN * (self.end - self._start), *begins)
         out = super().run(paces, v, y)
         saved = [np.array(each).reshape(times, *shape, total) for each, shape in zip((out.v, out.y), shapes, strict=True)]
         ends = [np.array(each).reshape(*shape, total) for each, shape in zip((out.last_v, out.last_y), shapes, strict=True)]
@@ -287,14 +291,7 @@ class _Resetting(_Driver):
         """Change the states of these members, from which they go on or in which they are at rest."""
         t, sides, sizes_of = self.stopped_at[index], self._sides[:, index], self._sizes[:, index]
         v, y = (each[..., index] for each in self.stop_state)
-        at, event = np.zeros_like(sides), np.full(len(index), -1)
-        for e in range(len(self.events)):
-            who = np.flatnonzero(sides[e])
-            if len(who):
-                v[..., who], y[..., who], at[e, who] = self._resets.new_state(
-                    e, t[who], v[..., who], y[..., who], index[who], sizes_of[e, who], sides[e, who]
-                )
-                event[who] = e
+        v, y, at, event = self._resets.new_states(t, self._lengths[index], v, y, index, sides, sizes_of)
         with np.errstate(all="ignore"):
             returned = ((self._resets.at[:, index] != 0.0) & (at != 0.0)).any(axis=0)
             flight, since = np.where(returned, t - self._start[index], np.nan), t - self.begin[index]
@@ -336,7 +333,10 @@ class _Resetting(_Driver):
                 each |= first & (at[e] != 0.0)
 
     def parts(self, e: int, steps: Changes) -> Changes:
-        parts, stuck = self.within(e, steps, self._side(e, steps))
+        side = self._side(e, steps)
+        parts, stuck = self.within(e, steps, side)
+        held = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
+        stuck = np.union1d(stuck, held)
         soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
         if not len(stuck) and not soon.any():
             return parts
@@ -356,6 +356,7 @@ class _Resetting(_Driver):
     def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
         self._sides[:, member], self._sizes[:, member] = stops.side[:, place], stops.size[:, place]
         plan = self.plan
+        self._lengths[member] = out.lengths(plan)[row, place]
         v, y = (np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), plan.block_axes, strict=True))
         so_far = np.maximum.accumulate(sizes(v, y, plan.block_axes, plan.acceptance.groups), axis=1)
         self._longest[:, member] = np.maximum(longest[:, place], so_far[:, row, place])
@@ -364,4 +365,4 @@ class _Resetting(_Driver):
         rests = (self._rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
-            warn_of_rest([event.name for event in self.events], self._rests, self.stopped_at, self.plan.batch)
+            self._resets.warn_of_rest(self._rests, self.stopped_at)

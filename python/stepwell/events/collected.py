@@ -86,12 +86,12 @@ class Collected:
             v, y = self.trials.step(index, t[which], part, steps.v[..., which], steps.y[..., which])
             there = t[which] + part
             g = self.quantity(e, there, v, y, self.members.numbers(index))
-            return g, self._slope(e, index, there, h[which], v, y), v, y
+            return g, self.slope(e, index, there, h[which], v, y), v, y
 
         if not len(member):
             return steps, member
         slope, slope_end = (
-            self._slope(e, member, at_time, h, *state)
+            self.slope(e, member, at_time, h, *state)
             for at_time, state in ((t, (steps.v, steps.y)), (t + h, (steps.v_end, steps.y_end)))
         )
         g = steps.g
@@ -117,7 +117,7 @@ class Collected:
         self.before[e, index] = g[-2]
         return may
 
-    def _slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
+    def slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
         """By how much the quantity would change in a step that goes on as the states do."""
         rates = self.trials.rates(index, t, h, v, y)
         return self.quantities[e].slope(self.sign * t, v, y, self.members.numbers(index), self.sign * h, *rates)

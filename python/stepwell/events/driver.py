@@ -14,9 +14,9 @@ from ..reference.events import near
 from ..reference.types import Whole
 from ..result import Status
 from .collected import Collected, Known
-from .event import Event
+from .event import Event, names_of_changing
 from .parts import At, Changes
-from .resets import Resets, Stretch, warn_of_rest
+from .resets import Resets, Stretch
 from .traced import watched
 
 #: Members × steps × numbers of a state that are looked at together: a megabyte, which stays in a cache.
@@ -68,6 +68,7 @@ class Run:
         """Give the result what was found."""
         assert self._driver is not None
         run.events, run.stopped_at = self._driver.occurrences(), self._driver.stops()
+        run.changed_by = names_of_changing(self._events)
         if run.stopped_at is not None and (stopped := ~np.isnan(run.stopped_at)).any():
             run.status = np.where(stopped, Status.EVENT, run.status).astype(np.int8)
             run.encounter = run.overshoots = None  # these go through all of the steps
@@ -250,7 +251,8 @@ class _Resetting(_Driver):
         plan = self.plan
         if not carried:
             states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
-            self.resets.begin(np.ravel(plan.t0) + plan.first * plan.dt, *states)
+            t = np.broadcast_to(plan.t0 + plan.first * plan.dt, plan.batch).reshape(-1)
+            self.resets.begin(t, np.full(plan.members, plan.dt), *states)
         return super().run(v, y, before, carried)
 
     def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
@@ -335,4 +337,4 @@ class _Resetting(_Driver):
         rests = (self.rests >= 0).reshape(self.plan.batch)
         if rests.any():
             run.status = np.where(rests, Status.REST, run.status).astype(np.int8)
-            warn_of_rest([event.name for event in self.events], self.rests, self.stopped_at, self.plan.batch)
+            self.resets.warn_of_rest(self.rests, self.stopped_at)

@@ -112,6 +112,11 @@ def _stops(name: str, value: Any) -> bool | int:
     return number if number > 1 else number == 1
 
 
+def names_of_changing(events: Sequence[Event]) -> tuple[str, ...]:
+    """The names of those that change the state."""
+    return tuple(event.name for event in events if event.then is not None)
+
+
 def several(events: Any) -> list[Event]:
     """The events that were given: one or a list, of which each may be a function alone."""
     given: Sequence[Any] = [events] if isinstance(events, Event) or callable(events) else []

@@ -75,10 +75,11 @@ class Frames(Collected):
 
     def _taken_up(self, g: list[Array]) -> None:
         """What is known of members from the last call, but for those that the user has moved since."""
+        t = np.full(len(self._all), self.plan.t0 + self._loop.step_number * self.plan.dt)
+        h, (v, y) = np.full(len(self._all), self.plan.dt), self._flat(self._blocks)
         if self._left is None:
             if self._resets is not None:
-                t: Any = np.array(self.plan.t0 + self._loop.step_number * self.plan.dt)
-                self._resets.begin(t, *self._flat(self._blocks))
+                self._resets.begin(t, h, v, y)
             return
         blocks, last = self._left
         moved = np.zeros(len(self._all), dtype=bool)
@@ -87,8 +88,8 @@ class Frames(Collected):
         self.before[:, moved] = np.nan
         self._rests &= ~moved
         if self._resets is not None:
-            for e, (here, there) in enumerate(zip(g, last, strict=True)):
-                self._resets.begin_again(e, here, here != there)
+            changed = [now != then for now, then in zip(g, last, strict=True)]
+            self._resets.begin_again(t, h, v, y, g, changed, moved)
 
     @property
     def told(self) -> dict[str, Occurrences]:

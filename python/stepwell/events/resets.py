@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._brief import first_of, share
-from .._checks import Array, Shape
+from .._checks import Array
 from ..errors import EventWarning
 from ..reference.types import Whole
 from .collected import Collected
@@ -29,6 +28,12 @@ NO_TIME = 2.0**-100
 #: A member is at an event still, after this changed its state, if g is no more than so many times what it was there, or than the
 #: share ``LEAST_LEFT`` of what it was at the ends of the step; else its state is elsewhere, as of a neuron that is set back.
 AT = 8.0
+#: Whether an event leads a member back to itself is tried with the state that is this share of a step further on.
+FURTHER = 2.0**-10
+
+
+#: Velocities and coordinates of some members.
+State = tuple[Array, Array]
 
 
 class Stretch(NamedTuple):
@@ -85,7 +90,7 @@ class Arrived(NamedTuple):
         y: coordinates.
         at: of each event the side from which a member came that is at it still.
         stops: which a terminal event stopped.
-        rests: the number of the event that changed the state of a member ever again within no time, −1 for others.
+        rests: the number of the event that changed the state of a member ever again within no time or holds it, −1 for others.
         t: the time at which members stopped or came to rest, NaN for others.
     """
 
@@ -109,35 +114,90 @@ class Resets:
         }
         #: At which of them members are, from which side, since they changed the state at the end of a step.
         self.at = np.zeros((len(run.events), run.plan.members))
+        #: Of those at an event, which it leads back to where they are.
+        self.led_back = np.zeros(self.at.shape, dtype=bool)
 
-    def begin(self, t: Array, v: Array, y: Array) -> None:
-        """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground."""
-        numbers = self._run.members.numbers(slice(None))
-        for e in self._new_states:
-            self.begin_again(e, self._run.quantity(e, t, v, y, numbers), np.ones(self.at.shape[1], dtype=bool))
+    def begin(self, t: Array, h: Array, v: Array, y: Array) -> None:
+        """Members that begin at an event of a direction are there as if it had changed their state: a ball lies at the ground.
 
-    def begin_again(self, e: int, g: Array, which: Any) -> None:
-        """The same of some members, of whom one quantity is known."""
-        if e in self._new_states:
-            there = np.where(g == 0.0, -float(self._run.events[e].direction), 0.0)
-            self.at[e] = np.where(which, there, self.at[e])
+        ``h`` is about the length of their steps.
+        """
+        numbers, everyone = self._run.members.numbers(slice(None)), np.ones(self.at.shape[1], dtype=bool)
+        g = [self._run.quantity(e, t, v, y, numbers) for e in range(len(self._run.events))]
+        self.begin_again(t, h, v, y, g, [everyone] * len(g), everyone)
+
+    def begin_again(self, t: Array, h: Array, v: Array, y: Array, g: list[Array], changed: list[Any], moved: Any) -> None:
+        """The same of members that were moved, whose quantities are known, and of which events they were changed."""
+        run = self._run
+        for e, new_state in self._new_states.items():
+            there = np.where(g[e] == 0.0, -float(run.events[e].direction), 0.0)
+            self.at[e] = np.where(changed[e], there, self.at[e])
+            who = np.flatnonzero(moved & ((self.at[e] != 0.0) | (changed[e] & (g[e] == 0.0))))
+            if len(who):
+                before = v[..., who], y[..., who]
+                after = new_state(run.sign * t[who], *before, run.members.numbers(who))
+                side = self.at[e, who]
+                if run.events[e].direction == 0:  # they can only be held on the side from which they would go on
+                    side = np.where(side == 0.0, -np.sign(run.slope(e, who, t[who], h[who], *after)), side)
+                self.led_back[e, who] = self._leads_back(e, t[who], h[who], before, after, who, side)
+                self.at[e, who] = np.where(self.led_back[e, who], side, self.at[e, who])
 
     def changes(self, e: int) -> bool:
         """Whether an event changes the state."""
         return e in self._new_states
 
-    def new_state(
-        self, e: int, t: Array, v: Array, y: Array, member: Whole, size: Array, side: Array
-    ) -> tuple[Array, Array, Array]:
-        """From where these members go on, and the side from which they came if they are at the event still, else 0.
+    def new_states(
+        self, t: Array, h: Array, v: Array, y: Array, member: Whole, side: Array, size: Array
+    ) -> tuple[Array, Array, Array, Whole]:
+        """From where members go on, the sides from which they came to events at which they are still, and what changed them.
 
-        ``size`` is how large g was at the ends of the step, and ``side`` the sign of g before the event.
+        Args:
+            t: when events change their states.
+            h: the lengths of their steps.
+            v: their velocities then, shape (*block, n).
+            y: their coordinates.
+            member: who they are.
+            side: of each event the sign of g before it, where it changes the state of a member, else 0.
+            size: of each event how large g was at the ends of the step.
+
+        Returns:
+            v, y, of each event its ``side`` where the new state is at the event, else 0, and the number of the last event.
         """
-        numbers, quantity = self._run.members.numbers(member), self._run.quantity
-        there = np.abs(quantity(e, t, v, y, numbers))
-        v, y = self._new_states[e](self._run.sign * t, v, y, numbers)
-        now = np.abs(quantity(e, t, v, y, numbers))
-        return v, y, np.where(now <= np.maximum(AT * there, LEAST_LEFT * size), side, 0.0)
+        run, before, at, event = self._run, (v, y), np.zeros_like(side), np.full(len(member), -1)
+        v, y = v.copy(), y.copy()
+        acting = [(e, who) for e in self._new_states if len(who := np.flatnonzero(side[e]))]
+        for e, who in acting:
+            state = v[..., who], y[..., who]
+            v[..., who], y[..., who] = self._new_states[e](run.sign * t[who], *state, run.members.numbers(member[who]))
+            event[who] = e
+        for e, who in acting:
+            numbers, old, new = run.members.numbers(member[who]), *((a[..., who], b[..., who]) for a, b in (before, (v, y)))
+            there, now = (np.abs(run.quantity(e, t[who], *state, numbers)) for state in (old, new))
+            at[e, who] = np.where(now <= np.maximum(AT * there, LEAST_LEFT * size[e, who]), side[e, who], 0.0)
+            self.led_back[e, member[who]] = self._leads_back(e, t[who], h[who], old, new, member[who], at[e, who])
+        return v, y, at, event
+
+    def _leads_back(self, e: int, t: Array, h: Array, old: State, new: State, member: Whole, side: Array) -> Any:
+        """Whether an event holds members where they are: a tank that is empty, in which a level below zero is set to zero.
+
+        It left their states as they were but for roundings; they go on across it; and from there it leads them back, by half of
+        the way or more. A kick that is zero also leaves a state as it is, but leads back from nowhere.
+        """
+        run, held = self._run, side != 0.0
+        if not held.any():
+            return held
+        numbers, rates = run.members.numbers(member), run.trials.rates(member, t, h, *new)
+        with np.errstate(all="ignore"):
+            for before, after, change in zip(old, new, rates, strict=True):
+                same = np.abs(after - before) <= LEAST_LEFT * (np.abs(after) + np.abs(change))
+                held &= same.all(axis=tuple(range(same.ndim - 1)))
+            v, y = (block + FURTHER * change for block, change in zip(new, rates, strict=True))
+            t_further = t + FURTHER * h
+            back = self._new_states[e](run.sign * t_further, v, y, numbers)
+            g = run.quantity(e, t, *new, numbers)
+            g_further, g_back = (run.quantity(e, t_further, *state, numbers) for state in ((v, y), back))
+            across = side * (g - g_further)
+            return held & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
 
     def through(self, stretch: Stretch) -> Arrived:
         """Go through one step of some members, from whole steps of theirs."""
@@ -211,6 +271,7 @@ class Resets:
             changes, stuck = run.within(e, whole.some(looked), stretch.at[e, looked])
             if e in self._new_states:
                 returns[looked[stuck]] = e
+                returns[(stretch.at[e] != 0.0) & self.led_back[e, stretch.member]] = e
             occurs = run.located(e, changes)
             if e in self._new_states:  # in no time
                 again = (stretch.at[e, changes.place] != 0.0) & (
@@ -227,31 +288,28 @@ class Resets:
             here = run.ends(e, occurs.member) & (occurs.share == share[place])
             t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
             stops[place[here]] |= e not in self._new_states
-        at, event = np.zeros_like(stretch.at), np.full(n, -1)
-        for e, (occurs, place, side) in enumerate(found):
+        side = np.zeros_like(stretch.at)
+        for e, (occurs, place, before) in enumerate(found):
             run.note(e, occurs.some(occurs.share <= share[place]))
             if e in self._new_states:
                 here = (occurs.share == share[place]) & ~stops[place]
-                who = place[here]
-                if len(who):
-                    v[..., who], y[..., who], at[e, who] = self.new_state(
-                        e, t[who], v[..., who], y[..., who], stretch.member[who], sizes[e][who], side[here]
-                    )
-                    event[who] = e
+                side[e, place[here]] = before[here]
+        v, y, at, event = self.new_states(t, self._way * step, v, y, stretch.member, side, np.array(sizes))
         share[returns >= 0] = np.inf
         return Ahead(share, stops, t, v, y, at, event), returns
 
-
-def warn_of_rest(names: Sequence[str], rests: Whole, times: Array, batch: Shape) -> None:
-    """Warn of members that are at rest at an event, by its number, since these times; −1 for others."""
-    is_at_rest = (rests >= 0).reshape(batch)
-    time = float(np.min(times[rests >= 0]))
-    first = np.flatnonzero((rests >= 0) & (times == time))[0]
-    some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
-    warnings.warn(
-        f"{share(some, batch, is_at_rest.size)} came to rest at event {names[rests[first]]}"
-        f"{first_of(some, place, is_at_rest.size) or ','} at t = {time:.9g}: changes of its state follow each other within no "
-        f"time, so that it does not go on by them",
-        EventWarning,
-        stacklevel=5,
-    )
+    def warn_of_rest(self, rests: Whole, times: Array) -> None:
+        """Warn of members that are at rest at an event, by its number, since these times; −1 for others."""
+        batch, is_at_rest = self._run.plan.batch, (rests >= 0).reshape(self._run.plan.batch)
+        first = int(np.argmin(np.where(rests >= 0, self._way * times, np.inf)))
+        some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
+        if self.led_back[rests[first], first]:
+            why = "its change of the state leads back onto it, and the motion across it, so that it does not go on"
+        else:
+            why = "changes of its state follow each other within no time, so that it does not go on by them"
+        warnings.warn(
+            f"{share(some, batch, is_at_rest.size)} came to rest at event {self._run.events[rests[first]].name}"
+            f"{first_of(some, place, is_at_rest.size) or ','} at t = {self._run.sign * times[first]:.9g}: {why}",
+            EventWarning,
+            stacklevel=5,
+        )

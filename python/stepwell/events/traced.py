@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core, engine
+from .. import _checks, _core, engine
 from .._checks import Array
 from ..derivatives import directional
 from ..equations.namespace import rebound
@@ -36,6 +36,7 @@ def parameters_of(function: Any, name: str, system: System, given: dict[str, Any
     if len(head) < len(state) or any(each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD) for each in head):
         why = f", since {system.kind_name} has velocities" if len(state) == 3 and len(head) == 2 else ""
         raise ArgumentError(f"{name}: expected a function {expected}{why}, got ({', '.join(map(str, own))})")
+    _checks.argument_order(name, function, state)
     taken = []
     for each in rest:
         if each.name in given and each.kind not in (each.POSITIONAL_ONLY, each.VAR_POSITIONAL, each.VAR_KEYWORD):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import _checks, _files
+from .._brief import counted
 from .._value import Value
 from ..method_records import Method
 from ..systems import System
@@ -188,7 +189,7 @@ class Explanation(Value):
         fused = ", with fused multiply-adds" if self.fused else ""
         fused += ", by its transition matrix" if self.form == "matrix" else ""
         fused += "" if self.dtype == "float64" else f", in {self.dtype}"
-        return f"{self.method.title}: {what} of {self.system!r}, {self.members} member{'s' * (self.members > 1)}{fused}"
+        return f"{self.method.title}: {what} of {self.system!r}, {counted(self.members, 'member')}{fused}"
 
     @property
     def machine(self) -> str:

@@ -124,3 +124,4 @@ def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
             f"{argument}, args: {name}({', '.join(expected.parameters)}) is called with t, y and {len(args)} args, which it does "
             f"not take: {error}"
         ) from None
+    _checks.argument_order(f"{argument}: {name}", function, ("t", "y"))

@@ -164,7 +164,8 @@ def lost(run: Run) -> int:
 
 def why(status: int) -> str:
     """Why a member stopped, in words."""
-    return WHY_STOPPED[Status(status)]
+    hint = "; a run of that member alone tells the cause" if status == Status.UNDERFLOW else ""
+    return f"{WHY_STOPPED[Status(status)]}{hint}"
 
 
 #: What is told of members that are lost in the absolute tolerance.

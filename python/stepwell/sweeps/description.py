@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from .._brief import counted
 from ..events import Event
 from ..method_records import method as find_method
 from ..systems import System
@@ -52,7 +53,7 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
     if task.at is not None:
         told["at"] = _digest(task.at)
     attrs: dict[str, Any] = {
-        "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {grid.members} members",
+        "title": f"{system.kind_name} by {find_method(task.method).title}: a sweep of {counted(grid.members, 'member')}",
         "stepwell_version": str(_core.__version__),
         "numpy_version": np.__version__,
         "system": repr(task.system) if isinstance(task.system, System) else system.kind_name,

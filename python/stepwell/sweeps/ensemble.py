@@ -318,7 +318,7 @@ def _compute(task: Task, grid: Grid, engine: Engine, kept: Memory | Zarr, progre
     if progress:
         from .._progress import bar
 
-        shown: Any = bar(f"sweep, {grid.members} members")
+        shown: Any = bar(f"sweep, {counted(grid.members, 'member')}")
     else:
         shown = nullcontext(None)
     with shown as told:

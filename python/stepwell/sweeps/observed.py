@@ -84,6 +84,8 @@ def checked(what: Any) -> Of:
             right = (what[0], *nested[0])
             raise ArgumentError(f"of: expected a component of a block with several axes as {right}, got {_checks.short(what)}")
         return (what[0], *(_checks.count("of", each, 0) for each in what[1:]))
+    if callable(what):
+        _checks.argument_order("of", what, ("t", "v", "y"))
     if isinstance(what, str) or callable(what):
         found: Of = what
         return found

@@ -369,8 +369,8 @@ class Function(Outcome):
                 raise ArgumentError(f"outcomes: {name}: expected numbers, got an array of dtype {values.dtype}")
             if values.ndim == 0 or values.shape[-1] != run.status.size:
                 raise ShapeError(
-                    f"outcomes: {name}: expected an array whose last axis has one number for each of the {run.status.size} "
-                    f"members of the run, got shape {values.shape}"
+                    f"outcomes: {name}: expected an array whose last axis has one number for each member of the run, "
+                    f"{run.status.size}, got shape {values.shape}"
                 )
             dims = tuple(f"{name}_{i}" for i in range(values.ndim - 1)) if dims is None else dims
             if len(dims) != values.ndim - 1:

@@ -57,6 +57,8 @@ class OwnSystem(System):
             own = definition.own_axes[name]
             argument = f"{definition.name}: {name}"
             if isinstance(value, (Sinusoid, Sampled)) or callable(value):
+                if not isinstance(value, (Sinusoid, Sampled)):
+                    _checks.argument_order(argument, value, ("t",))
                 if own:
                     raise ShapeError(f"{argument}: expected an array of {own} axes of its own, as its default, got {value!r}")
                 self.parameters_given[name] = value

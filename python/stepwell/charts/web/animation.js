@@ -78,7 +78,7 @@ function points(g, size, panel, now, given) {
   if (panel.trail > 0) {
     for (let i = 0; i < panel.count; i++) {
       const trail = [];
-      for (let k = first; k >= 0 && given.t[k] >= given.t[first] - panel.trail; k--) {
+      for (let k = first; k >= 0 && Math.abs(given.t[first] - given.t[k]) <= panel.trail; k--) {
         trail.push(at(panel.values[2 * (k * panel.count + i)], panel.values[2 * (k * panel.count + i) + 1]));
       }
       g.globalAlpha = 0.6;
@@ -162,7 +162,7 @@ function solid(g, size, panel, now, given) {
   polyline(g, circle.map(seen), "#c8c8c8", 1.2);
   if (panel.tip) {
     const trail = [];
-    for (let k = first; k >= 0 && given.t[k] >= given.t[first] - panel.trail; k--) {
+    for (let k = first; k >= 0 && Math.abs(given.t[first] - given.t[k]) <= panel.trail; k--) {
       const one = panel.values.subarray(9 * k, 9 * k + 9);
       trail.push(seen([0, 1, 2].map((i) => on(panel.tip, one.subarray(3 * i, 3 * i + 3)))));
     }
