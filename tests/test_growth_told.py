@@ -95,7 +95,9 @@ SWEEPS = [
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"transient": 150}, {"outcomes": "extremes"}, {"outcomes": lambda run: run.y[-1]}], ids=str
+    "options",
+    [{}, {"transient": 150}, {"outcomes": "extremes"}, {"outcomes": lambda run: run.y[-1]}],
+    ids=["", "transient", "extremes", "function"],
 )
 @pytest.mark.parametrize(("system", "axes", "method", "given", "number", "first"), SWEEPS)
 def test_a_sweep_tells_how_many_members_grew_and_which_first(

@@ -132,8 +132,8 @@ class _Factors:
         from .stability.some_members import Batch
 
         self._system, self._method, self._dt = system, method, dt
-        of = (system.without_inputs(), method, None, None) if system.linear else (system, method, *start)
-        self._batch = Batch(*of, batch)
+        v, y = (None, None) if system.linear else start
+        self._batch = Batch(system.without_inputs() if system.linear else system, method, v, y, batch)
         self._t = np.broadcast_to(t, batch).reshape(-1) if np.ndim(t) else t
 
     def _own(self, members: Whole) -> tuple[System, Any, Array | None, Array | None]:
